@@ -1,0 +1,89 @@
+"""Contact, stress and force: where gears, soils and effects meet, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from soilml.arrays import Array, Real, namespace
+from soilml.operating import Operating
+from soilml.soils.base import Soil
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Points along the contact of a running gear, arrays (points, batch): points first.
+
+    `up` and `ahead` are the area projected on the ground and on the direction of travel: for a
+    point where the gear's surface stands at an angle theta from the ground, cos(theta) and
+    sin(theta) times `area`. A gear whose stress follows a known shape between few points puts the
+    integral of that shape there, and the sum in `integrate` is then exact.
+    """
+
+    depth: Array  # m, depth that sets the pressure
+    sheared: Array  # m, shear displacement since entry, positive when it drives
+    area: Array  # m^2, area that the point stands for
+    up: Array  # m^2, that area, projected on the ground
+    ahead: Array  # m^2, that area, projected on the direction of travel
+    lever: Array  # m, lever arm of the shear stress about the axle
+    width: Real  # m, the smaller dimension of the contact patch
+
+
+@dataclass(frozen=True)
+class Stress:
+    """Stress of the soil on the gear's surface, arrays (points, batch), Pa."""
+
+    normal: Array
+    shear: Array
+
+
+@dataclass(frozen=True)
+class Force:
+    """What a running gear feels; arrays of the batch's shape.
+
+    A row whose `status` is not 0 has no equilibrium: its torque, drawbar pull, sinkage and entry
+    angle are NaN, and its `load` is the largest that the soil carried.
+    """
+
+    load: Array  # N, vertical load carried
+    torque: Array  # N m
+    drawbar_pull: Array  # N
+    sinkage: Array  # m
+    entry_angle: Array  # rad
+    status: Array  # codes of soilml.status.Status
+
+
+def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
+    r"""Bekker's pressure and Janosi and Hanamoto's shear stress at every point of the contact.
+
+    .. math::
+        \sigma = (k_c / b + k_\varphi) z^n, \qquad
+        \tau = (c + \sigma \tan\varphi) (1 - e^{-|j| / K})
+
+    with the sign of the slip carried to the shear stress (a braking wheel is pulled back).
+    Arrays (points, batch). References: Bekker 1969; Janosi and Hanamoto, Proc. 1st ISTVS, 1961.
+    Not for soils whose shear curve peaks and falls (Wong's hump), nor for repeated loading.
+    """
+    xp = namespace(contact.depth)
+    modulus = soil.kc / contact.width + soil.kphi
+    normal = modulus * xp.exp(soil.n * xp.log(contact.depth))
+    strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
+    mobilised = -xp.expm1(-xp.abs(contact.sheared) / soil.shear_modulus)
+    sign = xp.where(at.slip < 0, -xp.ones_like(at.slip), xp.ones_like(at.slip))
+    return Stress(normal=normal, shear=sign * strength * mobilised)
+
+
+def integrate(contact: Contact, stress: Stress) -> tuple[Array, Array, Array]:
+    r"""Vertical load (N), drawbar pull (N) and torque (N m) of all points together.
+
+    .. math::
+        W = \int (\sigma \cos\theta + \tau \sin\theta) dA, \quad
+        DP = \int (\tau \cos\theta - \sigma \sin\theta) dA, \quad
+        T = \int \tau R \, dA
+
+    References: Wong and Reece 1967, eqs. of equilibrium of a driven rigid wheel.
+    """
+    xp = namespace(stress.normal)
+    load = xp.sum(stress.normal * contact.up + stress.shear * contact.ahead, axis=0)
+    pull = xp.sum(stress.shear * contact.up - stress.normal * contact.ahead, axis=0)
+    torque = xp.sum(stress.shear * contact.lever * contact.area, axis=0)
+    return load, pull, torque

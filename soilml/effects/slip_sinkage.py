@@ -1,0 +1,39 @@
+"""Slip-sinkage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Real, namespace
+from soilml.effects.base import EffectCard
+from soilml.parameters import Parameter
+from soilml.scene import Scene
+from soilml.soils.base import Soil
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SlipSinkage:
+    r"""A slipping wheel digs itself in: the exponent of sinkage grows with slip.
+
+    .. math:: n = n_0 + n_1 |s|
+
+    References: Ding, Gao, Deng, Nagatani and Yoshida, J. Terramechanics 48(1), 2011, the
+    slip-dependent exponent. An empirical law for small lugged wheels in dry sand; it says nothing
+    of the time that digging takes.
+    """
+
+    name: ClassVar[str] = "slip-sinkage"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="a slipping wheel digs itself in: n grows with slip",
+        source="Ding et al. 2011, J. Terramechanics 48(1)",
+        neutral={"n1": 0.0},
+        reference={"n1": 0.4},
+        signs={"sinkage": +1},
+    )
+    n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
+
+    def on_soil(self, soil: Soil, scene: Scene) -> Soil:
+        xp = namespace(scene.at.slip)
+        return replace(soil, n=soil.n + self.n1 * xp.abs(scene.at.slip))

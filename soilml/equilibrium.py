@@ -1,0 +1,191 @@
+"""The sinkage at which the soil carries the load, for one flat batch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+from soilml.arrays import Array, namespace, tracked, untracked
+from soilml.contact import Force, Stress, integrate, stress
+from soilml.effects.base import through
+from soilml.parameters import values
+from soilml.roots import crossing, scan
+from soilml.scene import Scene, rows
+from soilml.status import Status
+
+#: The soil carries the load within this share of it, or the row is not converged.
+BALANCE = 1e-7
+#: A row that was not solved directly is looked at at this many sinkages.
+SCAN_POINTS = 32
+#: The search begins at this share of the deepest sinkage.
+SHALLOWEST = 1e-14
+
+
+def loaded(scene: Scene, sinkage: Array) -> Force:
+    """Forces on a gear that stands this deep (m) in the soil, whatever load that carries."""
+    xp = namespace(sinkage)
+    gear, soil, at, effects = scene.gear, scene.soil, scene.at, scene.effects
+    shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
+    contact = gear.contact(shape, at)
+    stresses = through(effects, "on_stress", stress(contact, soil, at), scene)
+    load, pull, torque = integrate(contact, stresses)
+    flaw = gear.flaw(shape)
+    bearing = soil.kc / contact.width + soil.kphi + 0.0 * load
+    status = xp.where((flaw == 0) & ~(bearing > 0), flaw + int(Status.NO_BEARING), flaw)
+    force = Force(
+        load=load,
+        torque=torque,
+        drawbar_pull=pull,
+        sinkage=sinkage,
+        entry_angle=shape.entry,
+        status=status,
+    )
+    return through(effects, "on_force", force, scene)
+
+
+def settled(scene: Scene) -> Force:
+    """Forces at the first sinkage at which the soil carries the load; arrays (batch,)."""
+    scene = prepared(scene)
+    leaves = list(values(scene).values())
+    with untracked(leaves):
+        force = _at_rest(scene)
+    if tracked(leaves):
+        force = _differentiable(scene, force)
+    return _blanked(through(scene.effects, "on_reading", force, scene))
+
+
+def prepared(scene: Scene) -> Scene:
+    """The scene as it truly is: slip and load without sensor errors, the soil as it is met."""
+    scene = replace(scene, at=through(scene.effects, "on_operating", scene.at, scene))
+    return replace(scene, soil=through(scene.effects, "on_soil", scene.soil, scene))
+
+
+def stresses_along(scene: Scene, sinkage: Array, points: int) -> tuple[Array, Stress]:
+    """Angles and stresses (points, batch) on a gear that stands this deep (m) in the soil."""
+    scene = prepared(scene)
+    shape = through(
+        scene.effects, "on_contact", scene.gear.shape(sinkage, scene.soil, scene.at), scene
+    )
+    angle, contact = scene.gear.stations(shape, scene.at, points)
+    found = stress(contact, scene.soil, scene.at)
+    return angle, through(scene.effects, "on_stress", found, scene)
+
+
+def _at_rest(scene: Scene) -> Force:
+    """Forces at equilibrium, of every row: directly where that works, by search where not."""
+    xp = namespace(scene.at.load)
+    soil, at, gear = scene.soil, scene.at, scene.gear
+    deepest = xp.log(gear.deepest() + 0.0 * at.load)
+    guess = xp.log(gear.guess(soil, at))
+    guess = xp.where(guess < deepest - 0.1, guess, deepest - 0.1)
+    found, force = _balanced(
+        scene, deepest + math.log(SHALLOWEST), deepest, guess, soil.n + 0.5 + 0.0 * at.load
+    )
+    if not bool(xp.all(found)):
+        index = xp.nonzero(~found)[0]
+        force = _with_rows(force, found, _searched(rows(scene, index)))
+    return force
+
+
+def _differentiable(scene: Scene, force: Force) -> Force:
+    r"""The same forces, with their gradients through the equilibrium.
+
+    .. math:: z(p) = z^* - \frac{W(z^*; p) - W}{\partial W / \partial z}
+
+    One Newton step from the sinkage found, whose value is nil and whose derivative is that of the
+    implicit function theorem. Rows without equilibrium have none.
+    """
+    xp = namespace(force.sinkage)
+    with untracked(values(scene).values()):
+        z, h = force.sinkage, 1e-5
+        above, below = loaded(scene, z * (1.0 + h)).load, loaded(scene, z * (1.0 - h)).load
+        steepness = (above - below) / (2.0 * h * z)
+    excess = loaded(scene, z).load - scene.at.load
+    answered = force.status == 0
+    step = xp.where(answered, excess / steepness, xp.zeros_like(z))
+    return replace(loaded(scene, z - step), status=force.status)
+
+
+def _balanced(
+    scene: Scene, low: Array, high: Array, guess: Array, steepness: Array
+) -> tuple[Array, Force]:
+    """Which rows have an equilibrium between two logs of sinkage, and the forces there."""
+    xp = namespace(guess)
+    excess = _excess(scene)
+    root = crossing(excess, low, high, guess, steepness)
+    force = loaded(scene, xp.exp(root.x))
+    balanced = xp.abs(force.load / scene.at.load - 1.0) < BALANCE
+    return root.found & balanced & (root.slope > 0), force
+
+
+def _excess(scene: Scene) -> Callable[[Array], Array]:
+    """Log of the load carried over the load, by log of sinkage; flat where far too little is."""
+    xp = namespace(scene.at.load)
+
+    def excess(log_sinkage: Array) -> Array:
+        ratio = loaded(scene, xp.exp(log_sinkage)).load / scene.at.load
+        return xp.log(xp.maximum(ratio, xp.full_like(ratio, 1e-3)))
+
+    return excess
+
+
+def _searched(scene: Scene) -> Force:
+    """Rows where the load is not reached directly, or is reached on the way down from a peak.
+
+    Under a braking wheel, or with an effect that lifts or unloads, the load carried need not rise
+    with sinkage: the wheel comes to rest where it first reaches the load.
+    """
+    xp = namespace(scene.at.load)
+    deepest = xp.log(scene.gear.deepest() + 0.0 * scene.at.load)
+    excess = _excess(scene)
+    steps = [3.0 * math.log((i + 1) / SCAN_POINTS) for i in range(SCAN_POINTS)]
+    grid = xp.stack([deepest + step for step in [math.log(SHALLOWEST), *steps]], axis=0)
+    low, high, exists, highest = scan(excess, grid)
+    for _ in range(2):  # closer to a peak that stayed below the load
+        last = grid.shape[0] - 1
+        left = xp.take_along_axis(grid, xp.clip(highest - 1, 0, last)[None, :], axis=0)[0, :]
+        right = xp.take_along_axis(grid, xp.clip(highest + 1, 0, last)[None, :], axis=0)[0, :]
+        grid = xp.stack([left + (right - left) * i / 16 for i in range(17)], axis=0)
+        low_near, high_near, near, highest = scan(excess, grid)
+        low = xp.where(exists, low, low_near)
+        high = xp.where(exists, high, high_near)
+        exists = exists | near
+    top = xp.take_along_axis(grid, highest[None, :], axis=0)[0, :]
+    low, high = xp.where(exists, low, top - 1e-3), xp.where(exists, high, top)
+    found, force = _balanced(scene, low, high, 0.5 * (low + high), 1.0 / (high - low))
+    at_top = loaded(scene, xp.exp(top))
+    status = xp.where(exists, int(Status.NOT_CONVERGED) + 0 * force.status, force.status)
+    status = xp.where(exists, status, int(Status.TOO_HEAVY) + 0 * force.status)
+    status = xp.where(force.status != 0, force.status, xp.where(found, 0 * status, status))
+    return replace(force, status=status, load=xp.where(exists, force.load, at_top.load))
+
+
+def _with_rows(force: Force, keep: Array, others: Force) -> Force:
+    """`force` where `keep`, and the rows of `others`, in order, elsewhere."""
+    xp = namespace(force.load)
+    size = keep.shape[0]
+    position = xp.where(
+        keep,
+        xp.arange(size, device=keep.device),
+        size - 1 + xp.cumulative_sum(xp.astype(~keep, xp.int64)),
+    )
+    joined = {}
+    for field in fields(Force):
+        both = xp.concat([getattr(force, field.name), getattr(others, field.name)], axis=0)
+        joined[field.name] = xp.take(both, position, axis=0)
+    return Force(**joined)
+
+
+def _blanked(force: Force) -> Force:
+    """NaN for every answer of a row that has none."""
+    xp = namespace(force.load)
+    answered = force.status == 0
+    nan = xp.full_like(force.load, math.nan)
+    return replace(
+        force,
+        torque=xp.where(answered, force.torque, nan),
+        drawbar_pull=xp.where(answered, force.drawbar_pull, nan),
+        sinkage=xp.where(answered, force.sinkage, nan),
+        entry_angle=xp.where(answered, force.entry_angle, nan),
+    )

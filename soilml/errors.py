@@ -1,0 +1,35 @@
+"""Everything soilml raises on purpose.
+
+    SoilmlError                 one clear line; the command line ends with status 2
+    ├── InputError              a value, a column or a setting given by the user is wrong
+    │   └── TableError          ... in a table; the line names file, row and column
+    ├── ModelFileError          an ONNX file is corrupt, foreign, or made for something else
+    ├── FitError                the measurements cannot be fitted as asked
+    └── MissingLibraryError     a library is not installed; the line says which extra brings it
+
+Nothing *inside* a batch raises: a row that has no answer carries a `soilml.status.Status`.
+"""
+
+
+class SoilmlError(Exception):
+    """Root of the tree: what was given, what is needed, a hint, in one line."""
+
+
+class InputError(SoilmlError, ValueError):
+    """A value, a column or a setting given by the user is wrong."""
+
+
+class TableError(InputError):
+    """A table cannot be read as measurements; names file, row and column."""
+
+
+class ModelFileError(SoilmlError):
+    """An ONNX file is corrupt, foreign, or made for something else."""
+
+
+class FitError(SoilmlError):
+    """The measurements cannot be fitted as asked."""
+
+
+class MissingLibraryError(SoilmlError, ImportError):
+    """A library is not installed; the message says which extra brings it."""

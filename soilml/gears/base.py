@@ -1,0 +1,45 @@
+"""What a running gear must answer."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+from soilml.arrays import Array, Real
+from soilml.contact import Contact
+from soilml.operating import Operating
+from soilml.soils.base import Soil
+
+
+@runtime_checkable
+class Gear(Protocol):
+    """A running gear: a frozen dataclass of its dimensions that can describe its contact.
+
+    `shape` gives the contact as a few numbers per row (angles, radii), which effects may change;
+    `contact` cuts that shape into points. Both take arrays of shape (batch,).
+    """
+
+    name: ClassVar[str]
+
+    def deepest(self) -> Real:
+        """The largest sinkage that the gear's model holds for, m."""
+        ...
+
+    def guess(self, soil: Soil, at: Operating) -> Array:
+        """A first estimate of the sinkage, m."""
+        ...
+
+    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Any:
+        """The contact at this sinkage, before it is cut into points."""
+        ...
+
+    def flaw(self, shape: Any) -> Array:
+        """Codes of `soilml.status.Status`: why a shape cannot carry stresses, 0 where it can."""
+        ...
+
+    def contact(self, shape: Any, at: Operating) -> Contact:
+        """The points along the contact, for integration."""
+        ...
+
+    def stations(self, shape: Any, at: Operating, points: int) -> tuple[Array, Contact]:
+        """Points along the contact for looking at: their angles (points, batch), and themselves."""
+        ...

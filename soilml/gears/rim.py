@@ -1,0 +1,76 @@
+"""The arc of a rigid wheel that stands in the soil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from soilml.arrays import Array, Real, namespace
+from soilml.operating import Operating
+from soilml.soils.base import Soil
+from soilml.status import Status
+
+#: Stands for no depth, where the stress is zero: log(0) has no derivative.
+NO_DEPTH = 1e-300
+
+
+@dataclass(frozen=True)
+class Rim:
+    """Entry, exit and maximum-stress angle of a wheel's contact, and the radii that matter.
+
+    Angles are measured from straight down, positive forward; arrays of shape (batch,).
+    """
+
+    entry: Array  # rad
+    exit: Array  # rad, zero or negative
+    peak: Array  # rad, where the normal stress is largest
+    sinkage: Array  # m
+    radius: Real  # m
+    shear_radius: Real  # m, radius at which soil is sheared; that of the rim unless lugs dig
+    width: Real  # m
+
+
+def rim_at(sinkage: Array, radius: Real, width: Real, soil: Soil, at: Operating) -> Rim:
+    r"""The arc of a wheel that has sunk this deep (m), leaving the soil straight below its axle.
+
+    .. math::
+        \theta_1 = \arccos(1 - z / r), \quad \theta_2 = 0, \quad
+        \theta_m = (a_0 + a_1 s) \theta_1
+
+    References: Wong and Reece, J. Terramechanics 4(1), 1967.
+    """
+    xp = namespace(sinkage)
+    # arcsin of the half angle keeps all digits at small sinkage, where arccos loses them
+    entry = 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * radius)))
+    return Rim(
+        entry=entry,
+        exit=xp.zeros_like(entry),
+        peak=(soil.a0 + soil.a1 * at.slip) * entry,
+        sinkage=sinkage,
+        radius=radius,
+        shear_radius=radius,
+        width=width,
+    )
+
+
+def rim_flaw(rim: Rim) -> Array:
+    """`Status.NO_PEAK` where the maximum stress does not lie inside the contact, else 0."""
+    xp = namespace(rim.entry)
+    inside = (rim.peak > rim.exit) & (rim.peak < rim.entry)
+    ok = xp.zeros_like(rim.entry, dtype=xp.int64)
+    return xp.where(inside, ok, ok + int(Status.NO_PEAK))
+
+
+def plate_sinkage(radius: Real, width: Real, soil: Soil, at: Operating) -> Array:
+    r"""Sinkage of a rigid wheel under normal stress alone, m.
+
+    .. math::
+        z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
+
+    References: Bekker 1969, eq. for the towed rigid wheel. Good for n below 1.3; here it only
+    starts a search, so n is kept from 3.
+    """
+    xp = namespace(at.load)
+    modulus = soil.kc + width * soil.kphi
+    room = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, 0.5))
+    base = 3.0 * at.load / (room * modulus * xp.sqrt(2.0 * radius))
+    return base ** (2.0 / (2.0 * soil.n + 1.0))

@@ -1,0 +1,155 @@
+"""The rigid wheel, by full integration of its stresses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Array, Real, namespace
+from soilml.contact import Contact
+from soilml.gears.reversal import reversal
+from soilml.gears.rim import NO_DEPTH, Rim, plate_sinkage, rim_at, rim_flaw
+from soilml.operating import Operating
+from soilml.parameters import Parameter
+from soilml.quadrature import Nodes, crowded_ends, crowded_start
+from soilml.soils.base import Soil
+
+#: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
+#: quadrature.
+DRIVING_NODES = 16
+BRAKING_NODES = 24
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Wheel:
+    r"""A rigid cylinder: Bekker's pressure mirrored behind the angle of maximum stress.
+
+    .. math::
+        z(\theta) = r (\cos\theta - \cos\theta_1), \ \theta_m \le \theta \le \theta_1; \quad
+        z(\theta) = r \left(\cos\left[\theta_1 - \frac{\theta - \theta_2}{\theta_m - \theta_2}
+        (\theta_1 - \theta_m)\right] - \cos\theta_1\right), \ \theta_2 \le \theta < \theta_m
+
+        j(\theta) = r [\theta_1 - \theta - (1 - s)(\sin\theta_1 - \sin\theta)]
+
+    References: Wong and Reece, J. Terramechanics 4(1), 1967; the same set in Nagatani et al. 2009,
+    eqs. 3-10. Holds for a rim that does not deform, straight travel, sinkage up to the hub, and
+    wheels large against the soil's grains; below about half a metre of diameter the measured
+    stress is narrower and further forward (Nagatani et al. 2009, section IV).
+    """
+
+    name: ClassVar[str] = "wheel"
+    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
+    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
+
+    def deepest(self) -> Real:
+        """The hub stands at the free surface: the radius, m."""
+        return self.radius
+
+    def guess(self, soil: Soil, at: Operating) -> Array:
+        """Bekker's sinkage of a towed wheel, m."""
+        return plate_sinkage(self.radius, self.width, soil, at)
+
+    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Rim:
+        """The arc that stands in the soil."""
+        return rim_at(sinkage, self.radius, self.width, soil, at)
+
+    def flaw(self, shape: Rim) -> Array:
+        """`Status.NO_PEAK` where the maximum stress does not lie inside the arc."""
+        return rim_flaw(shape)
+
+    def contact(self, shape: Rim, at: Operating) -> Contact:
+        """The points along the arc; more of them where a braking wheel shears both ways."""
+        xp = namespace(shape.entry)
+        if bool(xp.any(at.slip < 0)):
+            return _braking(shape, at)
+        return _driving(shape, at)
+
+    def stations(self, shape: Rim, at: Operating, points: int) -> tuple[Array, Contact]:
+        """Evenly spaced from entry to exit; they stand for no area."""
+        xp = namespace(shape.entry)
+        share = xp.linspace(0.0, 1.0, points, dtype=shape.entry.dtype)[:, None]
+        passed = share * (shape.entry - shape.exit)
+        front, rear = shape.entry - shape.peak, shape.peak - shape.exit
+        behind = (1.0 - share) * (shape.entry - shape.exit) * (front / rear)
+        depth = depth_along(shape, xp.where(passed <= front, passed, behind))
+        none = xp.zeros_like(passed)
+        return shape.entry - passed, contact_along(
+            shape, at, passed, xp.maximum(depth, none + NO_DEPTH), none
+        )
+
+
+def _driving(rim: Rim, at: Operating) -> Contact:
+    """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
+    xp = namespace(rim.entry)
+    x, weight = _columns(crowded_start(DRIVING_NODES), rim.entry)
+    front, rear = rim.entry - rim.peak, rim.peak - rim.exit
+    passed = xp.concat([x * front, (rim.entry - rim.exit) - x * rear], axis=0)
+    depth = depth_along(rim, x * front)  # nodes stand alike in both parts: the same pressures
+    arc = xp.concat([weight * front, weight * rear], axis=0)
+    return contact_along(rim, at, passed, xp.concat([depth, depth], axis=0), arc)
+
+
+def _braking(rim: Rim, at: Operating) -> Contact:
+    """Three parts: shear displacement may change its direction, and the shear curve bends there."""
+    xp = namespace(rim.entry)
+    x, weight = _columns(crowded_ends(BRAKING_NODES), rim.entry)
+    front, rear = rim.entry - rim.peak, rim.peak - rim.exit
+    halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
+    turn, turns = reversal(rim.entry, rim.exit, at.slip)
+    inner = xp.where(turns, turn, halfway)
+    ends = [rim.exit, xp.minimum(rim.peak, inner), xp.maximum(rim.peak, inner), rim.entry]
+    passed, mapped, arc = [], [], []
+    for low, high in pairwise(ends):
+        length = high - low
+        here = (rim.entry - high) + length * x
+        behind = ((low - rim.exit) + length * (1.0 - x)) * (front / rear)
+        passed.append(here)
+        mapped.append(xp.where(high <= rim.peak, behind, here))
+        arc.append(weight * length)
+    depth = depth_along(rim, xp.concat(mapped, axis=0))
+    return contact_along(rim, at, xp.concat(passed, axis=0), depth, xp.concat(arc, axis=0))
+
+
+def depth_along(rim: Rim, passed: Array) -> Array:
+    """Depth (m) below the free surface of points of the rim, by the angle passed since entry."""
+    xp = namespace(passed)
+    t = xp.tan(0.5 * passed)
+    double = 2.0 * t / (1.0 + t * t)
+    return rim.radius * double * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
+
+
+def contact_along(rim: Rim, at: Operating, passed: Array, depth: Array, arc: Array) -> Contact:
+    """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
+
+    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point stands for. With t the
+    tangent of half the angle passed, sines and cosines follow from those of the entry angle alone,
+    and their differences do not cancel.
+    """
+    xp = namespace(passed)
+    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
+    t = xp.tan(0.5 * passed)
+    double = 2.0 * t / (1.0 + t * t)
+    sin_gone = double * (cos_entry + t * sin_entry)  # sin(theta_1) - sin(theta)
+    cos_gained = double * (sin_entry - t * cos_entry)  # cos(theta) - cos(theta_1)
+    area = rim.radius * rim.width * arc
+    return Contact(
+        depth=depth,
+        sheared=rim.shear_radius * (passed - (1.0 - at.slip) * sin_gone),
+        area=area,
+        up=area * (cos_entry + cos_gained),
+        ahead=area * (sin_entry - sin_gone),
+        lever=rim.shear_radius,
+        width=rim.width,
+    )
+
+
+def _columns(nodes: Nodes, like: Array) -> tuple[Array, Array]:
+    """Nodes and weights as columns of the array library of `like`."""
+    xp = namespace(like)
+    x, weight = nodes
+    return (
+        xp.asarray(x[:, None], dtype=like.dtype, device=like.device),
+        xp.asarray(weight[:, None], dtype=like.dtype, device=like.device),
+    )

@@ -1,0 +1,24 @@
+"""How a running gear is driven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, final
+
+from soilml.arrays import Real
+from soilml.parameters import Parameter
+
+#: Slip of 1 is a wheel that spins on the spot, -1 a locked wheel that slides: neither rolls.
+MOST_SLIP = 1.0 - 1e-9
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Operating:
+    """Slip ratio and vertical load; numbers or arrays of any shapes that broadcast.
+
+    Slip is 1 - v/(r omega) when driving (0 to 1) and r omega/v - 1 when braking (-1 to 0).
+    """
+
+    slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
+    load: Annotated[Real, Parameter("N", 1e-6, 1e7, "vertical load")]

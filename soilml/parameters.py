@@ -1,0 +1,127 @@
+"""Parameters: declared once with their field, addressed by dotted path.
+
+A field of a frozen dataclass becomes a parameter by its annotation,
+
+    cohesion: Annotated[Real, Parameter("Pa", 0.0, 1e6)]
+
+and is then found by `values`, replaced by `with_values` and validated by `check`, however deep it
+sits in a tree of dataclasses, tuples of named parts, and plain mappings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
+from typing import Any, TypeVar, get_type_hints
+
+import numpy as np
+
+from soilml.arrays import Real, to_numpy
+from soilml.errors import InputError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Unit and closed bounds of a number, and what it means."""
+
+    unit: str
+    lower: float
+    upper: float
+    text: str = ""
+
+
+@cache
+def declared(cls: type) -> dict[str, Parameter]:
+    """The parameters that a dataclass declares, by field name, in order."""
+    hints = get_type_hints(cls, include_extras=True)
+    found = {}
+    for field in fields(cls):
+        for mark in getattr(hints[field.name], "__metadata__", ()):
+            if isinstance(mark, Parameter):
+                found[field.name] = mark
+    return found
+
+
+def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
+    """(path name, key, part) of the parts of `tree` that may hold parameters."""
+    if is_dataclass(tree) and not isinstance(tree, type):
+        own = declared(type(tree))
+        for field in fields(tree):
+            if field.name not in own:
+                yield field.name, field.name, getattr(tree, field.name)
+    elif isinstance(tree, tuple):
+        for index, part in enumerate(tree):
+            if hasattr(part, "name"):
+                yield part.name, index, part
+
+
+def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
+    """Every parameter of the tree, dotted path -> (declaration, value)."""
+    found: dict[str, tuple[Parameter, Real]] = {}
+    if is_dataclass(tree) and not isinstance(tree, type):
+        for name, parameter in declared(type(tree)).items():
+            found[prefix + name] = parameter, getattr(tree, name)
+    for name, _, part in _parts(tree):
+        found |= located(part, f"{prefix}{name}.")
+    return found
+
+
+def values(tree: Any) -> dict[str, Real]:
+    """Every parameter's value, by dotted path."""
+    return {path: value for path, (_, value) in located(tree).items()}
+
+
+def with_values(tree: T, new: Mapping[str, Real]) -> T:
+    """The same tree with some parameters replaced; a path that the tree lacks raises `InputError`.
+
+    Values are not checked: inside a computation an effect may carry a parameter past its bounds.
+    """
+    if missing := new.keys() - located(tree).keys():
+        raise InputError(
+            f"no parameter {sorted(missing)[0]!r}; there are: {', '.join(located(tree))}"
+        )
+    return _rebuilt(tree, new) if new else tree
+
+
+def _rebuilt(tree: Any, new: Mapping[str, Real]) -> Any:
+    here = {path: value for path, value in new.items() if "." not in path}
+    changed: dict[str | int, Any] = dict(here.items())
+    for name, key, part in _parts(tree):
+        inner = {
+            path[len(name) + 1 :]: value
+            for path, value in new.items()
+            if path.startswith(f"{name}.")
+        }
+        if inner:
+            changed[key] = _rebuilt(part, inner)
+    if isinstance(tree, tuple):
+        return tuple(changed.get(index, part) for index, part in enumerate(tree))
+    return replace(tree, **{str(key): value for key, value in changed.items()})
+
+
+def check(tree: Any, where: str = "") -> None:
+    """Raise `InputError` where a parameter is not finite or lies outside its bounds."""
+    for path, (parameter, value) in located(tree).items():
+        numbers = to_numpy(value)
+        bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
+        if np.any(bad):
+            worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
+            raise InputError(
+                f"{where}{path} is {worst:g} {unit_text(parameter.unit)}".rstrip()
+                + f"; it must lie between {parameter.lower:g} and {parameter.upper:g}"
+                + _hint(parameter, worst)
+            )
+
+
+def unit_text(unit: str) -> str:
+    """The unit as printed behind a number: nothing for a pure number."""
+    return "" if unit == "1" else unit
+
+
+def _hint(parameter: Parameter, value: float) -> str:
+    if parameter.unit == "rad" and 2.0 <= value <= 90.0:
+        return f" (if {value:g} are degrees, write {np.deg2rad(value):.4f})"
+    return ""

@@ -1,0 +1,79 @@
+"""Nomenclature: the only place where a quantity is named.
+
+A quantity's `column` is its name in every table that soilml reads or writes; the unit is part of
+the column name, so that a file cannot be read in the wrong unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+_SUFFIX = {
+    "1": "",
+    "N m": "_Nm",
+    "m/s": "_m_s",
+    "N/m^3": "_N_m3",
+    "N/m^(n+1)": "_SI",
+    "N/m^(n+2)": "_SI",
+    "-": "",
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical quantity: name, symbol, SI unit, and what it is, with its sign."""
+
+    name: str
+    symbol: str
+    unit: str
+    text: str
+
+    @property
+    def column(self) -> str:
+        """The quantity's column name in tables: `torque_Nm`, `sinkage_m`, `slip`."""
+        return self.name + _SUFFIX.get(self.unit, f"_{self.unit}")
+
+
+_ALL = (
+    Quantity("run", "", "-", "name of the run: rows driven together"),
+    Quantity("slip", "s", "1", "slip ratio: driving 1 - v/(r omega), braking r omega/v - 1"),
+    Quantity("load", "W", "N", "vertical load on the wheel"),
+    Quantity("torque", "T", "N m", "drive torque, positive when it drives forward"),
+    Quantity("drawbar_pull", "DP", "N", "net pull of the wheel on its axle, positive forward"),
+    Quantity("sinkage", "z", "m", "depth of the lowest point of the rim below the free surface"),
+    Quantity("entry_angle", "theta_1", "rad", "where the rim meets the soil, from straight down"),
+    Quantity("side_force", "Fy", "N", "sideways force of the soil on the wheel"),
+    Quantity("speed", "v", "m/s", "travel speed of the axle"),
+    Quantity("pass", "", "-", "1 on virgin soil, 2 in the rut of one wheel, ..."),
+    Quantity("slip_angle", "beta", "rad", "angle between the wheel's plane and its travel"),
+    Quantity("time", "t", "s", "time since the start of the log"),
+    Quantity("status", "", "-", "ok, or why the row has no answer"),
+    Quantity("source", "", "-", "where the row comes from"),
+    Quantity("wheel_radius", "r", "m", "radius of the wheel that was driven"),
+    Quantity("wheel_width", "b", "m", "width of the wheel that was driven"),
+    Quantity("grouser_height", "h", "m", "height of the grousers of the wheel that was driven"),
+    Quantity("grouser_count", "", "1", "number of grousers of the wheel that was driven"),
+    Quantity("cohesion", "c", "Pa", "cohesion of the soil"),
+    Quantity("friction_angle", "phi", "rad", "internal friction angle of the soil"),
+    Quantity("shear_modulus", "K", "m", "shear deformation modulus of the soil"),
+    Quantity("kc", "k_c", "N/m^(n+1)", "cohesive modulus of sinkage (Bekker)"),
+    Quantity("kphi", "k_phi", "N/m^(n+2)", "frictional modulus of sinkage (Bekker)"),
+    Quantity("n", "n", "1", "exponent of sinkage (Bekker)"),
+    Quantity("a0", "a_0", "1", "angle of maximum stress, share of the entry angle at no slip"),
+    Quantity("a1", "a_1", "1", "growth of that share with slip"),
+    Quantity("unit_weight", "gamma", "N/m^3", "weight of the soil per volume"),
+)
+
+#: Every quantity by name.
+QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _ALL}
+#: Every quantity by its column name in tables.
+COLUMNS: dict[str, Quantity] = {quantity.column: quantity for quantity in _ALL}
+#: What the shear law of the soil needs, in the order of every estimate: c, phi, K.
+SHEAR = ("cohesion", "friction_angle", "shear_modulus")
+#: Channels that a rover can measure and a model predicts.
+CHANNELS = ("torque", "drawbar_pull", "sinkage")
+
+
+def column(name: str) -> str:
+    """Column name of the quantity called `name`."""
+    return QUANTITIES[name].column

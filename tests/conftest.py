@@ -1,0 +1,115 @@
+"""What tests share: the input box, a reference case, small data."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.436332, 0.785398]
+shear_modulus = [0.005, 0.03]
+[noise]
+torque_Nm = "2 %"
+"""
+
+RECIPE = (
+    """\
+rows = {rows}
+seed = {seed}
+"""
+    + MODEL
+    + """\
+[operating]
+slip = [0.05, 0.6]
+load_N = [30.0, 120.0]
+"""
+)
+
+
+def input_box(count: int, seed: int) -> dict[str, np.ndarray]:
+    """Rows that fill the whole input box of the rigid wheel."""
+    u = qmc.Sobol(11, rng=seed).random(count)
+
+    def line(i, a, b):
+        return a + (b - a) * u[:, i]
+
+    def log(i, a, b):
+        return a * (b / a) ** u[:, i]
+
+    return {
+        "cohesion": line(0, 0.0, 6000.0),
+        "friction_angle": np.deg2rad(line(1, 15.0, 50.0)),
+        "shear_modulus": log(2, 0.002, 0.06),
+        "n": line(3, 0.4, 1.6),
+        "kc": np.zeros(count),
+        "kphi": log(4, 4e4, 1e7),
+        "slip": line(5, -0.9, 0.95),
+        "load": log(6, 5.0, 1000.0),
+        "radius": log(7, 0.04, 0.5),
+        "width": log(8, 0.02, 0.4),
+        "a0": line(9, 0.3, 0.6),
+        "a1": line(10, 0.0, 0.3),
+    }
+
+
+def solved(box: dict[str, np.ndarray], effects=(), gear=None):
+    """The package's answer for rows of a box."""
+    from soilml import Model, Operating, Soil, Wheel
+
+    names = ("cohesion", "friction_angle", "shear_modulus", "n", "kc", "kphi", "a0", "a1")
+    soil = Soil(**{name: box[name] for name in names})
+    gear = (gear or Wheel)(radius=box["radius"], width=box["width"])
+    return Model(gear, tuple(effects))(soil, Operating(slip=box["slip"], load=box["load"]))
+
+
+@pytest.fixture
+def model_file(tmp_path: Path) -> Path:
+    """The reference wheel as a model file."""
+    path = tmp_path / "model.toml"
+    path.write_text(MODEL)
+    return path
+
+
+@pytest.fixture(scope="session")
+def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Some thousand rows, a quarter of them in runs of 32."""
+    from datagen.engine import generate
+    from datagen.recipe import read_recipe
+
+    folder = tmp_path_factory.mktemp("data")
+    recipe = folder / "recipe.toml"
+    blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
+    recipe.write_text(RECIPE.format(rows=8192, seed=5) + blocks)
+    generate(read_recipe(recipe), folder / "data.parquet")
+    return folder / "data.parquet"
+
+
+@pytest.fixture(scope="session")
+def small_model(small_data: Path) -> Path:
+    """A fused estimator trained on the small data, with a quick perceptron."""
+    from soilml.cli import main
+
+    spec = small_data.parent / "spec.toml"
+    spec.write_text(
+        'seed = 1\n[[regressor]]\ntype = "fixed-size-lssvm"\ncentres = 60\n'
+        '[[regressor]]\ntype = "mlp"\nhidden = [24]\nepochs = 12\n[[regressor]]\ntype = "linear"\n'
+    )
+    out = small_data.parent / "small.onnx"
+    assert main(["train", str(spec), str(small_data), str(out)]) == 0
+    return out

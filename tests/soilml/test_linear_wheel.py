@@ -1,0 +1,96 @@
+"""The closed form against its printed sums, against quadrature, and against sympy."""
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import quad
+
+from soilml import LinearWheel, Model, Operating, Soil, Wheel
+
+SOIL = Soil(
+    cohesion=900.0, friction_angle=0.55, shear_modulus=0.012, kc=990.0, kphi=1.5e6, n=1.1,
+    a0=0.4, a1=0.2,
+)  # fmt: skip
+R, B = 0.15, 0.12
+
+
+def printed(theta1, slip):
+    """(W, DP, T) by the sums of the closed form, theta_2 = 0."""
+    tm = (SOIL.a0 + SOIL.a1 * slip) * theta1
+    sm = (SOIL.kc / B + SOIL.kphi) * (R * (np.cos(tm) - np.cos(theta1))) ** SOIL.n
+    K = SOIL.shear_modulus
+    t0 = SOIL.cohesion * (1 - np.exp(-R / K * (theta1 - (1 - slip) * np.sin(theta1))))
+    j = theta1 - tm - (1 - slip) * (np.sin(theta1) - np.sin(tm))
+    taum = (SOIL.cohesion + sm * np.tan(SOIL.friction_angle)) * (1 - np.exp(-R / K * j))
+    front = theta1 - tm
+    a_rear = (tm * np.sin(tm) + np.cos(tm) - 1) / tm
+    a = a_rear + (np.cos(tm) - np.cos(theta1) - front * np.sin(tm)) / front
+    b1 = (np.sin(tm) - tm * np.cos(tm)) / tm
+    b = b1 + (front * np.cos(tm) + np.sin(tm) - np.sin(theta1)) / front
+    load = R * B * (sm * a + taum * b + t0 * (1 - np.cos(tm) - b1))
+    pull = R * B * (taum * a - sm * b + t0 * (np.sin(tm) - a_rear))
+    torque = 0.5 * R * R * B * (taum * theta1 + t0 * tm)
+    return load, pull, torque
+
+
+@pytest.mark.parametrize("slip", [0.05, 0.3, 0.8])
+@pytest.mark.parametrize("load", [8.0, 60.0, 400.0])
+def test_agrees_with_the_printed_sums(slip, load):
+    force = Model(LinearWheel(radius=R, width=B))(SOIL, Operating(slip=slip, load=load))
+    expected = printed(float(force.entry_angle), slip)
+    assert expected[0] == pytest.approx(load, rel=1e-9)
+    assert force.drawbar_pull == pytest.approx(expected[1], rel=1e-9)
+    assert force.torque == pytest.approx(expected[2], rel=1e-12)
+
+
+def test_weights_are_the_integrals_of_the_straight_lines():
+    t, t2, tm, t1 = sp.symbols("t t2 tm t1", real=True)
+    rear, front = (t - t2) / (tm - t2), (t1 - t) / (t1 - tm)
+    numbers = {t2: -0.1, tm: 0.2, t1: 0.5}
+    gear = LinearWheel(radius=R, width=B)
+    from dataclasses import replace
+
+    at = Operating(slip=np.asarray([0.3]), load=np.asarray([60.0]))
+    shape = gear.shape(np.asarray([R * (1 - np.cos(0.5))]), SOIL, at)
+    shape = replace(shape, exit=np.asarray([-0.1]), peak=np.asarray([0.2]))
+    contact = gear.contact(shape, at)
+    for weight, function in ((contact.up, sp.cos(t)), (contact.ahead, sp.sin(t))):
+        middle = sp.integrate(rear * function, (t, t2, tm))
+        middle += sp.integrate(front * function, (t, tm, t1))
+        end = sp.integrate((1 - rear) * function, (t, t2, tm))
+        assert weight[1, 0] == pytest.approx(R * B * float(middle.subs(numbers)), rel=1e-12)
+        assert weight[0, 0] == pytest.approx(R * B * float(end.subs(numbers)), rel=1e-12)
+
+
+def test_load_is_the_quadrature_of_its_own_stresses():
+    slip = 0.4
+    force = Model(LinearWheel(radius=R, width=B))(SOIL, Operating(slip=slip, load=60.0))
+    t1 = float(force.entry_angle)
+    tm = (SOIL.a0 + SOIL.a1 * slip) * t1
+    sm = (SOIL.kc / B + SOIL.kphi) * (R * (np.cos(tm) - np.cos(t1))) ** SOIL.n
+    j0 = R * (t1 - (1 - slip) * np.sin(t1))
+    jm = R * (t1 - tm - (1 - slip) * (np.sin(t1) - np.sin(tm)))
+    t0 = SOIL.cohesion * (1 - np.exp(-j0 / SOIL.shear_modulus))
+    taum = SOIL.cohesion + sm * np.tan(SOIL.friction_angle)
+    taum *= 1 - np.exp(-jm / SOIL.shear_modulus)
+
+    def sigma(x):
+        return np.interp(x, [0, tm, t1], [0, sm, 0])
+
+    def tau(x):
+        return np.interp(x, [0, tm, t1], [t0, taum, 0])
+
+    load = quad(lambda x: R * B * (sigma(x) * np.cos(x) + tau(x) * np.sin(x)), 0, t1, points=[tm])[
+        0
+    ]
+    torque = quad(lambda x: R * R * B * tau(x), 0, t1, points=[tm])[0]
+    assert load == pytest.approx(60.0, rel=1e-9)
+    assert force.torque == pytest.approx(torque, rel=1e-9)
+
+
+def test_is_near_the_full_integrals_where_the_stresses_are_near_straight():
+    at = Operating(slip=np.linspace(0.1, 0.6, 6), load=60.0)
+    full = Model(Wheel(radius=R, width=B))(SOIL, at)
+    closed = Model(LinearWheel(radius=R, width=B))(SOIL, at)
+    assert np.abs(closed.torque / full.torque - 1.0).max() < 0.15
+    assert np.abs(closed.torque / full.torque - 1.0).max() > 1e-3  # it is another model
