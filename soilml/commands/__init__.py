@@ -1,0 +1,1 @@
+"""The sub-commands of `soilml` that need no ground software to be listed."""

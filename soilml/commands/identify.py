@@ -1,0 +1,97 @@
+"""`soilml identify`: analytic identification from measured rows."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from typing import Any
+
+from soilml.case import read_case
+from soilml.identification.fit import Fit
+from soilml.needs import need
+from soilml.reading import RUNS, read_table
+from soilml.saving import save_text
+from soilml.writing import aligned
+
+HELP = "soil parameters from measured rows, by least squares on a model"
+DESCRIPTION = """\
+Find soil parameters with which MODEL.toml explains the rows of RUNS.csv.
+
+  soilml identify MODEL.toml RUNS.csv --out found.json
+  soilml identify MODEL.toml RUNS.csv --free cohesion,friction_angle,shear_modulus
+  soilml identify MODEL.toml RUNS.csv --method linear --where run=sand_3
+
+RUNS.csv needs the columns run, slip, load_N, torque_Nm (blank where not measured) and may have
+drawbar_pull_N, sinkage_m, and <column>_std. All rows are taken for one soil. What has a prior in
+[soil.prior] is found, unless --free names other parameters. Methods: nonlinear (least squares on
+the full integrals, bounded, several starts), linear (c and phi from sinkage, K given), newton (phi,
+K and kphi on the closed form, c given). Read the warnings: they say what the rows cannot tell.
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("model", metavar="MODEL.toml")
+    parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
+    parser.add_argument("--method", default="nonlinear", help="nonlinear, linear or newton")
+    parser.add_argument("--free", metavar="A,B,...", help="parameters to find")
+    add_row_options(parser)
+    parser.add_argument("--out", metavar="FILE.json", help="where to write the answer")
+
+
+def add_row_options(parser: argparse.ArgumentParser) -> None:
+    """Options that choose rows and forgive columns."""
+    parser.add_argument("--where", metavar="COLUMN=VALUE", help="take these rows alone")
+    parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify and deliver the answer."""
+    need("scipy", "identify")
+    from soilml.identification import identify
+
+    case = read_case(args.model)
+    table = chosen_rows(args, RUNS)
+    free = None if args.free is None else [name.strip() for name in args.free.split(",")]
+    found = identify(case, table, free, args.method)
+    text = json.dumps(found.as_json(), indent=2) + "\n"
+    if args.out is not None:
+        save_text(args.out, text)
+        print(_for_people(found))
+    elif sys.stdout.isatty():
+        print(_for_people(found))
+    else:
+        sys.stdout.write(text)
+    return 0
+
+
+def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Any:
+    """The rows of the table that `--where` leaves."""
+    from soilml.errors import InputError
+
+    table = read_table(args.runs, need_columns, ignore_extra=args.ignore_extra)
+    if args.where is None:
+        return table
+    name, equals, value = args.where.partition("=")
+    if not equals:
+        raise InputError(f"--where is {args.where!r}; needed is COLUMN=VALUE, such as run=sand_3")
+    return table.where(name, value)
+
+
+def _for_people(found: Fit) -> str:
+    rows = [
+        (name, f"{value:.5g}", f"{std:.2g}", unit, share)
+        for name, value, std, unit, share in zip(
+            found.names,
+            found.values,
+            found.std,
+            found.units,
+            [f"{found.narrowed[n]:.0%}" if n in found.narrowed else "" for n in found.names],
+            strict=True,
+        )
+    ]
+    table = aligned(("parameter", "value", "std", "unit", "std / prior's"), rows)
+    said = "\n".join(f"! {text}" for text in found.warnings)
+    head = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
+    return f"{head}\n\n{table}\n{said}".rstrip()

@@ -1,0 +1,78 @@
+"""`soilml simulate`: forces on a running gear over slip and load."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import read_case
+from soilml.commands.output import deliver
+from soilml.errors import InputError
+from soilml.operating import Operating
+from soilml.status import Status
+
+HELP = "forces and sinkage over slip and load, from a model"
+DESCRIPTION = """\
+Solve the wheel-soil equilibrium of MODEL.toml at every slip and load given.
+
+  soilml simulate MODEL.toml --slip 0:0.6:13 --load 60 --out curve.csv
+  soilml simulate MODEL.toml --slip -0.3,0,0.3 --load 30:120:4
+
+Ranges are start:stop:count, or values with commas. A row without equilibrium has blank values and
+its reason in `status`; where no row at all has one, that is an error. Without --out the table is
+printed: aligned on a terminal, as CSV into a pipe.
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("model", metavar="MODEL.toml", help="gear, soil and effects")
+    parser.add_argument("--slip", required=True, help="slip ratios, driving above 0, braking below")
+    parser.add_argument("--load", required=True, help="vertical loads, N")
+    parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate and deliver the table."""
+    case = read_case(args.model)
+    slips, loads = numbers("--slip", args.slip), numbers("--load", args.load)
+    slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
+    force = case.model(case.soil, Operating(slip=slip, load=load))
+    failed = int(np.count_nonzero(force.status))
+    if failed == slip.size:
+        worst = Status(int(force.status[0]))
+        limit = f" (at most {force.load.max():.4g} N)" if worst is Status.TOO_HEAVY else ""
+        raise InputError(f"no row has an answer; {worst.reason}{limit}: change --load or the soil")
+    deliver(
+        {
+            "slip": slip,
+            "load_N": load,
+            "torque_Nm": force.torque,
+            "drawbar_pull_N": force.drawbar_pull,
+            "sinkage_m": force.sinkage,
+            "entry_angle_rad": force.entry_angle,
+            "status": [Status(int(code)).reason for code in force.status],
+        },
+        args.out,
+    )
+    if failed:
+        print(f"{failed} of {slip.size} rows have no equilibrium: see status", file=sys.stderr)
+    return 0
+
+
+def numbers(option: str, text: str) -> NDArray[np.float64]:
+    """The numbers of `start:stop:count` or `a,b,c`; raises `InputError` naming the option."""
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            found = np.linspace(float(start), float(stop), int(count)).round(12)
+        else:
+            found = np.asarray([float(part) for part in text.split(",")])
+    except ValueError:
+        found = np.zeros(0)
+    if found.size == 0 or not np.all(np.isfinite(found)):
+        raise InputError(f"{option} is {text!r}; needed is start:stop:count or values with commas")
+    return found

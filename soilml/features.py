@@ -1,0 +1,78 @@
+"""What a trained model reads: measured quantities, and ratios of them.
+
+Training and the onboard runtime both take their inputs from here, so that they cannot differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.quantities import QUANTITIES
+
+Floats = NDArray[np.float64]
+
+#: Quantities that a model may read, with the open interval in which a reading makes sense.
+READABLE: dict[str, tuple[float, float]] = {
+    "slip": (-1.0, 1.0),
+    "torque": (-np.inf, np.inf),
+    "load": (0.0, np.inf),
+    "drawbar_pull": (-np.inf, np.inf),
+    "sinkage": (-np.inf, np.inf),
+}
+
+
+def parts(feature: str) -> tuple[str, str | None]:
+    """(numerator, denominator) of `torque/load`; no denominator for `slip`."""
+    top, _, bottom = feature.partition("/")
+    for name in (top, bottom or top):
+        if name not in READABLE:
+            raise InputError(f"feature {feature!r}: {name!r} is none of {', '.join(READABLE)}")
+    return top, bottom or None
+
+
+def inputs_of(features: Sequence[str]) -> tuple[str, ...]:
+    """The measured quantities that these features need, in nomenclature order."""
+    needed = {name for feature in features for name in parts(feature) if name}
+    return tuple(name for name in READABLE if name in needed)
+
+
+def computed(features: Sequence[str], measured: Mapping[str, Floats]) -> Floats:
+    """The features (rows, d) of measured columns (rows,)."""
+    columns = []
+    for feature in features:
+        top, bottom = parts(feature)
+        columns.append(measured[top] / measured[bottom] if bottom else measured[top])
+    return np.stack(columns, axis=-1)
+
+
+def readings(
+    names: Sequence[str], measured: Mapping[str, Any]
+) -> tuple[list[Floats], tuple[int, ...]]:
+    """The named quantities as flat arrays of one length, and the shape they had in common.
+
+    Raises `InputError` for one that is missing, not known, not finite or outside `READABLE`.
+    """
+    for name in measured:
+        if name not in names:
+            raise InputError(f"{name!r} is not read by this model; it reads {', '.join(names)}")
+    arrays = []
+    for name in names:
+        if name not in measured:
+            raise InputError(f"{name} is missing; this model reads {', '.join(names)}")
+        array = np.asarray(measured[name], dtype=np.float64)
+        low, high = READABLE[name]
+        bad = ~((array > low) & (array < high))
+        if bad.any():
+            unit = QUANTITIES[name].unit
+            raise InputError(
+                f"{name} is {array[bad].flat[0]:g}; needed is a finite number between "
+                f"{low:g} and {high:g} (unit {unit})"
+            )
+        arrays.append(array)
+    shape = np.broadcast_shapes(*(a.shape for a in arrays))
+    return [np.broadcast_to(a, shape).reshape(-1) for a in arrays], shape

@@ -1,0 +1,76 @@
+"""What a user should know of a fit before believing it, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.identification.fit import Fit
+from soilml.identification.free import Free
+from soilml.identification.measured import Measured
+from soilml.quantities import column
+
+#: Share of the prior's width above which a parameter counts as not identified, or hardly.
+NOT = 0.8
+HARDLY = 0.5
+TRADE_OFF = 0.95
+
+
+def caveats(
+    fit: Fit,
+    case: Case,
+    data: Measured,
+    free: Sequence[Free],
+    u: NDArray[np.float64],
+    *,
+    surplus: bool,
+    undeclared: bool,
+) -> Fit:
+    """The same fit with its warnings."""
+    one_load = float(np.ptp(data.load)) <= 0.02 * float(np.mean(data.load))
+    said = []
+    for i, f in enumerate(free):
+        share = fit.narrowed[f.path]
+        if one_load and f.path == "cohesion" and share > HARDLY:
+            said.append("one load only: cohesion is not identified")
+        elif share > NOT:
+            said.append(f"{f.path} is not identified: its std is {share:.0%} of the prior's")
+        elif share > HARDLY:
+            said.append(f"{f.path} is hardly identified: its std is {share:.0%} of the prior's")
+        if min(u[i], 1.0 - u[i]) < 1e-3:
+            end = "lower" if u[i] < 0.5 else "upper"
+            said.append(f"{f.path} stands at the {end} end of its prior: the prior holds it there")
+        if f.assumed:
+            said.append(
+                f"{f.path} has no prior: {f.prior.lower:g} to {f.prior.upper:g} {f.unit} is assumed"
+            )
+    if one_load and "cohesion" in fit.names and fit.narrowed["cohesion"] <= HARDLY:
+        said.append("one load only: cohesion rests on the change with slip alone")
+    if data.cells < len(free):
+        said.append(f"{data.cells} readings for {len(free)} parameters: the prior decides the rest")
+    said += _trade_offs(fit)
+    if surplus:
+        said.append(
+            f"residuals are {np.sqrt(fit.misfit):.1f} times the declared noise: the model lacks "
+            "something or the noise is understated; std is widened by as much"
+        )
+    if undeclared:
+        names = ", ".join(column(c.name) for c in data.channels if not c.declared)
+        said.append(f"noise of {names} is not declared: estimated from the residuals")
+    said += [f"{name} is not used: its noise is not declared in [noise]" for name in data.left_out]
+    return replace(fit, warnings=(*fit.warnings, *said))
+
+
+def _trade_offs(fit: Fit) -> list[str]:
+    correlation = fit.correlation
+    return [
+        f"{a} and {b} trade off (correlation {correlation[i, j]:+.2f}): "
+        "the rows fix a combination of them better than either"
+        for i, a in enumerate(fit.names)
+        for j, b in enumerate(fit.names)
+        if i < j and abs(correlation[i, j]) > TRADE_OFF
+    ]

@@ -1,0 +1,67 @@
+"""The answer of an identification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Values, their covariance, and what the user should know before believing them.
+
+    `std` is the expected distance between value and truth, given the rows, the sensors' noise and
+    the prior: a parameter that the rows do not determine keeps the width of its prior.
+    """
+
+    method: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Floats  # (p,)
+    covariance: Floats  # (p, p)
+    warnings: tuple[str, ...]
+    rows_used: int
+    #: std left of the prior's, 1 where the rows tell nothing; empty where there was no prior
+    narrowed: dict[str, float] = field(default_factory=dict)
+    #: mean squared residual in standard deviations of the noise, per degree of freedom
+    misfit: float = float("nan")
+    channels: tuple[str, ...] = ()
+
+    @property
+    def std(self) -> Floats:
+        """Standard deviations, (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlations, (p, p)."""
+        return np.asarray(self.covariance / np.outer(self.std, self.std))
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of the file that `soilml identify` writes."""
+        rows = zip(self.names, self.values, self.std, self.units, strict=True)
+        correlation = self.correlation
+        return {
+            "method": self.method,
+            "parameters": {
+                name: {"value": float(v), "std": float(s), "unit": unit}
+                | ({"std_share_of_prior": self.narrowed[name]} if name in self.narrowed else {})
+                for name, v, s, unit in rows
+            },
+            "correlation": {
+                a: {b: float(correlation[i, j]) for j, b in enumerate(self.names) if j != i}
+                for i, a in enumerate(self.names)
+            },
+            "warnings": list(self.warnings),
+            "rows_used": self.rows_used,
+            "channels_used": list(self.channels),
+            "misfit": None if np.isnan(self.misfit) else float(self.misfit),
+        }

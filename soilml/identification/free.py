@@ -1,0 +1,52 @@
+"""Which parameters are to be found, and where they may lie."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from soilml.case import Case
+from soilml.errors import InputError
+from soilml.prior import Prior
+
+#: Where the shear parameters of natural soils lie, for a user who gives no prior.
+_USUAL = {
+    "cohesion": Prior(0.0, 10000.0),
+    "friction_angle": Prior(0.17, 0.96),
+    "shear_modulus": Prior(0.001, 0.1, log=True),
+    "n": Prior(0.3, 1.8),
+}
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter to be found: its path, its unit, its prior, and the value the case gives it."""
+
+    path: str
+    unit: str
+    prior: Prior
+    nominal: float
+    assumed: bool
+
+
+def chosen(case: Case, names: Sequence[str] | None) -> list[Free]:
+    """The named parameters, or those with a prior; raises `InputError` for an unknown name."""
+    known = case.parameters()
+    wanted = list(case.prior) if names is None else list(dict.fromkeys(names))
+    if not wanted:
+        raise InputError(
+            "nothing to identify: give [soil.prior] in the model file, or --free cohesion,..."
+        )
+    found = []
+    for name in wanted:
+        if name not in known:
+            raise InputError(f"--free {name!r} is no parameter; there are: {', '.join(known)}")
+        parameter, nominal = known[name]
+        prior = case.prior.get(name) or _USUAL.get(name)
+        if prior is None:
+            prior = Prior(parameter.lower, parameter.upper)
+            if nominal > 0.0:
+                low, high = max(nominal / 30.0, parameter.lower), min(nominal * 30, parameter.upper)
+                prior = Prior(low, high, log=low > 0.0)
+        found.append(Free(name, parameter.unit, prior, float(nominal), name not in case.prior))
+    return found

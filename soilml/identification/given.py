@@ -1,0 +1,39 @@
+"""What a value that a method takes as given does to its answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from soilml.case import Case
+from soilml.errors import FitError
+from soilml.identification.fit import Fit
+
+#: One standard deviation of a uniform prior to either side of its middle, as fractions of it.
+SIDES = (0.5 - 12.0**-0.5, 0.5 + 12.0**-0.5)
+
+
+def with_given(case: Case, path: str, solve: Callable[[Case], Fit]) -> Fit:
+    """Solve with the parameter `path` as the case has it, and widen by what its prior leaves open.
+
+    The covariance grows by the mean square change of the answer when the given value is moved to
+    either side of its prior; where there is no prior, the value is believed.
+    """
+    fit = solve(case)
+    prior = case.prior.get(path)
+    value = float(case.parameters()[path][1])
+    if prior is None:
+        said = f"{path} is taken as given, and believed: {value:g}"
+        return replace(fit, warnings=(said, *fit.warnings))
+    covariance = fit.covariance.copy()
+    for side in SIDES:
+        moved = float(prior.at(np.asarray([side]))[0])
+        try:
+            change = solve(case.with_values({path: moved})).values - fit.values
+        except FitError:
+            continue
+        covariance += 0.5 * np.outer(change, change)
+    said = f"{path} is taken as given: {value:g}; the width of its prior is carried into std"
+    return replace(fit, covariance=covariance, warnings=(said, *fit.warnings))

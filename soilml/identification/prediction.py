@@ -1,0 +1,76 @@
+"""What a case predicts for measured rows, for many parameter sets at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.identification.free import Free
+from soilml.identification.measured import Measured
+from soilml.operating import Operating
+
+Floats = NDArray[np.float64]
+
+#: Step of central differences, as a share of the prior.
+STEP = 1e-4
+
+
+def predicted(
+    case: Case, free: Sequence[Free], u: Floats, slip: Floats, load: Floats
+) -> dict[str, Floats]:
+    """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
+    values = {f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)}
+    changed = case.with_values(values)
+    force = changed.model(changed.soil, Operating(slip=slip, load=load))
+    shape = (len(u), len(slip))
+    return {
+        "torque": np.broadcast_to(force.torque, shape),
+        "drawbar_pull": np.broadcast_to(force.drawbar_pull, shape),
+        "sinkage": np.broadcast_to(force.sinkage, shape),
+    }
+
+
+def stacked(data: Measured, channels: dict[str, Floats]) -> Floats:
+    """The predictions (sets, cells) in the order of the readings that there are."""
+    parts = [channels[c.name][:, np.isfinite(c.reading)] for c in data.channels]
+    return np.concatenate(parts, axis=1)
+
+
+def readings(data: Measured) -> tuple[Floats, Floats]:
+    """All readings that there are and their declared standard deviations, (cells,)."""
+    kept = [np.isfinite(c.reading) for c in data.channels]
+    reading = [c.reading[k] for c, k in zip(data.channels, kept, strict=True)]
+    std = [c.std[k] for c, k in zip(data.channels, kept, strict=True)]
+    return np.concatenate(reading), np.concatenate(std)
+
+
+def linearised(
+    case: Case, data: Measured, free: Sequence[Free], u: Floats
+) -> tuple[Floats, Floats]:
+    """Predictions (cells,) at `u` (p,) and their derivatives (cells, p), in one model call."""
+    p = len(u)
+    up, down = np.minimum(u + STEP, 1.0), np.maximum(u - STEP, 0.0)
+    sets = np.tile(u, (2 * p + 1, 1))
+    sets[np.arange(p), np.arange(p)] = up
+    sets[p + np.arange(p), np.arange(p)] = down
+    y = stacked(data, predicted(case, free, sets, data.slip, data.load))
+    return y[-1], np.asarray(((y[:p] - y[p:-1]) / (up - down)[:, None]).T)
+
+
+def input_noise(case: Case, data: Measured, free: Sequence[Free], u: Floats) -> Floats:
+    """Standard deviation (cells,) that noise of slip and load adds to the predictions at `u`."""
+    total = np.zeros(data.cells)
+    for name, std in (("slip", data.slip_std), ("load", data.load_std)):
+        if not np.any(std > 0.0):
+            continue
+        points = {"slip": data.slip, "load": data.load}
+        y = []
+        for sign in (-1.0, 1.0):
+            moved = points | {name: points[name] + sign * 0.5 * std}
+            moved["slip"] = np.clip(moved["slip"], -0.999, 0.999)
+            y.append(stacked(data, predicted(case, free, u[None, :], **moved))[0])
+        total = np.hypot(total, np.nan_to_num(y[1] - y[0]))
+    return np.asarray(total)

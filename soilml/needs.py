@@ -1,0 +1,20 @@
+"""Modules that need more than the board has."""
+
+from __future__ import annotations
+
+import importlib
+
+from soilml.errors import MissingLibraryError
+
+
+def need(module: str, command: str, extra: str = "ground") -> None:
+    """Import a module; a library that it lacks raises `MissingLibraryError` naming the extra."""
+    try:
+        importlib.import_module(module)
+    except MissingLibraryError:
+        raise
+    except ImportError as error:
+        raise MissingLibraryError(
+            f"`soilml {command}` needs {error.name or 'a library'}, which is not installed: "
+            f"pip install 'soilml[{extra}]'"
+        ) from None

@@ -1,0 +1,168 @@
+"""The onboard runtime: one ONNX file in, estimates out. Needs numpy and onnxruntime, no more."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+
+from soilml.errors import ModelFileError
+from soilml.estimate import Estimate, Together, joined
+from soilml.features import readings
+
+Floats = NDArray[np.float64]
+
+#: Version of the file's contract: input and output names, metadata keys.
+FORMAT = "1"
+#: A file whose answers to its own probe differ by more than this share of the prior is damaged.
+PROBE_TOLERANCE = 1e-4
+
+
+@final
+@dataclass(frozen=True)
+class Estimator:
+    """A trained model, loaded and checked.
+
+    estimator = Estimator.load("exported/wheel.onnx")
+    estimate = estimator(slip=0.3, torque=2.1, load=60.0)
+    estimate.mean, estimate.std, estimate.covariance, estimate.in_range
+    """
+
+    path: str
+    inputs: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    metadata: dict[str, str]
+    prior_mean: Floats
+    prior_std: Floats
+    prior_low: Floats
+    prior_high: Floats
+    together: Together
+    session: ort.InferenceSession
+
+    @staticmethod
+    def load(path: str | os.PathLike[str]) -> Estimator:
+        """Read and check a model file; raises `ModelFileError` for one that is not ours or damaged.
+
+        The file holds a probe, readings with the answers that they must give; it is run here.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise ModelFileError(f"{file}: there is no such file")
+        session = _session(file)
+        metadata = session.get_modelmeta().custom_metadata_map
+        if "soilml_format" not in metadata:
+            raise ModelFileError(f"{file} is an ONNX model, but none that soilml train wrote")
+        if metadata["soilml_format"] != FORMAT:
+            raise ModelFileError(
+                f"{file} has format {metadata['soilml_format']}, this soilml reads {FORMAT}"
+            )
+        try:
+            inputs = json.loads(metadata["inputs"])
+            outputs = json.loads(metadata["outputs"])
+            together = json.loads(metadata["together"])
+            probe = json.loads(metadata["probe"])
+            estimator = Estimator(
+                path=str(file),
+                inputs=tuple(entry["name"] for entry in inputs),
+                names=tuple(entry["name"] for entry in outputs),
+                units=tuple(entry["unit"] for entry in outputs),
+                metadata=dict(metadata),
+                prior_mean=_column(outputs, "prior_mean"),
+                prior_std=_column(outputs, "prior_std"),
+                prior_low=_column(outputs, "lower"),
+                prior_high=_column(outputs, "upper"),
+                together=Together(
+                    *(
+                        np.asarray(together[k], float)
+                        for k in ("rows", "worth", "widening", "reach")
+                    )
+                ),
+                session=session,
+            )
+            answer = estimator(**probe["readings"])
+            off = np.abs(answer.mean - np.asarray(probe["mean"])) / estimator.prior_std
+            off = np.maximum(off, np.abs(answer.std - np.asarray(probe["std"])) / answer.prior_std)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
+        except Exception as error:  # onnxruntime raises many kinds, none with a public base
+            raise ModelFileError(f"{file} cannot be run: {error}") from None
+        if not bool(np.all(off < PROBE_TOLERANCE)):
+            raise ModelFileError(f"{file} is damaged: it fails its own probe; export it again")
+        return estimator
+
+    def __call__(self, **measured: Any) -> Estimate:
+        """Estimates from readings, each on its own; numbers or arrays that broadcast.
+
+        Raises `InputError` for a reading that is missing, not finite or impossible.
+        """
+        flat, shape = readings(self.inputs, measured)
+        feed = {n: a.astype(np.float32) for n, a in zip(self.inputs, flat, strict=True)}
+        mean, std, covariance, in_range = self.session.run(
+            ("mean", "std", "covariance", "in_range"), feed
+        )
+        q = len(self.names)
+        return self._estimate(
+            mean.astype(np.float64).reshape(*shape, q),
+            covariance.astype(np.float64).reshape(*shape, q, q),
+            std.astype(np.float64).reshape(*shape, q),
+            in_range.reshape(shape),
+            self.together.at(1)[2],
+        )
+
+    def run(self, **measured: Any) -> Estimate:
+        """One estimate from all readings together: rows driven on one soil, arrays (rows,)."""
+        single = self(**{name: np.atleast_1d(value) for name, value in measured.items()})
+        q = len(self.names)
+        means, covariances = single.mean.reshape(-1, q), single.covariance.reshape(-1, q, q)
+        worth, widening, reach = self.together.at(len(means))
+        mean, covariance = joined(means, covariances, self.prior_mean, self.prior_std, worth)
+        claimed = np.sqrt(np.diag(covariance))
+        widening = np.minimum(widening, np.maximum(self.prior_std / claimed, 1.0))
+        covariance = covariance * np.outer(widening, widening)
+        std = np.sqrt(np.diag(covariance))
+        return self._estimate(mean, covariance, std, np.asarray(single.in_range.all()), reach)
+
+    def _estimate(
+        self,
+        mean: Floats,
+        covariance: Floats,
+        std: Floats,
+        in_range: NDArray[np.bool_],
+        reach: Floats,
+    ) -> Estimate:
+        return Estimate(
+            names=self.names,
+            units=self.units,
+            mean=mean,
+            std=std,
+            covariance=covariance,
+            low=np.clip(mean - reach * std, self.prior_low, self.prior_high),
+            high=np.clip(mean + reach * std, self.prior_low, self.prior_high),
+            in_range=in_range,
+            prior_std=self.prior_std,
+        )
+
+
+def _session(file: Path) -> ort.InferenceSession:
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    try:
+        return ort.InferenceSession(file.read_bytes(), options, providers=["CPUExecutionProvider"])
+    except OSError as error:
+        raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
+    except Exception as error:  # onnxruntime raises many kinds, none with a public base
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ModelFileError(f"{file} is not a whole ONNX model: {first[:160]}") from None
+
+
+def _column(entries: list[dict[str, Any]], key: str) -> Floats:
+    return np.asarray([entry[key] for entry in entries], dtype=np.float64)

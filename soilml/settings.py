@@ -1,0 +1,99 @@
+"""TOML settings, read key by key so that every mistake is named with its place."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from soilml.errors import InputError
+
+
+class Settings:
+    """One table of a TOML file; each key is taken once, and `finish` names those nobody took."""
+
+    def __init__(self, content: dict[str, Any], where: str, folder: Path) -> None:
+        self._left = dict(content)
+        self._all = tuple(content)
+        self.where = where
+        self.folder = folder
+        self._known: list[str] = []
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._left
+
+    def take(
+        self, key: str, kind: type | tuple[type, ...], needed: str, default: Any = None
+    ) -> Any:
+        """The value of `key`; `needed` says what it must be. Without a default it must be there."""
+        self._known.append(key)
+        if key not in self._left:
+            if default is None:
+                self.fail(f"{key} is missing; needed is {needed}")
+            return default
+        value = self._left.pop(key)
+        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+            self.fail(f"{key} is {value!r}; needed is {needed}")
+        return value
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """A number."""
+        return float(self.take(key, (int, float), "a number", default))
+
+    def count(self, key: str, default: int | None = None) -> int:
+        """A whole number, 1 or more."""
+        value = self.take(key, int, "a whole number, 1 or more", default)
+        if value < 1:
+            self.fail(f"{key} is {value}; needed is a whole number, 1 or more")
+        return int(value)
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """A text."""
+        return str(self.take(key, str, "a text in quotes", default))
+
+    def table(self, key: str) -> Settings:
+        """The table [key]; an empty one where there is none."""
+        content = self.take(key, dict, f"a table [{key}]", {})
+        return Settings(content, f"{self.where} [{key}]", self.folder)
+
+    def tables(self, key: str) -> list[Settings]:
+        """The tables [[key]], in order."""
+        content = self.take(key, list, f"tables [[{key}]]", [])
+        if not all(isinstance(entry, dict) for entry in content):
+            self.fail(f"{key} must be written as tables: [[{key}]]")
+        return [
+            Settings(entry, f"{self.where} [[{key}]] number {i}", self.folder)
+            for i, entry in enumerate(content, 1)
+        ]
+
+    def knows(self, keys: Iterable[str]) -> None:
+        """Keys that may stand here, for the hint about one that may not."""
+        self._known.extend(keys)
+
+    def finish(self) -> None:
+        """Raise `InputError` for the first key that nobody took."""
+        for key in self._left:
+            near = difflib.get_close_matches(key, self._known, 1, 0.6)
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(self._known)}"
+            self.fail(f"unknown key {key!r}; {hint}")
+
+    def fail(self, text: str) -> None:
+        """Raise `InputError` with this place in front."""
+        raise InputError(f"{self.where}: {text}")
+
+
+def read_settings(path: str | os.PathLike[str]) -> Settings:
+    """The TOML file at `path`; raises `InputError` where it is missing or no TOML."""
+    file = Path(path)
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{file}: there is no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} cannot be read: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file} is not valid TOML: {error}") from None
+    return Settings(content, str(file), file.parent)
