@@ -1,0 +1,1 @@
+"""The ground: recipes become synthetic measured data. Imports soilml; is imported by training."""

@@ -1,0 +1,51 @@
+"""`soilml generate`: synthetic measured data from a recipe."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from soilml.errors import InputError
+
+HELP = "synthetic measurements from a recipe, as Parquet"
+DESCRIPTION = """\
+Simulate RECIPE.toml and write what the rover's sensors would report, with the true soil beside it.
+
+  soilml generate recipe.toml data.parquet
+  soilml generate wheel data.parquet --rows 20000 --seed 7    a recipe of the package
+
+A recipe is a model file (see README) with, at the top, rows and seed, and
+
+  [operating]             [bias]                    [[runs]]
+  slip = [0.05, 0.6]      torque_Nm = "1 %"         rows = 8      # rows on one soil
+  load_N = [30, 120]      # one draw for each run   share = 1.0   # of all rows
+
+[soil.prior] says which parameters vary, and where. Same recipe and seed, same bytes.
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("recipe", metavar="RECIPE.toml", help="or the name of a packaged recipe")
+    parser.add_argument("out", metavar="OUT.parquet")
+    parser.add_argument("--rows", type=int, help="how many, instead of the recipe's")
+    parser.add_argument("--seed", type=int, help="instead of the recipe's")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Generate the file."""
+    from soilml.needs import need
+
+    need("datagen.engine", "generate")
+    from datagen.engine import generate
+    from datagen.progress import bar
+    from datagen.recipe import read_recipe
+
+    if not args.out.endswith(".parquet"):
+        raise InputError(f"{args.out}: the output is a Parquet file, name it ....parquet")
+    recipe = read_recipe(args.recipe).sized(args.rows, args.seed)
+    with bar("simulating", recipe.rows) as progress:
+        made = generate(recipe, args.out, progress)
+    note = f", {made.failed} without equilibrium" if made.failed else ""
+    print(f"{made.rows} rows{note} written to {args.out}", file=sys.stderr)
+    return 0

@@ -1,0 +1,127 @@
+"""A recipe: which wheel, which soils, how driven, how measured, how many rows."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tomllib
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from soilml.case import Case, take_case
+from soilml.errors import InputError
+from soilml.noise import Noise, take_noise
+from soilml.operating import MOST_SLIP
+from soilml.prior import Prior, take_prior
+from soilml.quantities import COLUMNS
+from soilml.settings import Settings, read_settings
+
+#: Columns that a sensor of the rover fills, and that may have noise and bias.
+SENSED = ("slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Runs of one length: `share` of all rows are in runs of `rows` rows on one soil each."""
+
+    rows: int
+    share: float
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What `soilml generate` makes; `content` is the file as it was read."""
+
+    case: Case
+    slip: Prior
+    load: Prior
+    bias: dict[str, Noise]
+    blocks: tuple[Block, ...]
+    rows: int
+    seed: int
+    content: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.rows <= 10**10:
+            raise InputError(f"rows is {self.rows}; needed is a whole number from 1 to 10^10")
+        if not 0 <= self.seed < 2**63:
+            raise InputError(f"seed is {self.seed}; needed is a whole number, 0 or more")
+
+    def sized(self, rows: int | None = None, seed: int | None = None) -> Recipe:
+        """The same recipe with another number of rows or another seed."""
+        rows = self.rows if rows is None else rows
+        seed = self.seed if seed is None else seed
+        return replace(self, rows=rows, seed=seed)
+
+    @property
+    def text(self) -> str:
+        """Everything that decides the rows, as canonical JSON."""
+        return json.dumps(self.content | {"rows": self.rows, "seed": self.seed}, sort_keys=True)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of `text`."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def packaged(kind: str, name: str, folder: str) -> Path | None:
+    """A recipe or spec that comes with the package, by its bare name."""
+    inside = resources.files(kind).joinpath(folder, f"{name}.toml")
+    return Path(str(inside)) if inside.is_file() else None
+
+
+def read_recipe(path: str | os.PathLike[str]) -> Recipe:
+    """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
+    file = Path(path)
+    if not file.exists() and file.name == str(path):
+        file = packaged("datagen", str(path).removesuffix(".toml"), "recipes") or file
+    settings = read_settings(file)
+    recipe = _take_recipe(settings, tomllib.loads(file.read_text(encoding="utf-8")))
+    settings.finish()
+    return recipe
+
+
+def _take_recipe(settings: Settings, content: dict[str, Any]) -> Recipe:
+    case = take_case(settings)
+    if not case.prior:
+        settings.fail("nothing varies: give ranges in [soil.prior]")
+    operating = settings.table("operating")
+    slip, load = take_prior(operating, "slip"), take_prior(operating, "load_N")
+    if not -MOST_SLIP < slip.lower < slip.upper < MOST_SLIP:
+        operating.fail(f"slip is [{slip.lower:g}, {slip.upper:g}]; it must lie between -1 and 1")
+    if load.lower <= 0:
+        operating.fail(f"load_N begins at {load.lower:g}; it must lie above zero")
+    operating.finish()
+    bias_settings = settings.table("bias")
+    bias = {key: take_noise(bias_settings, key) for key in SENSED if key in bias_settings}
+    bias_settings.knows(SENSED)
+    bias_settings.finish()
+    for key in case.noise.keys() - set(SENSED):
+        settings.fail(f"[noise] {key}: no sensor of {COLUMNS[key].text} is simulated")
+    return Recipe(
+        case=case,
+        slip=slip,
+        load=load,
+        bias=bias,
+        blocks=_take_blocks(settings),
+        rows=settings.count("rows"),
+        seed=int(settings.take("seed", int, "a whole number, 0 or more")),
+        content=content,
+    )
+
+
+def _take_blocks(settings: Settings) -> tuple[Block, ...]:
+    blocks = []
+    for entry in settings.tables("runs"):
+        blocks.append(Block(entry.count("rows", 1), entry.number("share", 1.0)))
+        if not 0.0 < blocks[-1].share <= 1.0:
+            entry.fail(f"share is {blocks[-1].share:g}; needed is a number above 0, up to 1")
+        entry.finish()
+    if not blocks:
+        return (Block(1, 1.0),)
+    if abs(sum(b.share for b in blocks) - 1.0) > 1e-9:
+        settings.fail("the shares of [[runs]] must sum to 1")
+    return tuple(blocks)

@@ -1,0 +1,58 @@
+"""Low-discrepancy draws of soils and operating points."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from datagen.recipe import Block, Recipe
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Rows (n,): the number of the run, and each parameter's value by path."""
+
+    run: NDArray[np.int64]
+    soil: dict[str, Floats]
+    slip: Floats
+    load: Floats
+
+
+def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
+    """Rows `first` to `last` (excluded) of a block; the same whatever pieces it is drawn in.
+
+    Runs of one row vary soil and operating point in one scrambled Sobol sequence; longer runs draw
+    soils and operating points from two.
+    """
+    shape: Block = recipe.blocks[block]
+    priors = list(recipe.case.prior.items())
+    row = np.arange(first, last)
+    run = row // shape.rows
+    if shape.rows == 1:
+        both = _sobol(len(priors) + 2, (recipe.seed, block, 0), first, last - first)
+        soil, operating = both[:, :-2], both[:, -2:]
+    else:
+        runs = _sobol(len(priors), (recipe.seed, block, 1), run[0], run[-1] - run[0] + 1)
+        soil = runs[run - run[0]]
+        operating = _sobol(2, (recipe.seed, block, 2), first, last - first)
+    return Drawn(
+        run=run,
+        soil={path: prior.at(soil[:, i]) for i, (path, prior) in enumerate(priors)},
+        slip=recipe.slip.at(operating[:, 0]),
+        load=recipe.load.at(operating[:, 1]),
+    )
+
+
+def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:
+    sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
+    if skip:
+        sequence.fast_forward(int(skip))
+    with warnings.catch_warnings():  # pieces of a sequence need not be powers of two
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(sequence.random(int(count)))
