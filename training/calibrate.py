@@ -1,0 +1,97 @@
+"""Uncertainty measured on rows that nobody learned from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.estimate import Together, joined
+from training.dataset import Dataset
+
+Floats = NDArray[np.float64]
+
+#: Numbers of rows at which joining is measured, and groups of rows looked at for each.
+LENGTHS = (1, 2, 4, 8, 16, 32)
+LEAST_GROUPS, MOST_GROUPS = 50, 600
+#: Shares of what a row seems to tell that are tried.
+WORTHS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05, 0.03)
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A regressor, what its standard deviations are multiplied by, and its errors' correlation."""
+
+    regressor: Any
+    widen: Floats  # (q,)
+    correlation: Floats  # (q, q) of the errors of one row
+
+    def predict(self, features: Floats) -> tuple[Floats, Floats]:
+        """Mean and recalibrated standard deviation, (n, q)."""
+        mean, std = self.regressor.predict(features, return_std=True)
+        return mean, std * self.widen
+
+
+def calibrated(regressor: Any, data: Dataset) -> Calibrated:
+    """Widen so that squared errors are, on the mean, what the variance says."""
+    mean, std = regressor.predict(data.features, return_std=True)
+    z = (data.targets - mean) / std
+    widen = np.sqrt(np.mean(z**2, axis=0))
+    return Calibrated(regressor, widen, np.corrcoef(z.T).reshape(z.shape[1], -1))
+
+
+def covariances(std: Floats, correlation: Floats) -> Floats:
+    """Covariance (n, q, q) from standard deviations (n, q) and one correlation (q, q)."""
+    return np.asarray(std[:, :, None] * correlation * std[:, None, :])
+
+
+def together(
+    mean: Floats, covariance: Floats, data: Dataset, prior_mean: Floats, prior_std: Floats
+) -> Together:
+    """How far joined estimates of several rows stray, against what they claim.
+
+    `mean` (n, q) and `covariance` (n, q, q) are those of the rows of `data`. Where it has no runs
+    of several rows, joining is not trusted to narrow anything.
+    """
+    q = mean.shape[1]
+    runs = _runs(data)
+    rows, worths, widening, reach = [], [], [], []
+    for length in LENGTHS:
+        groups = [
+            run[i : i + length] for run in runs for i in range(0, len(run) - length + 1, length)
+        ]
+        if len(groups) < LEAST_GROUPS:
+            break
+        groups = groups[:: max(len(groups) // MOST_GROUPS, 1)]
+        best: tuple[float, Floats, Floats] | None = None
+        least = np.inf
+        for worth in WORTHS if length > 1 else WORTHS[:1]:
+            both = [joined(mean[g], covariance[g], prior_mean, prior_std, worth) for g in groups]
+            std = np.stack([np.sqrt(np.diag(c)) for _, c in both])
+            off = np.abs(
+                np.stack([data.targets[g[0]] - m for g, (m, _) in zip(groups, both, strict=True)])
+            )
+            wide = np.sqrt(np.mean((off / std) ** 2, axis=0)) if length > 1 else np.ones(q)
+            # negative log likelihood of the widened Gaussian, but for constants
+            loss = float(np.mean(np.log(std * wide / prior_std)))
+            if loss < least:
+                least, best = loss, (worth, wide, np.quantile(off / (std * wide), 0.9, axis=0))
+        assert best is not None
+        rows.append(length)
+        worths.append(best[0])
+        widening.append(best[1])
+        reach.append(best[2])
+    if len(rows) == 1:  # nothing is known of joining: it narrows nothing
+        rows.append(LENGTHS[-1])
+        worths.append(1.0 / LENGTHS[-1])
+        widening.append(np.ones(q))
+        reach.append(reach[0])
+    return Together(*(np.asarray(part, dtype=float) for part in (rows, worths, widening, reach)))
+
+
+def _runs(data: Dataset) -> list[NDArray[np.int64]]:
+    order = np.argsort(data.run, kind="stable")
+    ends = np.flatnonzero(np.diff(data.run[order])) + 1
+    return [np.asarray(part) for part in np.split(order, ends)]

@@ -1,0 +1,133 @@
+"""The card beside a model file: what it is, what it was trained on, how good it is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from training.score import Score
+from training.train import Trained
+
+
+def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
+    """The card as Markdown."""
+    outputs = json.loads(metadata["outputs"])
+    inputs = json.loads(metadata["inputs"])
+    recipe = json.loads(metadata["recipe"])
+    gear = ", ".join(f"{k} {v}" for k, v in json.loads(metadata["gear"]).items())
+    kinds = ", ".join(_described(m.regressor) for m in trained.members)
+    parts = trained.parts
+    fused = len(trained.members) > 1
+    lines = [
+        f"# {name}",
+        "",
+        f"Estimates {_list(o['name'].replace('_', ' ') for o in outputs)} from one reading of "
+        f"{_list(i['name'] for i in inputs)}. Regressors: {kinds}."
+        + (f" Joined by the rule `{trained.spec.rule}`." if fused else ""),
+        "",
+        "One reading brings one equation for all these unknowns: the estimate is mostly the prior, "
+        "and its standard deviation says so. Use several readings of one soil together "
+        "(`soilml estimate --by run`, `Estimator.run`).",
+        "",
+        "## Valid for",
+        "",
+        f"- gear: {gear or 'not recorded'}",
+        f"- soil outside the estimated parameters: {_soil(recipe)}",
+        *[f"- effect: {json.dumps(e)}" for e in recipe.get("effect", [])],
+        f"- noise: {json.dumps(recipe.get('noise', {}))}; bias per run: "
+        f"{json.dumps(recipe.get('bias', {}))}",
+        "",
+        "| input | column | unit | trained from | to |",
+        "|---|---|---|---:|---:|",
+        *[
+            f"| {i['name']} | `{i['column']}` | {i['unit']} | {i['lower']:.4g} | {i['upper']:.4g} |"
+            for i in inputs
+        ],
+        "",
+        "Readings outside, or unlike any that were trained on, come back with `in_range` false.",
+        "",
+        "| output | column | unit | prior from | to | prior std |",
+        "|---|---|---|---:|---:|---:|",
+        *[
+            f"| {o['name']} | `{o['column']}` | {o['unit']} | {o['lower']:.4g} | {o['upper']:.4g} "
+            f"| {o['prior_std']:.4g} |"
+            for o in outputs
+        ],
+        "",
+        "## Figures",
+        "",
+        f"On {trained.scores['estimator'].rows} rows that nobody learned from or calibrated on. "
+        "Error is RMSE / prior std; likelihood is the mean negative log density of the value over "
+        "the prior std (prior alone: 1.42 as a Gaussian); coverage is of the 90 % interval.",
+        "",
+        *_scores(trained.scores, [o["name"] for o in outputs]),
+        "",
+        "Several readings of one soil together (`run`): what each row adds is weighed, and the "
+        "standard deviation multiplied, by what held-out runs showed to be needed.",
+        "",
+        *_together(json.loads(metadata["together"]), [o["name"] for o in outputs]),
+        "",
+        "## Made by",
+        "",
+        f"- rows: {len(parts.train)} learned from, {len(parts.choose)} to stop and choose by, "
+        f"{len(parts.calibrate)} to calibrate and score; {trained.data.dropped} dropped",
+        f"- training recipe sha256 `{metadata['recipe_sha256']}`",
+        f"- data sha256 `{metadata['data_sha256']}`",
+        f"- spec: `{metadata['spec']}`",
+        f"- float32 file against float64 original: at most {metadata['parity']} of the prior's "
+        f"spread; opset {metadata['opset']}, IR {metadata['ir_version']}",
+        f"- soilml {metadata['soilml_version']}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _described(regressor: Any) -> str:
+    details = ""
+    if hasattr(regressor, "centres_"):
+        details = (
+            f" ({len(regressor.centres_)} centres, gamma {regressor.gamma_:.3g}, "
+            f"width {regressor.width_:.3g})"
+        )
+    if hasattr(regressor, "history_"):
+        layers = " x ".join(str(h) for h in regressor.hidden)
+        details = f" (hidden {layers}, {len(regressor.history_)} epochs)"
+    return f"{regressor.kind}{details}"
+
+
+def _list(words: Any) -> str:
+    words = list(words)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _soil(recipe: Mapping[str, Any]) -> str:
+    soil = dict(recipe.get("soil", {}))
+    prior = soil.pop("prior", {})
+    unknown = {
+        k: v for k, v in prior.items() if k not in ("cohesion", "friction_angle", "shear_modulus")
+    }
+    text = json.dumps(soil) if soil else "not recorded"
+    return f"{text}; varied and not estimated: {json.dumps(unknown)}" if unknown else text
+
+
+def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
+    head = " | ".join(f"error {n}" for n in names)
+    logs = " | ".join(f"-log p {n}" for n in names)
+    cover = " | ".join(f"90 % {n}" for n in names)
+    lines = [f"| | {head} | {logs} | {cover} |", "|---|" + "---:|" * (3 * len(names))]
+    for name, s in scores.items():
+        cells = [f"{v:.3f}" for v in (*s.relative, *s.nll)] + [f"{v:.1%}" for v in s.cover90]
+        label = f"**{name}**" if name == "estimator" else name
+        lines.append(f"| {label} | {' | '.join(cells)} |")
+    return lines
+
+
+def _together(joint: Mapping[str, Any], names: list[str]) -> list[str]:
+    lines = [
+        f"| rows | worth of a row | {' | '.join(f'widening {n}' for n in names)} |",
+        "|---:|---:|" + "---:|" * len(names),
+    ]
+    for rows, worth, widening in zip(joint["rows"], joint["worth"], joint["widening"], strict=True):
+        lines.append(f"| {rows:g} | {worth:g} | {' | '.join(f'{w:.2f}' for w in widening)} |")
+    return lines

@@ -1,0 +1,1 @@
+"""Sub-commands of `soilml` that come with training."""

@@ -1,0 +1,76 @@
+"""`soilml train`: from data to a model file that flies."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from soilml.errors import InputError
+from soilml.needs import need
+
+HELP = "fit regressors to data and export one ONNX file"
+DESCRIPTION = """\
+Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not learn from, export it.
+
+  soilml train spec.toml data.parquet wheel.onnx
+  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear
+
+Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
+
+  features = ["slip", "torque/load", "load"]     # measured quantities, or ratios of them
+  [[regressor]]                                  # one or more; several are fused
+  type = "fixed-size-lssvm"                      # or lssvm, mlp, linear
+  centres = 150
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("spec", metavar="SPEC.toml", help="or the name of a packaged spec")
+    parser.add_argument("data", metavar="DATA.parquet", help="from soilml generate")
+    parser.add_argument("out", metavar="OUT.onnx")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Train and export."""
+    need("training.train", "train")
+    from datagen.progress import stages
+    from soilml.saving import save_text
+    from soilml.writing import aligned
+    from training.card import card
+    from training.curves import draw_curves
+    from training.dataset import read_dataset
+    from training.export import export
+    from training.spec import read_spec
+    from training.train import train
+
+    out = Path(args.out)
+    if out.suffix != ".onnx":
+        raise InputError(f"{out}: the output is an ONNX file, name it ....onnx")
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: there is no folder {out.parent}; create it first")
+    spec = read_spec(args.spec)
+    data = read_dataset(args.data, spec.features, spec.targets)
+    with stages() as progress:
+        trained = train(spec, data, progress)
+        progress("exporting", 0, 2)
+        metadata = export(trained, out, args.data)
+        progress("exporting", 1, 2)
+        draw_curves(trained, out.with_suffix(".png"))
+        progress("exporting", 2, 2)
+    save_text(out.with_suffix(".md"), card(trained, metadata, out.stem))
+    rows = [
+        (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])
+        for name, s in trained.scores.items()
+    ]
+    short = [name.replace("_", " ") for name in spec.targets]
+    head = ("", *[f"RMSE/prior {n}" for n in short], *[f"90 % {n}" for n in short])
+    print(f"On {trained.scores['estimator'].rows} rows not learned from:\n", file=sys.stderr)
+    print(aligned(head, rows), file=sys.stderr)
+    print(
+        f"\n{out} ({out.stat().st_size / 1e3:.0f} kB, parity {metadata['parity']} of the prior), "
+        f"{out.with_suffix('.md')}, {out.with_suffix('.png')}",
+        file=sys.stderr,
+    )
+    return 0

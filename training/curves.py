@@ -1,0 +1,97 @@
+"""Learning curves as a picture."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from sklearn.base import clone
+
+from soilml.saving import replacing
+from training.fixed_size import FixedSizeLSSVM
+from training.lssvm import LSSVM
+from training.mlp import GaussianMLP
+from training.train import Trained
+
+#: Shares of the training rows at which the error is looked at.
+SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)
+
+
+def draw_curves(trained: Trained, path: str | os.PathLike[str]) -> None:
+    """Error against rows, loss against epochs, and leave-one-out error against gamma, as PNG."""
+    from matplotlib.figure import Figure
+
+    regressors = [member.regressor for member in trained.members]
+    searched = [r for r in regressors if isinstance(r, LSSVM | FixedSizeLSSVM)]
+    learned = [r for r in regressors if isinstance(r, GaussianMLP)]
+    figure = Figure(figsize=(4.2 * (1 + len(searched) + len(learned)), 3.6), layout="constrained")
+    axes = figure.subplots(1, 1 + len(searched) + len(learned), squeeze=False)[0]
+    _rows(axes[0], trained, regressors)
+    for axis, machine in zip(axes[1:], [*searched, *learned], strict=True):
+        if isinstance(machine, GaussianMLP):
+            _epochs(axis, machine)
+        else:
+            _search(axis, machine)
+    with replacing(path) as part:
+        figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
+
+
+def _rows(axis: Any, trained: Trained, regressors: list[Any]) -> None:
+    """Error on held-out rows against rows learned from, for the machines that fit in a moment."""
+    train, check = trained.parts.train, trained.parts.choose
+    for machine in regressors:
+        if isinstance(machine, GaussianMLP | LSSVM):
+            error = _relative(machine, trained)
+            axis.plot([len(train)], [error], "o", label=machine.kind)
+            continue
+        fixed: dict[str, Any] = {}
+        if isinstance(machine, FixedSizeLSSVM):
+            fixed = {"gamma": machine.gamma_, "width": machine.width_}
+        sizes, errors = [], []
+        for share in SHARES:
+            size = int(share * len(train))
+            if size < 40:
+                continue
+            some = (
+                clone(machine).set_params(**fixed).fit(train.features[:size], train.targets[:size])
+            )
+            sizes.append(size)
+            errors.append(_relative(some, trained))
+        axis.plot(sizes, errors, "o-", label=machine.kind)
+    axis.set(xscale="log", xlabel="rows learned from", ylabel="RMSE / prior std, mean over outputs")
+    axis.set_title(f"error on {len(check)} rows not learned from", fontsize=9)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _relative(machine: Any, trained: Trained) -> float:
+    check = trained.parts.choose
+    error = (check.targets - machine.predict(check.features)) / trained.prior_std
+    return float(np.sqrt(np.mean(error**2, axis=0)).mean())
+
+
+def _search(axis: Any, machine: LSSVM | FixedSizeLSSVM) -> None:
+    for width, gammas, errors in machine.search_:
+        axis.plot(gammas, np.sqrt(errors), "-", label=f"width {width:.2g}")
+    axis.plot([machine.gamma_], [min(np.sqrt(e.min()) for _, _, e in machine.search_)], "k*", ms=10)
+    axis.set(xscale="log", xlabel="gamma", ylabel="leave-one-out error / spread of outputs")
+    axis.set_title(f"{machine.kind}: choice by leave-one-out", fontsize=9)
+    low = min(float(np.sqrt(e.min())) for _, _, e in machine.search_)
+    axis.set_ylim(low * 0.995, low * 1.08)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _epochs(axis: Any, machine: GaussianMLP) -> None:
+    loss = np.asarray(machine.history_)
+    held = int(np.ceil(machine.warm_up * machine.epochs))
+    epochs = np.arange(1, len(loss) + 1)
+    axis.plot(epochs[held:], loss[held:, 0], label="learned from")
+    axis.plot(epochs[held:], loss[held:, 1], label="held out")
+    best = held + int(np.argmin(loss[held:, 1])) if len(loss) > held else len(loss) - 1
+    axis.axvline(epochs[best], color="k", lw=0.8, ls=":", label=f"kept: epoch {epochs[best]}")
+    axis.set(xlabel="epoch", ylabel="negative log likelihood, nat")
+    axis.set_title("mlp: likelihood (mean-only epochs left out)", fontsize=9)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)

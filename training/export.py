@@ -1,0 +1,198 @@
+"""A trained estimator as one ONNX file that carries all that the board must know."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from soilml import __version__
+from soilml.errors import SoilmlError
+from soilml.features import computed, inputs_of, parts
+from soilml.onboard import FORMAT
+from soilml.quantities import QUANTITIES
+from soilml.saving import replacing
+from training.graph import IR_VERSION, OPSET, Graph
+from training.train import Trained
+
+Floats = NDArray[np.float64]
+
+#: Largest difference to the float64 original, in prior standard deviations, that may be exported.
+TOLERANCE = 1e-4
+PARITY_ROWS = 8192
+
+
+def draw(trained: Trained) -> Any:
+    """The whole estimator as an ONNX model without metadata."""
+    graph, spec, estimator = Graph(), trained.spec, trained.estimator
+    names = list(inputs_of(spec.features))
+    double = {name: graph.double(name) for name in names}
+    columns = []
+    for feature in spec.features:
+        top, bottom = parts(feature)
+        value = graph.op("Div", double[top], double[bottom]) if bottom else double[top]
+        columns.append(graph.reshaped(value, -1, 1))
+    features = graph.op("Concat", *columns, axis=1)
+    mean, std = estimator.regressor.draw(graph, features)
+    std = graph.op("Mul", std, graph.constant(estimator.widen))
+    q = len(spec.targets)
+    outer = graph.op("Mul", graph.reshaped(std, -1, q, 1), graph.reshaped(std, -1, 1, q))
+    covariance = graph.op("Mul", outer, graph.constant(estimator.correlation))
+    inside = trained.support.draw(graph, features)
+    graph.op("Identity", inside, out="in_range")
+    prior = np.diag(trained.prior_std**2)
+    answers = {
+        "mean": (mean, trained.prior_mean, (-1, 1)),
+        "std": (std, trained.prior_std, (-1, 1)),
+        "covariance": (covariance, prior, (-1, 1, 1)),
+    }
+    for name, (value, otherwise, shape) in answers.items():
+        flag = graph.reshaped(inside, *shape)
+        graph.single(graph.op("Where", flag, value, graph.constant(otherwise)), name)
+    return graph.model(
+        names,
+        {
+            "mean": (1, ["rows", q]),
+            "std": (1, ["rows", q]),
+            "covariance": (1, ["rows", q, q]),
+            "in_range": (9, ["rows"]),
+        },
+    )
+
+
+def export(
+    trained: Trained, path: str | os.PathLike[str], data_path: str | os.PathLike[str]
+) -> dict[str, str]:
+    """Write the file and return its metadata; raises `SoilmlError` where parity is missed.
+
+    Bytes depend on the spec and the data alone.
+    """
+    model = draw(trained)
+    parity = _parity(trained, model.SerializeToString())
+    if not parity < TOLERANCE:
+        raise SoilmlError(
+            f"the exported model differs from the original by {parity:.1e} of the prior's spread, "
+            f"more than {TOLERANCE:g}: lower gamma, or take fewer centres"
+        )
+    metadata = _metadata(trained, parity, data_path)
+    for key, value in sorted(metadata.items()):
+        entry = model.metadata_props.add()
+        entry.key, entry.value = key, value
+    with replacing(path) as part:
+        part.write_bytes(model.SerializeToString(deterministic=True))
+    return metadata
+
+
+def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]) -> dict[str, str]:
+    spec, data = trained.spec, trained.data
+    recipe = data.recipe
+    inputs = [
+        {
+            "name": name,
+            "column": QUANTITIES[name].column,
+            "unit": QUANTITIES[name].unit,
+            "lower": float(values.min()),
+            "upper": float(values.max()),
+        }
+        for name, values in trained.parts.train.measured.items()
+    ]
+    outputs = [
+        {
+            "name": name,
+            "column": QUANTITIES[name].column,
+            "unit": QUANTITIES[name].unit,
+            "lower": float(data.lower[k]),
+            "upper": float(data.upper[k]),
+            "prior_mean": float(trained.prior_mean[k]),
+            "prior_std": float(trained.prior_std[k]),
+        }
+        for k, name in enumerate(spec.targets)
+    ]
+    joint = trained.together
+    return {
+        "soilml_format": FORMAT,
+        "soilml_version": __version__,
+        "inputs": json.dumps(inputs),
+        "outputs": json.dumps(outputs),
+        "gear": json.dumps(json.loads(recipe).get("gear", {}), sort_keys=True),
+        "together": json.dumps(
+            {
+                "rows": joint.rows.tolist(),
+                "worth": joint.worth.tolist(),
+                "widening": joint.widening.tolist(),
+                "reach": joint.reach.tolist(),
+            }
+        ),
+        "probe": json.dumps(_probe(trained)),
+        "spec": spec.text,
+        "recipe": recipe,
+        "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
+        "data_sha256": hashlib.sha256(Path(data_path).read_bytes()).hexdigest(),
+        "metrics": json.dumps(
+            {
+                name: {
+                    "rmse": score.rmse.tolist(),
+                    "rmse_share_of_prior": score.relative.tolist(),
+                    "nll": score.nll.tolist(),
+                    "cover50": score.cover50.tolist(),
+                    "cover90": score.cover90.tolist(),
+                    "rows": score.rows,
+                }
+                for name, score in trained.scores.items()
+            }
+        ),
+        "parity": f"{parity:.3e}",
+        "opset": str(OPSET),
+        "ir_version": str(IR_VERSION),
+    }
+
+
+def _box(trained: Trained) -> dict[str, Floats]:
+    """Readings (n,) that fill the training box, and rows that were learned from."""
+    measured = trained.parts.train.measured
+    fill = qmc.Sobol(len(measured), rng=11).random(PARITY_ROWS)
+    step = max(len(trained.parts.train) // PARITY_ROWS, 1)
+    found = {}
+    for k, (name, values) in enumerate(measured.items()):
+        box = values.min() + (values.max() - values.min()) * fill[:, k]
+        found[name] = np.concatenate([box, values[::step]])
+    return found
+
+
+def _parity(trained: Trained, content: bytes) -> float:
+    """Largest difference of mean or std to the float64 original, in prior standard deviations."""
+    import onnxruntime as ort
+
+    options = ort.SessionOptions()
+    options.log_severity_level = 4
+    session = ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    readings = _box(trained)
+    feed = {name: values.astype(np.float32) for name, values in readings.items()}
+    mean, std, flag = session.run(("mean", "std", "in_range"), feed)
+    true_mean, true_std, inside = trained.predict(computed(trained.spec.features, readings))
+    off = np.maximum(np.abs(mean - true_mean), np.abs(std - true_std)) / trained.prior_std
+    same = flag == inside  # a reading rounded across the edge of the range differs by its nature
+    if same.mean() < 0.999:
+        raise SoilmlError("the exported in-range flag differs from the original")
+    return float(off[same].max())
+
+
+def _probe(trained: Trained) -> dict[str, Any]:
+    """A few readings with their answers, which the board checks when it loads the file."""
+    chosen = np.linspace(0, len(trained.parts.train) - 1, 8).astype(int)
+    readings = {
+        name: values[chosen].astype(np.float32).astype(np.float64)
+        for name, values in trained.parts.train.measured.items()
+    }
+    mean, std, _ = trained.predict(computed(trained.spec.features, readings))
+    return {
+        "readings": {name: values.tolist() for name, values in readings.items()},
+        "mean": mean.tolist(),
+        "std": std.tolist(),
+    }

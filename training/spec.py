@@ -1,0 +1,102 @@
+"""A training spec: what to learn, from what, with which regressors."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from datagen.recipe import packaged
+from soilml.features import inputs_of
+from soilml.fusion import RULES
+from soilml.quantities import QUANTITIES, SHEAR
+from soilml.settings import Settings, read_settings
+from training.fixed_size import FixedSizeLSSVM
+from training.linear import LinearGaussian
+from training.lssvm import LSSVM
+from training.mlp import GaussianMLP
+
+#: Regressor by the name that `[[regressor]] type` takes: one new file and one line here.
+REGRESSORS: dict[str, type] = {
+    cls.kind: cls
+    for cls in (
+        LSSVM,
+        FixedSizeLSSVM,
+        GaussianMLP,
+        LinearGaussian,
+    )
+}
+
+
+@dataclass(frozen=True)
+class Spec:
+    """Seed, features, targets, regressors (unfitted) and the rule that joins them."""
+
+    name: str
+    seed: int
+    features: tuple[str, ...]
+    targets: tuple[str, ...]
+    regressors: tuple[Any, ...]
+    rule: str
+    text: str
+
+
+def read_spec(path: str | os.PathLike[str]) -> Spec:
+    """The spec in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
+    file = Path(path)
+    if not file.exists() and file.name == str(path):
+        file = packaged("training", str(path).removesuffix(".toml"), "specs") or file
+    settings = read_settings(file)
+    features = _words(settings, "features", ["slip", "torque/load", "load"])
+    inputs_of(features)  # names the first that cannot be read
+    targets = _words(settings, "targets", list(SHEAR))
+    for name in targets:
+        if name not in QUANTITIES:
+            settings.fail(f"targets: {name!r} is no quantity")
+    seed = int(settings.take("seed", int, "a whole number, 0 or more", 0))
+    rule = settings.text("rule", "best-linear")
+    if rule not in RULES:
+        settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
+    regressors = tuple(_regressor(entry, seed) for entry in settings.tables("regressor"))
+    if not regressors:
+        settings.fail("[[regressor]] is missing; give one or more")
+    settings.finish()
+    text = json.dumps(tomllib.loads(file.read_text(encoding="utf-8")), sort_keys=True)
+    return Spec(file.stem, seed, tuple(features), tuple(targets), regressors, rule, text)
+
+
+def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
+    words = settings.take(key, list, "a list of names", default)
+    if not words or not all(isinstance(word, str) for word in words):
+        settings.fail(f"{key} is {words!r}; needed is a list of names")
+    return [str(word) for word in words]
+
+
+def _regressor(settings: Settings, seed: int) -> Any:
+    kind = settings.text("type")
+    if kind not in REGRESSORS:
+        settings.fail(f"type is {kind!r}; there are: {', '.join(REGRESSORS)}")
+    made = REGRESSORS[kind]()
+    allowed = made.get_params()
+    settings.knows(allowed)
+    given: dict[str, Any] = {}
+    for key, default in allowed.items():
+        if key not in settings:
+            continue
+        if isinstance(default, tuple | list):
+            given[key] = tuple(settings.take(key, list, "a list of whole numbers"))
+            if not all(isinstance(v, int) and 1 <= v <= 4096 for v in given[key]):
+                settings.fail(f"{key} is {list(given[key])}; needed are whole numbers above zero")
+        elif isinstance(default, int):
+            given[key] = settings.count(key)
+        else:
+            given[key] = settings.number(key)
+            if not given[key] > 0.0:
+                settings.fail(f"{key} is {given[key]:g}; needed is a number above zero")
+    settings.finish()
+    if "random_state" in allowed and "random_state" not in given:
+        given["random_state"] = seed
+    return made.set_params(**given)
