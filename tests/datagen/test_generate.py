@@ -1,0 +1,169 @@
+"""Synthetic data: reproducible, whole, calibrated, and honest about failures."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from conftest import RECIPE
+
+from datagen.engine import generate, piece, pieces, sizes
+from datagen.recipe import read_recipe
+from soilml import Model, Operating, Wheel, read_table, soil
+from soilml.errors import InputError
+
+
+def recipe(tmp_path, extra="", rows=600, seed=1, text=RECIPE):
+    path = tmp_path / "recipe.toml"
+    path.write_text(text.format(rows=rows, seed=seed) + extra)
+    return read_recipe(path)
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_same_recipe_and_seed_give_the_same_bytes(tmp_path):
+    for name in ("a", "b"):
+        generate(recipe(tmp_path), tmp_path / f"{name}.parquet")
+    generate(recipe(tmp_path, seed=2), tmp_path / "c.parquet")
+    assert digest(tmp_path / "a.parquet") == digest(tmp_path / "b.parquet")
+    assert digest(tmp_path / "a.parquet") != digest(tmp_path / "c.parquet")
+
+
+def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
+    blocks = "[bias]\ntorque_Nm = 0.1\n[[runs]]\nrows = 8\nshare = 1.0\n"
+    made = recipe(tmp_path, blocks)
+    whole = piece(made, 0, 0, 600)
+    for first, last in ((0, 13), (13, 14), (301, 600)):
+        part = piece(made, 0, first, last)
+        for name, values in part.items():
+            if values.dtype.kind == "U":
+                assert (values == whole[name][first:last]).all()
+            else:  # vector units round the last digit by place
+                np.testing.assert_allclose(values, whole[name][first:last], rtol=1e-12)
+
+
+def test_metadata_holds_recipe_units_versions_and_seed(tmp_path):
+    made = recipe(tmp_path)
+    generate(made, tmp_path / "d.parquet")
+    schema = pq.read_schema(tmp_path / "d.parquet")
+    metadata = {k.decode(): v.decode() for k, v in schema.metadata.items()}
+    assert metadata["soilml_seed"] == "1" and metadata["soilml_rows"] == "600"
+    assert json.loads(metadata["soilml_recipe"])["gear"]["radius"] == 0.15
+    assert metadata["soilml_recipe_sha256"] == made.sha256
+    assert set(json.loads(metadata["soilml_versions"])) >= {"soilml", "numpy", "pyarrow"}
+    assert json.loads(metadata["soilml_units"])["torque_Nm"] == "N m"
+    assert schema.field("cohesion_Pa").metadata[b"unit"] == b"Pa"
+
+
+def test_readings_are_the_model_s_with_the_noise_declared(tmp_path):
+    generate(recipe(tmp_path, rows=4096), tmp_path / "d.parquet")
+    table = read_table(tmp_path / "d.parquet")
+    sand = soil(
+        "wong1989/dry_sand",
+        cohesion=table["cohesion_Pa"],
+        friction_angle=table["friction_angle_rad"],
+        shear_modulus=table["shear_modulus_m"],
+    )
+    at = Operating(slip=table["slip"], load=table["load_N"])
+    true = Model(Wheel(radius=0.15, width=0.12))(sand, at)
+    off = table["torque_Nm"] / true.torque - 1.0
+    assert np.std(off) == pytest.approx(0.02, rel=0.05)
+    assert abs(np.mean(off)) < 0.0015
+    np.testing.assert_allclose(table["sinkage_m"], true.sinkage, rtol=1e-12)  # no noise declared
+    for name, low, high in (("slip", 0.05, 0.6), ("load_N", 30, 120), ("cohesion_Pa", 0, 3000)):
+        u = np.sort((table[name] - low) / (high - low))
+        assert np.abs(u - (np.arange(4096) + 0.5) / 4096).max() < 0.01  # evenly filled
+
+
+def test_runs_share_soil_and_bias(tmp_path):
+    extra = "[bias]\ntorque_Nm = 0.5\n[[runs]]\nrows = 6\nshare = 1.0\n"
+    text = RECIPE.replace('torque_Nm = "2 %"', "sinkage_m = 1e-9")
+    made = recipe(tmp_path, extra, rows=1200, text=text)
+    columns = next(pieces(made))
+    runs = columns["run"].reshape(-1, 6)
+    assert (runs == runs[:, :1]).all()
+    assert len(np.unique(runs[:, 0])) == 200
+    c = columns["cohesion_Pa"].reshape(-1, 6)
+    assert (c == c[:, :1]).all()
+    sand = soil(
+        "wong1989/dry_sand",
+        **{n.rsplit("_", 1)[0]: columns[n] for n in ("cohesion_Pa", "friction_angle_rad")},
+        shear_modulus=columns["shear_modulus_m"],
+    )
+    at = Operating(slip=columns["slip"], load=columns["load_N"])
+    bias = columns["torque_Nm"] - Model(Wheel(radius=0.15, width=0.12))(sand, at).torque
+    bias = bias.reshape(-1, 6)
+    np.testing.assert_allclose(bias, np.tile(bias[:, :1], 6), atol=1e-9)
+    assert np.std(bias[:, 0]) == pytest.approx(0.5, rel=0.2)
+
+
+def test_rows_requested_are_rows_made(tmp_path):
+    blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
+    for rows in (1, 64, 1000):
+        assert sum(sizes(recipe(tmp_path, blocks, rows=rows))) == rows
+    assert recipe(tmp_path).sized(77, 3).rows == 77
+
+
+def test_rows_without_equilibrium_stay_with_their_reason(tmp_path):
+    text = RECIPE.replace("[30.0, 120.0]", "[30.0, 3000.0]")
+    made = generate(recipe(tmp_path, text=text), tmp_path / "d.parquet")
+    table = read_table(tmp_path / "d.parquet", filled=("run",))
+    failed = table["status"] != "ok"
+    assert 0 < made.failed == failed.sum() < 300
+    assert np.isnan(table["torque_Nm"][failed]).all()
+    assert np.isfinite(table["torque_Nm"][~failed]).all()
+
+
+def test_a_recipe_that_mostly_fails_is_refused_and_leaves_nothing(tmp_path):
+    text = RECIPE.replace("[30.0, 120.0]", "[30000.0, 120000.0]")
+    with pytest.raises(InputError, match="no equilibrium"):
+        generate(recipe(tmp_path, text=text), tmp_path / "d.parquet")
+    assert not list(tmp_path.glob("*parquet*"))
+
+
+def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
+    made = recipe(tmp_path, rows=3_000_000)
+    target = tmp_path / "d.parquet"
+    code = "import sys; from soilml.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "generate", str(tmp_path / "recipe.toml"), str(target)]
+    for stop in (signal.SIGINT, signal.SIGKILL):
+        process = subprocess.Popen(command, stderr=subprocess.PIPE)
+        part = tmp_path / ".d.parquet.part"
+        deadline = time.monotonic() + 60
+        while not (part.exists() and part.stat().st_size > 10_000):
+            assert time.monotonic() < deadline and process.poll() is None
+            time.sleep(0.01)
+        os.kill(process.pid, stop)
+        process.communicate()
+        assert process.returncode != 0
+        assert not target.exists()
+        assert part.exists() == (stop == signal.SIGKILL)
+    generate(made.sized(500), target)
+    assert len(read_table(target)) == 500
+    assert not part.exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[0.05, 0.6]", "[0.05, 1.6]", "must lie between -1 and 1"),
+        ("[30.0, 120.0]", "[-30.0, 120.0]", "above zero"),
+        ("rows = {rows}", "rows = 0", "1 or more"),
+        ("rows = {rows}", "rows = {rows}\nrow = 3", "did you mean 'rows'"),
+        ("seed = {seed}", "", "seed is missing"),
+        ("[operating]", "[[runs]]\nrows = 2\nshare = 0.4\n[operating]", "must sum to 1"),
+        ("slip = [0.05, 0.6]", "slip = [0.05, 0.6]\nload = [1, 2]", "unknown key 'load'"),
+    ],
+)
+def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
+    assert old in RECIPE
+    with pytest.raises(InputError, match=said):
+        recipe(tmp_path, text=RECIPE.replace(old, new))

@@ -1,0 +1,50 @@
+"""The catalogue of soils: units, bounds, sources, published numbers."""
+
+import csv
+import math
+from pathlib import Path
+
+import pytest
+
+from soilml import Soil, soil, soil_catalogue
+from soilml.errors import InputError
+from soilml.parameters import check
+
+PRINTED = list(csv.DictReader((Path(__file__).parent / "soils_printed.csv").open()))
+FACTOR = {"kPa": 1e3, "deg": math.pi / 180.0, "kN": 1e3, "1": 1.0, "mm": 1e-3, "rad": 1.0, "m": 1.0}
+
+
+@pytest.mark.parametrize("row", PRINTED, ids=lambda r: f"{r['soil']}-{r['field']}")
+def test_printed_values_stand_in_the_catalogue(row):
+    entry = soil_catalogue()[row["soil"]]
+    printed = float(row["value"]) * FACTOR[row["unit"]]
+    assert entry.published[row["field"]] == pytest.approx(printed, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", soil_catalogue())
+def test_every_soil_is_valid_and_says_where_it_comes_from(name):
+    entry = soil_catalogue()[name]
+    check(entry.soil)
+    assert any(year in entry.source for year in ("19", "20"))
+    assert entry.text
+    assert not set(entry.assumed) & set(entry.published)
+
+
+def test_a_negative_published_cohesion_is_kept_and_not_used():
+    entry = soil_catalogue()["comin2017/es-3"]
+    assert entry.published["cohesion"] == -830.0
+    assert entry.soil.cohesion == 0.0
+
+
+def test_single_values_can_be_replaced():
+    changed = soil("wong1989/dry_sand", friction_angle=0.6)
+    assert isinstance(changed, Soil)
+    assert changed.friction_angle == 0.6
+    assert changed.cohesion == soil("wong1989/dry_sand").cohesion
+
+
+def test_unknown_names_come_with_a_hint():
+    with pytest.raises(InputError, match="wong1989/dry_sand"):
+        soil("wong/dry_sand")
+    with pytest.raises(InputError, match="friction_angle"):
+        soil("wong1989/dry_sand", phi=0.6)

@@ -1,0 +1,124 @@
+"""What the layout promises, checked on the source and in a fresh process."""
+
+import ast
+import re
+import statistics
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("soilml", "datagen", "training")
+FILES = sorted(f for p in PACKAGES for f in (ROOT / p).rglob("*.py"))
+BOARD = {"numpy", "onnxruntime"}
+ALLOWED_OUTSIDE_BOARD = {
+    # where soilml itself may reach for more than the board has, always inside a function
+    "soilml/arrays.py": {"torch", "array_api_compat"},
+    "soilml/reading.py": {"pyarrow"},
+    "soilml/identification/nonlinear.py": {"scipy"},
+}
+
+
+def imports(tree, top_level_only=False):
+    nodes = tree.body if top_level_only else ast.walk(tree)
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module
+
+
+def test_the_layers_of_the_import_linter_hold():
+    done = subprocess.run(
+        [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(ROOT)))
+def test_what_flies_imports_only_what_the_board_has(file):
+    name = str(file.relative_to(ROOT))
+    tree = ast.parse(file.read_text())
+    if not name.startswith("soilml/"):
+        return
+    outside = {m.split(".")[0] for m in imports(tree)} - set(sys.stdlib_module_names) - {"soilml"}
+    assert outside - BOARD <= ALLOWED_OUTSIDE_BOARD.get(name, set())
+    at_top = {m.split(".")[0] for m in imports(tree, top_level_only=True)}
+    assert at_top - set(sys.stdlib_module_names) - {"soilml"} <= BOARD
+
+
+def test_files_are_short_and_say_what_they_are():
+    lengths = {f: len(f.read_text().splitlines()) for f in FILES}
+    assert statistics.median(lengths.values()) <= 120
+    assert max(lengths.values()) <= 300
+    for file in FILES:
+        assert ast.get_docstring(ast.parse(file.read_text())), file
+        assert file.stem not in ("utils", "common", "helpers", "core", "manager"), file
+
+
+def test_public_functions_and_classes_are_described():
+    for file in FILES:
+        for node in ast.parse(file.read_text()).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                assert ast.get_docstring(node), f"{file}: {node.name}"
+
+
+def test_nothing_is_unpickled():
+    for file in FILES:
+        text = file.read_text()
+        assert not re.search(r"\b(pickle|joblib|marshal|shelve)\b|torch\.(load|save)\(", text), file
+        assert not re.search(r"allow_pickle\s*=\s*True", text), file
+
+
+def test_importing_soilml_loads_nothing_else():
+    code = "import sys, soilml; print(*sorted(m for m in sys.modules if m.split('.')[0] in "
+    code += "('numpy', 'scipy', 'torch', 'sklearn', 'onnxruntime', 'soilml')))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout.split() == ["soilml"]
+
+
+def test_listing_the_commands_loads_no_ground_library():
+    code = "import sys; from soilml.cli import parser; parser(); "
+    code += "print(*sorted({m.split('.')[0] for m in sys.modules}))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    heavy = {"scipy", "torch", "sklearn", "onnx", "pyarrow", "matplotlib", "rich"}
+    assert not heavy & set(done.stdout.split())
+
+
+def test_every_public_name_can_be_had():
+    import soilml
+
+    for name in soilml.__all__:
+        assert getattr(soilml, name) is not None
+    assert set(dir(soilml)) == set(soilml.__all__)
+    with pytest.raises(AttributeError):
+        _ = soilml.nonsense
+
+
+def test_pinned_versions_cover_every_dependency():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    pinned = {
+        line.split("==")[0].lower().replace("_", "-")
+        for line in (ROOT / "constraints.txt").read_text().splitlines()
+        if "==" in line
+    }
+    needed = project["dependencies"] + sum(project["optional-dependencies"].values(), [])
+    for requirement in needed:
+        assert re.match(r"[\w-]+", requirement)[0].lower() in pinned
+
+
+def test_layout_page_names_every_module():
+    page = (ROOT / "ARCHITECTURE.md").read_text()
+    for file in FILES:
+        if file.name != "__init__.py":
+            assert file.name in page, f"ARCHITECTURE.md does not name {file.relative_to(ROOT)}"

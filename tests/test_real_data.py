@@ -1,0 +1,48 @@
+"""Measured tests, where `SOILML_DATA` names a folder that holds them."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from soilml.cli import main
+
+DATA = os.environ.get("SOILML_DATA", "")
+KLS1 = Path(DATA) / "kls1_rashid1" / "single_wheel_tests.csv"
+ROOT = Path(__file__).parents[1]
+
+pytestmark = pytest.mark.skipif(
+    not (DATA and KLS1.is_file()), reason="SOILML_DATA does not name a folder with measured tests"
+)
+SMOOTH = ["--where", "run=kls1_smooth_w59"]
+
+
+def test_identification_says_what_five_points_at_one_load_can_tell(capsys):
+    model = str(ROOT / "examples/kls1/model.toml")
+    assert main(["identify", model, str(KLS1), *SMOOTH]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rows_used"] == 5
+    assert "one load only: cohesion is not identified" in found["warnings"]
+    friction = found["parameters"]["friction_angle"]
+    assert friction["value"] + 1.645 * friction["std"] < 0.7086  # below direct shear: smooth rim
+
+
+def test_estimates_of_five_points_at_one_load_stay_with_the_prior(capsys):
+    model = str(ROOT / "exported/kls1_wheel.onnx")
+    assert main(["estimate", model, str(KLS1), *SMOOTH, "--by", "run"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.count("\n") == 2
+    assert "mostly the prior" in captured.err
+
+
+def test_the_model_can_be_simulated_at_the_tests_own_slips(capsys):
+    model = str(ROOT / "examples/kls1/model.toml")
+    assert main(["simulate", model, "--slip", "0.1:0.5:5", "--load", "58.86"]) == 0
+    assert capsys.readouterr().out.count("\n") == 6
+
+
+def test_a_table_with_several_wheels_asks_for_a_choice(capsys):
+    model = str(ROOT / "examples/kls1/model.toml")
+    assert main(["identify", model, str(KLS1)]) == 2
+    assert "--where" in capsys.readouterr().err

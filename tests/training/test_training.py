@@ -1,0 +1,162 @@
+"""Training: splits, calibration, specs, cards, pictures."""
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError, TableError
+from training.calibrate import calibrated, covariances, together
+from training.dataset import read_dataset, split
+from training.fused import fused
+from training.linear import LinearGaussian
+from training.score import scored
+from training.spec import read_spec
+
+FEATURES = ("slip", "torque/load", "load")
+TARGETS = ("cohesion", "friction_angle", "shear_modulus")
+
+
+@pytest.fixture(scope="module")
+def data(small_data):
+    return read_dataset(small_data, FEATURES, TARGETS)
+
+
+def test_no_soil_stands_in_two_parts_and_nothing_is_lost(data):
+    parts = split(data, seed=3)
+    runs = [set(p.run) for p in (parts.train, parts.choose, parts.calibrate)]
+    assert not (runs[0] & runs[1] or runs[0] & runs[2] or runs[1] & runs[2])
+    assert sum(map(len, (parts.train, parts.choose, parts.calibrate))) == len(data)
+    assert parts.train.run_length.max() == 1  # runs of many rows serve calibration
+    assert (parts.calibrate.run_length > 1).any()
+    assert len(parts.calibrate.thinned(2)) < len(parts.calibrate)
+
+
+def test_figures_of_a_known_case():
+    rng = np.random.default_rng(0)
+    mean, std = rng.normal(size=(20000, 1)), np.full((20000, 1), 0.5)
+    s = scored(mean + 0.5 * rng.normal(size=mean.shape), mean, std, np.asarray([2.0]))
+    assert s.rmse[0] == pytest.approx(0.5, rel=0.02)
+    assert s.relative[0] == pytest.approx(0.25, rel=0.02)
+    assert s.cover50[0] == pytest.approx(0.5, abs=0.012)
+    assert s.cover90[0] == pytest.approx(0.9, abs=0.008)
+    assert s.nll[0] == pytest.approx(0.5 * np.log(2 * np.pi * np.e) + np.log(0.25), abs=0.02)
+
+
+def test_recalibration_makes_errors_as_large_as_claimed(data):
+    parts = split(data, seed=0)
+    machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
+    shrunken = calibrated(_Overconfident(machine), parts.choose)
+    s = scored(
+        parts.calibrate.thinned().targets,
+        *shrunken.predict(parts.calibrate.thinned().features),
+        np.ones(3),
+    )
+    assert (np.abs(s.cover90 - 0.9) < 0.04).all()
+    np.testing.assert_allclose(shrunken.widen, 5.0, rtol=0.15)
+
+
+class _Overconfident:
+    def __init__(self, machine):
+        self.machine = machine
+
+    def predict(self, x, return_std=False):
+        mean, std = self.machine.predict(x, return_std=True)
+        return mean, std / 5.0
+
+
+def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
+    parts = split(data, seed=0)
+    machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
+    member = calibrated(machine, parts.choose)
+    single = member.predict(parts.calibrate.features)[1]
+    twice = fused([member, member], "best-linear", parts.choose)
+    np.testing.assert_allclose(twice.predict(parts.calibrate.features)[1], single, rtol=0.02)
+    naive = fused([member, member], "inverse-variance", parts.choose)
+    np.testing.assert_allclose(
+        naive.predict(parts.calibrate.features)[1], single / np.sqrt(2), rtol=1e-9
+    )
+
+
+def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
+    parts = split(data, seed=0)
+    member = calibrated(
+        LinearGaussian().fit(parts.train.features, parts.train.targets), parts.choose
+    )
+    prior_mean, prior_std = data.targets.mean(axis=0), data.targets.std(axis=0)
+    mean, std = member.predict(parts.calibrate.features)
+    covariance = covariances(std, member.correlation)
+    joint = together(mean, covariance, parts.calibrate, prior_mean, prior_std)
+    assert joint.rows.tolist() == [1, 2, 4, 8, 16, 32]
+    assert (joint.worth[1:] <= joint.worth[0]).all()
+    alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
+    mean, std = member.predict(alone.features)
+    unknown = together(mean, covariances(std, member.correlation), alone, prior_mean, prior_std)
+    assert unknown.worth[-1] == pytest.approx(1 / 32)  # nothing known: rows narrow nothing
+
+
+def test_train_writes_model_card_and_picture(small_model):
+    from matplotlib.image import imread
+
+    card = small_model.with_suffix(".md").read_text()
+    for said in ("cohesion", "in_range", "sha256", "best-linear", "90 %", "mostly the prior"):
+        assert said in card
+    picture = imread(small_model.with_suffix(".png"))
+    assert picture.shape[0] > 200 and picture[..., :3].std() > 0.01
+
+
+def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_path):
+    from conftest import RECIPE
+
+    from datagen.engine import generate
+    from datagen.recipe import read_recipe
+    from soilml import Estimator, read_table
+
+    (tmp_path / "r.toml").write_text(RECIPE.format(rows=4000, seed=77))
+    generate(read_recipe(tmp_path / "r.toml"), tmp_path / "t.parquet")
+    table = read_table(tmp_path / "t.parquet")
+    found = Estimator.load(small_model)(
+        slip=table["slip"], torque=table["torque_Nm"], load=table["load_N"]
+    )
+    truth = np.stack([table[c] for c in ("cohesion_Pa", "friction_angle_rad", "shear_modulus_m")])
+    inside = np.mean((found.low <= truth.T) & (found.high >= truth.T), axis=0)
+    assert (np.abs(inside - 0.9) < 0.05).all()
+    assert found.in_range.mean() > 0.99
+    # and they are narrower than the prior's, where one reading can tell anything
+    assert np.median(found.std[:, 2]) < 0.85 * found.prior_std[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "regressor]] is missing"),
+        ('[[regressor]]\ntype = "forest"\n', "lssvm, fixed-size-lssvm, mlp, linear"),
+        ('[[regressor]]\ntype = "mlp"\nlayers = [3]\n', "unknown key 'layers'"),
+        ('[[regressor]]\ntype = "mlp"\nhidden = [0]\n', "whole numbers above zero"),
+        ('[[regressor]]\ntype = "mlp"\nepochs = 0\n', "1 or more"),
+        ('[[regressor]]\ntype = "lssvm"\ngamma = -1.0\n', "above zero"),
+        ('rule = "average"\n[[regressor]]\ntype = "mlp"\n', "rule is 'average'"),
+        ('features = ["slip", "colour"]\n[[regressor]]\ntype = "mlp"\n', "'colour' is none of"),
+        ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' is no quantity"),
+    ],
+)
+def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
+    path = tmp_path / "spec.toml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_spec(path)
+    assert said in str(caught.value)
+
+
+def test_data_without_targets_or_with_too_few_rows_is_refused(tmp_path, small_data):
+    with pytest.raises(TableError, match="kphi_SI is missing"):
+        read_dataset(small_data, FEATURES, ("kphi",))
+    import pyarrow.parquet as pq
+
+    few = pq.read_table(small_data).slice(0, 20)
+    pq.write_table(few, tmp_path / "few.parquet")
+    with pytest.raises(TableError, match="20 usable rows"):
+        read_dataset(tmp_path / "few.parquet", FEATURES, TARGETS)
+
+
+@pytest.mark.parametrize("name", ["fused", "lssvm", "mlp", "linear"])
+def test_packaged_specs_are_found_by_name(name):
+    assert read_spec(name).regressors
