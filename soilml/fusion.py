@@ -20,6 +20,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+#: Keeps the correlation matrix of two estimators that are one and the same invertible.
+TWIN = 1e-9
+
+
 @dataclass(frozen=True)
 class Fused:
     """Fused mean and standard deviation (...), and the weights (m, ...) that sum to one."""
@@ -77,7 +81,7 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     best_variance = np.full(std.shape[1:], np.inf)
     best_weights = np.zeros_like(std)
     for subset in _subsets(m):
-        inverse = np.linalg.inv(R[np.ix_(subset, subset)])
+        inverse = np.linalg.inv(R[np.ix_(subset, subset)] + TWIN * np.eye(len(subset)))
         scaled = np.zeros_like(std)
         for i, row in zip(subset, inverse, strict=True):
             scaled[i] = sum(x / std[j] for x, j in zip(row, subset, strict=True)) / std[i]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -20,7 +22,7 @@ Floats = NDArray[np.float64]
 
 #: Version of the file's contract: input and output names, metadata keys.
 FORMAT = "1"
-#: A file whose answers to its own probe differ by more than this share of the prior is damaged.
+#: Answers to the file's own probe may differ by this share of the prior.
 PROBE_TOLERANCE = 1e-4
 
 
@@ -50,19 +52,22 @@ class Estimator:
     def load(path: str | os.PathLike[str]) -> Estimator:
         """Read and check a model file; raises `ModelFileError` for one that is not ours or damaged.
 
-        The file holds a probe, readings with the answers that they must give; it is run here.
+        Its checksums are compared, and its probe, readings with the answers that they must give, is
+        run: that tests the runtime of this machine as well.
         """
         file = Path(path)
         if not file.is_file():
             raise ModelFileError(f"{file}: there is no such file")
-        session = _session(file)
-        metadata = session.get_modelmeta().custom_metadata_map
+        content = _content(file)
+        session, metadata = _session(file, content)
         if "soilml_format" not in metadata:
             raise ModelFileError(f"{file} is an ONNX model, but none that soilml train wrote")
         if metadata["soilml_format"] != FORMAT:
             raise ModelFileError(
                 f"{file} has format {metadata['soilml_format']}, this soilml reads {FORMAT}"
             )
+        if not _whole(content, metadata):
+            raise ModelFileError(f"{file} is damaged: its checksum does not hold; export it again")
         try:
             inputs = json.loads(metadata["inputs"])
             outputs = json.loads(metadata["outputs"])
@@ -73,7 +78,7 @@ class Estimator:
                 inputs=tuple(entry["name"] for entry in inputs),
                 names=tuple(entry["name"] for entry in outputs),
                 units=tuple(entry["unit"] for entry in outputs),
-                metadata=dict(metadata),
+                metadata=metadata,
                 prior_mean=_column(outputs, "prior_mean"),
                 prior_std=_column(outputs, "prior_std"),
                 prior_low=_column(outputs, "lower"),
@@ -94,7 +99,7 @@ class Estimator:
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
             raise ModelFileError(f"{file} cannot be run: {error}") from None
         if not bool(np.all(off < PROBE_TOLERANCE)):
-            raise ModelFileError(f"{file} is damaged: it fails its own probe; export it again")
+            raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator
 
     def __call__(self, **measured: Any) -> Estimate:
@@ -150,15 +155,41 @@ class Estimator:
         )
 
 
-def _session(file: Path) -> ort.InferenceSession:
+def checksum(metadata: Mapping[str, str]) -> str:
+    """Hash of all metadata but the hash itself."""
+    entries = sorted((k, v) for k, v in metadata.items() if k != "metadata_sha256")
+    return hashlib.sha256(json.dumps(entries).encode()).hexdigest()
+
+
+def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
+    """Whether graph and metadata are those that were written.
+
+    The graph stands in front of the metadata in the file, in as many bytes as the metadata says.
+    """
+    size = metadata.get("graph_bytes", "0")
+    graph = content[: int(size) if size.isdecimal() else 0]
+    return hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256") and checksum(
+        metadata
+    ) == metadata.get("metadata_sha256")
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
+
+
+def _session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str, str]]:
     options = ort.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = 4
     try:
-        return ort.InferenceSession(file.read_bytes(), options, providers=["CPUExecutionProvider"])
-    except OSError as error:
-        raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
+        session = ort.InferenceSession(
+            content, options, providers=["CPUExecutionProvider"], enable_fallback=0
+        )
+        return session, dict(session.get_modelmeta().custom_metadata_map)
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ModelFileError(f"{file} is not a whole ONNX model: {first[:160]}") from None

@@ -112,7 +112,9 @@ def test_pinned_versions_cover_every_dependency():
         for line in (ROOT / "constraints.txt").read_text().splitlines()
         if "==" in line
     }
-    needed = project["dependencies"] + sum(project["optional-dependencies"].values(), [])
+    needed = [*project["dependencies"]]
+    for extra in project["optional-dependencies"].values():
+        needed += extra
     for requirement in needed:
         assert re.match(r"[\w-]+", requirement)[0].lower() in pinned
 

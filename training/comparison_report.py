@@ -98,7 +98,8 @@ def draw(lines: Sequence[Line], names: Sequence[str], path: str | os.PathLike[st
         axes[0][k].set_title(name.replace("_", " "))
         axes[0][k].set_ylim(bottom=0)
         axes[1][k].axhspan(0.88, 0.92, color="C2", alpha=0.2, lw=0)
-        axes[1][k].set_ylim(0, 1.02)
+        held = [line.cover90[k] for line in lines if np.isfinite(line.cover90[k])]
+        axes[1][k].set_ylim(min([0.5, *held]) - 0.02, 1.02)
         axes[1][k].set_xticks(range(len(sizes)), [str(size) for size in sizes])
         axes[1][k].set_xlabel("readings of one soil in a set")
         for row in (0, 1):

@@ -15,7 +15,7 @@ from scipy.stats import qmc
 from soilml import __version__
 from soilml.errors import SoilmlError
 from soilml.features import computed, inputs_of, parts
-from soilml.onboard import FORMAT
+from soilml.onboard import FORMAT, checksum
 from soilml.quantities import QUANTITIES
 from soilml.saving import replacing
 from training.graph import IR_VERSION, OPSET, Graph
@@ -81,11 +81,18 @@ def export(
             f"more than {TOLERANCE:g}: lower gamma, or take fewer centres"
         )
     metadata = _metadata(trained, parity, data_path)
+    graph = model.SerializeToString(deterministic=True)
+    metadata["graph_bytes"] = str(len(graph))
+    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
+    metadata["metadata_sha256"] = checksum(metadata)
     for key, value in sorted(metadata.items()):
         entry = model.metadata_props.add()
         entry.key, entry.value = key, value
+    content = model.SerializeToString(deterministic=True)
+    if not content.startswith(graph):
+        raise SoilmlError("this version of onnx does not write the metadata behind the graph")
     with replacing(path) as part:
-        part.write_bytes(model.SerializeToString(deterministic=True))
+        part.write_bytes(content)
     return metadata
 
 

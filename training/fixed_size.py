@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 from threadpoolctl import threadpool_limits
 
@@ -59,7 +59,7 @@ class Primal:
         return np.asarray((y - features @ weights - bias) / (1.0 - leverage)[:, None])
 
 
-class FixedSizeLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class FixedSizeLSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """LS-SVM in the primal, on Nystrom features of an entropy-selected subset of the rows.
 
     Parameters

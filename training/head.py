@@ -20,7 +20,8 @@ TAIL = 0.001
 
 def checked(estimator: Any, X: Any, y: Any) -> tuple[Floats, Floats, bool]:
     """X (n, d), y as (n, q), and whether y came as (n,); faults raise as in scikit-learn."""
-    X, y = validate_data(estimator, X, y, multi_output=True, y_numeric=True, dtype=np.float64)
+    rules = {"multi_output": True, "y_numeric": True, "dtype": np.float64, "ensure_min_samples": 2}
+    X, y = validate_data(estimator, X, y, **rules)
     return X, y.reshape(len(y), -1).astype(np.float64), y.ndim == 1
 
 

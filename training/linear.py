@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from training.graph import Graph
@@ -14,7 +14,7 @@ from training.kernel import log_squares
 from training.scaling import Scaling
 
 
-class LinearGaussian(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class LinearGaussian(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """Linear mean and linear logarithm of the variance, by least squares with a little ridge.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 from threadpoolctl import threadpool_limits
 
@@ -62,7 +62,7 @@ class Factored:
         return gammas[int(np.argmin(errors))], errors
 
 
-class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class LSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """Least squares support vector regression with bias, Gaussian kernel, any number of outputs.
 
     Parameters

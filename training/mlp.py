@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from training.graph import Graph
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int], None]
 
 
-class GaussianMLP(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class GaussianMLP(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
     r"""Tanh layers with a Gaussian head, by maximum likelihood.
 
     .. math:: L = \tfrac12 \sum_k \left[\log v_k + (y_k - \mu_k)^2 / v_k\right]

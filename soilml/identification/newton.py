@@ -21,6 +21,8 @@ from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 STEPS = 60
+#: Least ratio of the sensitivities to the three unknowns.
+LEAST_RANK = 1e-6
 
 
 def newton(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
@@ -80,6 +82,12 @@ def _solved(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
             break
         if np.abs(step).max() < 1e-9:
             break
+    size = np.linalg.svd(slope, compute_uv=False)
+    if len(size) < 3 or size[-1] < LEAST_RANK * size[0]:
+        raise FitError(
+            "the rows are too alike for Newton-Raphson: give three or more at different slips and "
+            "loads, or use --method nonlinear"
+        )
     freedom = len(r) - 3
     misfit = float(r @ r / freedom) if freedom > 0 else float("nan")
     scale = misfit if freedom > 0 and (not known or misfit > 1.0) else 1.0

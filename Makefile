@@ -1,0 +1,47 @@
+# `make` alone lists what can be made. Everything runs in .venv, which is made on first use.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# one thread for each process: two processes that share two cores slow each other down manyfold
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check models kls1 bench clean
+
+help: ## list the targets
+	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+$(VENV)/.ready: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "soilml needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.11"; exit 2; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null \
+	  || { echo "$(PYTHON) cannot make environments; on Debian: apt install python3-venv"; exit 2; }
+	@echo "making the environment in $(VENV) (about a minute) ..."
+	@$(PYTHON) -m venv $(VENV)
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[ground,dev]'
+	@touch $@
+
+demo: $(VENV)/.ready ## from physics to an estimate on board, with a table and a picture
+	@$(BIN)/python examples/wheel/demo.py
+
+test: $(VENV)/.ready ## all checks and tests
+	@$(MAKE) --no-print-directory check
+	@$(BIN)/python -m pytest -n 2
+
+check: $(VENV)/.ready ## formatting, types and layers
+	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \
+	  && $(BIN)/lint-imports > /dev/null && echo "format, types and layers hold"
+
+models: $(VENV)/.ready ## train the released models again, into exported/
+	@$(BIN)/python exported/make.py
+
+kls1: $(VENV)/.ready ## the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
+	@$(BIN)/python examples/kls1/run.py
+
+bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md
+	@$(BIN)/python bench/run.py
+
+clean: ## remove the environment and what demo and tests made
+	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache
