@@ -65,7 +65,7 @@ class Together:
 def joined(
     mean: Floats, covariance: Floats, prior_mean: Floats, prior_std: Floats, worth: float
 ) -> tuple[Floats, Floats]:
-    r"""One mean (q,) and covariance (q, q) from those of m rows of one soil, (m, q) and (m, q, q).
+    r"""One mean (..., q) and covariance (..., q, q) from those of m rows, (..., m, q), of one soil.
 
     .. math::
         P^{-1} = P_0^{-1} + w \sum_i (P_i^{-1} - P_0^{-1}), \quad
@@ -77,16 +77,16 @@ def joined(
     conditionally independent measurements (Tresp, Neural Computation 12, 2000). It treats the
     posterior of a row as a Gaussian, which it is not: `Together` holds what that costs.
     """
-    q = mean.shape[1]
+    q = mean.shape[-1]
     white_mean = (mean - prior_mean) / prior_std
     white = covariance / np.outer(prior_std, prior_std)
     share, axes = np.linalg.eigh(white)
     share = np.clip(share, LEAST_SHARE**2, 1.0 - LEAST_SHARE)
-    along = np.einsum("mji,mj->mi", axes, white_mean) / share
-    gained = worth * np.einsum("mij,mj,mkj->ik", axes, 1.0 / share - 1.0, axes)
-    pulled = worth * np.einsum("mij,mj->i", axes, along)
+    along = np.einsum("...ji,...j->...i", axes, white_mean) / share
+    gained = worth * np.einsum("...mij,...mj,...mkj->...ik", axes, 1.0 / share - 1.0, axes)
+    pulled = worth * np.einsum("...mij,...mj->...i", axes, along)
     inverse = np.linalg.inv(np.eye(q) + gained)
     return (
-        prior_mean + prior_std * (inverse @ pulled),
+        prior_mean + prior_std * np.einsum("...ij,...j->...i", inverse, pulled),
         np.asarray(inverse * np.outer(prior_std, prior_std)),
     )

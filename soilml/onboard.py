@@ -123,7 +123,10 @@ class Estimator:
 
     def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings together: rows driven on one soil, arrays (rows,)."""
-        single = self(**{name: np.atleast_1d(value) for name, value in measured.items()})
+        arrays = {name: np.atleast_1d(value) for name, value in measured.items()}
+        if all(array.size == 1 for array in arrays.values()):
+            return self(**{name: array.reshape(()) for name, array in arrays.items()})
+        single = self(**arrays)
         q = len(self.names)
         means, covariances = single.mean.reshape(-1, q), single.covariance.reshape(-1, q, q)
         worth, widening, reach = self.together.at(len(means))

@@ -13,9 +13,10 @@ from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
 
-#: Numbers of rows at which joining is measured, and groups of rows looked at for each.
-LENGTHS = (1, 2, 4, 8, 16, 32)
-LEAST_GROUPS, MOST_GROUPS = 50, 600
+#: Numbers of rows at which joining is measured; how many groups that takes, and may come of a run.
+LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
+LEAST_GROUPS = 50
+MOST_OF_A_RUN = 4
 #: Shares of what a row seems to tell that are tried.
 WORTHS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05, 0.03)
 
@@ -59,20 +60,18 @@ def together(
     runs = _runs(data)
     rows, worths, widening, reach = [], [], [], []
     for length in LENGTHS:
-        groups = [
-            run[i : i + length] for run in runs for i in range(0, len(run) - length + 1, length)
-        ]
+        groups = _groups(runs, length)
         if len(groups) < LEAST_GROUPS:
             break
-        groups = groups[:: max(len(groups) // MOST_GROUPS, 1)]
+        truth = data.targets[groups[:, 0]]
         best: tuple[float, Floats, Floats] | None = None
         least = np.inf
         for worth in WORTHS if length > 1 else WORTHS[:1]:
-            both = [joined(mean[g], covariance[g], prior_mean, prior_std, worth) for g in groups]
-            std = np.stack([np.sqrt(np.diag(c)) for _, c in both])
-            off = np.abs(
-                np.stack([data.targets[g[0]] - m for g, (m, _) in zip(groups, both, strict=True)])
-            )
+            m, c = mean[groups[:, 0]], covariance[groups[:, 0]]
+            if length > 1:
+                m, c = joined(mean[groups], covariance[groups], prior_mean, prior_std, worth)
+            std = np.sqrt(np.diagonal(c, axis1=1, axis2=2))
+            off = np.abs(truth - m)
             wide = np.sqrt(np.mean((off / std) ** 2, axis=0)) if length > 1 else np.ones(q)
             # negative log likelihood of the widened Gaussian, but for constants
             loss = float(np.mean(np.log(std * wide / prior_std)))
@@ -89,6 +88,16 @@ def together(
         widening.append(np.ones(q))
         reach.append(reach[0])
     return Together(*(np.asarray(part, dtype=float) for part in (rows, worths, widening, reach)))
+
+
+def _groups(runs: list[NDArray[np.int64]], length: int) -> NDArray[np.int64]:
+    """Rows (groups, length) of one soil each; a run gives at most a few, lest it count too much."""
+    found = [
+        run[i : i + length]
+        for run in runs
+        for i in range(0, min(len(run), MOST_OF_A_RUN * length) - length + 1, length)
+    ]
+    return np.asarray(found, dtype=np.int64).reshape(-1, length)
 
 
 def _runs(data: Dataset) -> list[NDArray[np.int64]]:

@@ -85,7 +85,7 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     mean, std = member.predict(parts.calibrate.features)
     covariance = covariances(std, member.correlation)
     joint = together(mean, covariance, parts.calibrate, prior_mean, prior_std)
-    assert joint.rows.tolist() == [1, 2, 4, 8, 16, 32]
+    assert joint.rows.tolist() == [1, 2, 3, 4, 6, 8, 12, 16, 24, 32]
     assert (joint.worth[1:] <= joint.worth[0]).all()
     alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
     mean, std = member.predict(alone.features)

@@ -1,0 +1,60 @@
+"""What the README shows works as shown."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datagen.recipe import read_recipe
+from soilml import read_case, read_table
+from soilml.cli import ORDER
+from soilml.reading import RUNS
+from training.spec import read_spec
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_python_lines_run(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    (lines,) = blocks("python")
+    names: dict = {}
+    exec(lines, names)
+    assert names["force"].torque.shape == (50,)
+    assert names["one"].mean.shape == names["all_"].mean.shape == (3,)
+    assert bool(names["one"].in_range) and bool(names["all_"].in_range)
+
+
+def test_the_model_file_is_valid(tmp_path):
+    model = next(b for b in blocks("toml") if "[gear]" in b)
+    (tmp_path / "model.toml").write_text(model)
+    case = read_case(tmp_path / "model.toml")
+    assert case.soil.friction_angle == 0.60
+    assert set(case.prior) == {"cohesion", "kphi"}
+
+
+def test_the_recipe_and_the_spec_are_valid(tmp_path):
+    model = next(b for b in blocks("toml") if "[gear]" in b)
+    extra = next(b for b in blocks("toml") if "[operating]" in b).replace("0.25", "1.0")
+    (tmp_path / "recipe.toml").write_text(f"rows = 64\nseed = 1\n{model}{extra}")
+    assert read_recipe(tmp_path / "recipe.toml").blocks[0].rows == 32
+    spec = next(b for b in blocks("toml") if "[[regressor]]" in b)
+    (tmp_path / "spec.toml").write_text(spec)
+    assert read_spec(tmp_path / "spec.toml").regressors[0].centres == 150
+
+
+def test_the_table_of_runs_is_valid(tmp_path):
+    text = blocks("csv")[0]
+    (tmp_path / "runs.csv").write_text(text)
+    table = read_table(tmp_path / "runs.csv", RUNS)
+    assert np.isnan(table["drawbar_pull_N"]).all()
+
+
+@pytest.mark.parametrize("command", ORDER)
+def test_every_command_is_on_the_screen(command):
+    assert f"\nsoilml {command} " in README
