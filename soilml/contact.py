@@ -30,8 +30,9 @@ class Contact:
 
 @dataclass(frozen=True)
 class Stress:
-    """Stress of the soil on the gear's surface, arrays (points, batch), Pa."""
+    """Stress of the soil on the gear's surface at the points of a contact, (points, batch), Pa."""
 
+    contact: Contact
     normal: Array
     shear: Array
 
@@ -69,10 +70,10 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
     mobilised = -xp.expm1(-xp.abs(contact.sheared) / soil.shear_modulus)
     sign = xp.where(at.slip < 0, -xp.ones_like(at.slip), xp.ones_like(at.slip))
-    return Stress(normal=normal, shear=sign * strength * mobilised)
+    return Stress(contact=contact, normal=normal, shear=sign * strength * mobilised)
 
 
-def integrate(contact: Contact, stress: Stress) -> tuple[Array, Array, Array]:
+def integrate(stress: Stress) -> tuple[Array, Array, Array]:
     r"""Vertical load (N), drawbar pull (N) and torque (N m) of all points together.
 
     .. math::
@@ -82,7 +83,7 @@ def integrate(contact: Contact, stress: Stress) -> tuple[Array, Array, Array]:
 
     References: Wong and Reece 1967, eqs. of equilibrium of a driven rigid wheel.
     """
-    xp = namespace(stress.normal)
+    xp, contact = namespace(stress.normal), stress.contact
     load = xp.sum(stress.normal * contact.up + stress.shear * contact.ahead, axis=0)
     pull = xp.sum(stress.shear * contact.up - stress.normal * contact.ahead, axis=0)
     torque = xp.sum(stress.shear * contact.lever * contact.area, axis=0)

@@ -29,7 +29,7 @@ def loaded(scene: Scene, sinkage: Array) -> Force:
     shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
     contact = gear.contact(shape, at)
     stresses = through(effects, "on_stress", stress(contact, soil, at), scene)
-    load, pull, torque = integrate(contact, stresses)
+    load, pull, torque = integrate(stresses)
     flaw = gear.flaw(shape)
     bearing = soil.kc / contact.width + soil.kphi + 0.0 * load
     status = xp.where((flaw == 0) & ~(bearing > 0), flaw + int(Status.NO_BEARING), flaw)

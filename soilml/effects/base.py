@@ -13,7 +13,7 @@ STAGES = {
     "on_operating": "Operating: what the slip and load sensors report -> what the gear does",
     "on_soil": "Soil: the soil as it is at this slip, speed or pass",
     "on_contact": "the gear's shape in the soil (for wheels a Rim)",
-    "on_stress": "Stress on the gear's surface",
+    "on_stress": "Stress at the points of the contact, which it carries",
     "on_force": "Force at any sinkage, inside the search for equilibrium",
     "on_reading": "Force at equilibrium -> what the sensors report",
 }
