@@ -7,14 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
 from threadpoolctl import threadpool_limits
 
-from training.graph import Graph
+from training.expansion import KernelExpansion
 from training.head import GaussianHead, checked
 from training.kernel import log_squares, median_distance, rbf
-from training.lssvm import draw_kernel
 from training.scaling import Scaling
 from training.select import entropy_selected
 
@@ -59,7 +56,7 @@ class Primal:
         return np.asarray((y - features @ weights - bias) / (1.0 - leverage)[:, None])
 
 
-class FixedSizeLSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class FixedSizeLSSVM(KernelExpansion):
     """LS-SVM in the primal, on Nystrom features of an entropy-selected subset of the rows.
 
     Parameters
@@ -139,19 +136,6 @@ class FixedSizeLSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: 
             for i in range(0, len(x), CHUNK)
         ]
         return np.vstack(parts)
-
-    def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Mean (n,) or (n, q); with `return_std` a tuple with the standard deviation."""
-        check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
-        row = rbf(self.x_scaling_.apply(X), self.centres_, self.width_)
-        return self.head_.answer(
-            row @ self.alpha_ + self.bias_, row @ self.spread_alpha_ + self.spread_bias_, return_std
-        )
-
-    def draw(self, graph: Graph, features: str) -> tuple[str, str]:
-        """The fitted machine as nodes of an ONNX graph: names of mean and std, (n, q)."""
-        return draw_kernel(self, graph, features)
 
 
 def _whitening(centres: Floats, width: float) -> Floats:

@@ -7,11 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
 from threadpoolctl import threadpool_limits
 
-from training.graph import Graph
+from training.expansion import KernelExpansion
 from training.head import GaussianHead, checked
 from training.kernel import log_squares, median_distance, rbf
 from training.scaling import Scaling
@@ -62,7 +60,7 @@ class Factored:
         return gammas[int(np.argmin(errors))], errors
 
 
-class LSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
+class LSSVM(KernelExpansion):
     """Least squares support vector regression with bias, Gaussian kernel, any number of outputs.
 
     Parameters
@@ -106,30 +104,3 @@ class LSSVM(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[mi
             self.spread_alpha_, self.spread_bias_, left = best.solved(logs, spread_gamma)
         self.head_ = GaussianHead.of(self.y_scaling_, logs - left, one_output)
         return self
-
-    def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Mean (n,) or (n, q); with `return_std` a tuple with the standard deviation."""
-        check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
-        row = rbf(self.x_scaling_.apply(X), self.centres_, self.width_)
-        return self.head_.answer(
-            row @ self.alpha_ + self.bias_, row @ self.spread_alpha_ + self.spread_bias_, return_std
-        )
-
-    def draw(self, graph: Graph, features: str) -> tuple[str, str]:
-        """The fitted machine as nodes of an ONNX graph: names of mean and std, (n, q)."""
-        return draw_kernel(self, graph, features)
-
-
-def draw_kernel(machine: Any, graph: Graph, features: str) -> tuple[str, str]:
-    """Kernel row against the centres, then both expansions in one product; float64 throughout."""
-    shrink = 1.0 / (np.sqrt(2.0) * machine.width_)
-    x = graph.scaled(features, machine.x_scaling_.mean, machine.x_scaling_.scale / shrink)
-    centres = machine.centres_ * shrink
-    row = graph.op("Exp", graph.op("Neg", graph.squared_distances(x, centres)))
-    q = machine.alpha_.shape[1]
-    weights = np.hstack([machine.alpha_, machine.spread_alpha_])
-    bias = np.concatenate([machine.bias_, machine.spread_bias_])
-    both = graph.affine(row, weights, bias)
-    head: GaussianHead = machine.head_
-    return head.draw(graph, graph.columns(both, 0, q), graph.columns(both, q, 2 * q))

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, final
+from typing import ClassVar, final
 
-from soilml.arrays import Array, Real, namespace
+from soilml.arrays import Array, namespace
 from soilml.contact import Contact
-from soilml.gears.rim import NO_DEPTH, Rim, plate_sinkage, rim_at, rim_flaw
+from soilml.gears.rim import NO_DEPTH, RigidWheel, Rim
 from soilml.operating import Operating
-from soilml.parameters import Parameter
-from soilml.soils.base import Soil
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class LinearWheel:
+class LinearWheel(RigidWheel):
     r"""Closed form: stresses at exit, maximum and entry, joined by straight lines.
 
     .. math::
@@ -29,24 +27,6 @@ class LinearWheel:
     """
 
     name: ClassVar[str] = "linear-wheel"
-    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
-    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
-
-    def deepest(self) -> Real:
-        """The hub stands at the free surface: the radius, m."""
-        return self.radius
-
-    def guess(self, soil: Soil, at: Operating) -> Array:
-        """Bekker's sinkage of a towed wheel, m."""
-        return plate_sinkage(self.radius, self.width, soil, at)
-
-    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Rim:
-        """The arc that stands in the soil."""
-        return rim_at(sinkage, self.radius, self.width, soil, at)
-
-    def flaw(self, shape: Rim) -> Array:
-        """`Status.NO_PEAK` where the maximum stress does not lie inside the arc."""
-        return rim_flaw(shape)
 
     def contact(self, shape: Rim, at: Operating) -> Contact:
         """Two points, exit and maximum stress; at entry there is neither stress."""

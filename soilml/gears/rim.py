@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from abc import ABC
 from dataclasses import dataclass
+from typing import Annotated, final
 
 from soilml.arrays import Array, Real, namespace
 from soilml.operating import Operating
+from soilml.parameters import Parameter
 from soilml.soils.base import Soil
 from soilml.status import Status
 
@@ -29,48 +32,60 @@ class Rim:
     width: Real  # m
 
 
-def rim_at(sinkage: Array, radius: Real, width: Real, soil: Soil, at: Operating) -> Rim:
-    r"""The arc of a wheel that has sunk this deep (m), leaving the soil straight below its axle.
+@dataclass(frozen=True, kw_only=True)
+class RigidWheel(ABC):
+    """A rigid cylinder in the soil, whatever its stresses are taken to be along the arc."""
 
-    .. math::
-        \theta_1 = \arccos(1 - z / r), \quad \theta_2 = 0, \quad
-        \theta_m = (a_0 + a_1 s) \theta_1
+    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
+    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
 
-    References: Wong and Reece, J. Terramechanics 4(1), 1967.
-    """
-    xp = namespace(sinkage)
-    # arcsin of the half angle keeps all digits at small sinkage, where arccos loses them
-    entry = 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * radius)))
-    return Rim(
-        entry=entry,
-        exit=xp.zeros_like(entry),
-        peak=(soil.a0 + soil.a1 * at.slip) * entry,
-        sinkage=sinkage,
-        radius=radius,
-        shear_radius=radius,
-        width=width,
-    )
+    @final
+    def deepest(self) -> Real:
+        """The hub stands at the free surface: the radius, m."""
+        return self.radius
 
+    @final
+    def guess(self, soil: Soil, at: Operating) -> Array:
+        r"""Sinkage under normal stress alone, m: where the search begins.
 
-def rim_flaw(rim: Rim) -> Array:
-    """`Status.NO_PEAK` where the maximum stress does not lie inside the contact, else 0."""
-    xp = namespace(rim.entry)
-    inside = (rim.peak > rim.exit) & (rim.peak < rim.entry)
-    ok = xp.zeros_like(rim.entry, dtype=xp.int64)
-    return xp.where(inside, ok, ok + int(Status.NO_PEAK))
+        .. math::
+            z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
 
+        References: Bekker 1969, eq. for the towed rigid wheel; good for n below 1.3.
+        """
+        xp = namespace(at.load)
+        modulus = soil.kc + self.width * soil.kphi
+        room = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, 0.5))
+        base = 3.0 * at.load / (room * modulus * xp.sqrt(2.0 * self.radius))
+        return base ** (2.0 / (2.0 * soil.n + 1.0))
 
-def plate_sinkage(radius: Real, width: Real, soil: Soil, at: Operating) -> Array:
-    r"""Sinkage of a rigid wheel under normal stress alone, m.
+    @final
+    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Rim:
+        r"""The arc of a wheel that has sunk this deep (m) and leaves the soil below its axle.
 
-    .. math::
-        z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
+        .. math::
+            \theta_1 = \arccos(1 - z / r), \quad \theta_2 = 0, \quad
+            \theta_m = (a_0 + a_1 s) \theta_1
 
-    References: Bekker 1969, eq. for the towed rigid wheel. Good for n below 1.3; here it only
-    starts a search, so n is kept from 3.
-    """
-    xp = namespace(at.load)
-    modulus = soil.kc + width * soil.kphi
-    room = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, 0.5))
-    base = 3.0 * at.load / (room * modulus * xp.sqrt(2.0 * radius))
-    return base ** (2.0 / (2.0 * soil.n + 1.0))
+        References: Wong and Reece, J. Terramechanics 4(1), 1967.
+        """
+        xp = namespace(sinkage)
+        # arcsin of the half angle keeps all digits at small sinkage, where arccos loses them
+        entry = 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * self.radius)))
+        return Rim(
+            entry=entry,
+            exit=xp.zeros_like(entry),
+            peak=(soil.a0 + soil.a1 * at.slip) * entry,
+            sinkage=sinkage,
+            radius=self.radius,
+            shear_radius=self.radius,
+            width=self.width,
+        )
+
+    @final
+    def flaw(self, shape: Rim) -> Array:
+        """`Status.NO_PEAK` where the maximum stress does not lie inside the arc, else 0."""
+        xp = namespace(shape.entry)
+        inside = (shape.peak > shape.exit) & (shape.peak < shape.entry)
+        ok = xp.zeros_like(shape.entry, dtype=xp.int64)
+        return xp.where(inside, ok, ok + int(Status.NO_PEAK))

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, ClassVar, final
+from typing import ClassVar, final
 
-from soilml.arrays import Array, Real, namespace
+from soilml.arrays import Array, namespace
 from soilml.contact import Contact
 from soilml.gears.reversal import reversal
-from soilml.gears.rim import NO_DEPTH, Rim, plate_sinkage, rim_at, rim_flaw
+from soilml.gears.rim import NO_DEPTH, RigidWheel, Rim
 from soilml.operating import Operating
-from soilml.parameters import Parameter
 from soilml.quadrature import Nodes, crowded_ends, crowded_start
-from soilml.soils.base import Soil
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
 #: quadrature.
@@ -23,7 +21,7 @@ BRAKING_NODES = 24
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Wheel:
+class Wheel(RigidWheel):
     r"""A rigid cylinder: Bekker's pressure mirrored behind the angle of maximum stress.
 
     .. math::
@@ -40,24 +38,6 @@ class Wheel:
     """
 
     name: ClassVar[str] = "wheel"
-    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
-    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
-
-    def deepest(self) -> Real:
-        """The hub stands at the free surface: the radius, m."""
-        return self.radius
-
-    def guess(self, soil: Soil, at: Operating) -> Array:
-        """Bekker's sinkage of a towed wheel, m."""
-        return plate_sinkage(self.radius, self.width, soil, at)
-
-    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Rim:
-        """The arc that stands in the soil."""
-        return rim_at(sinkage, self.radius, self.width, soil, at)
-
-    def flaw(self, shape: Rim) -> Array:
-        """`Status.NO_PEAK` where the maximum stress does not lie inside the arc."""
-        return rim_flaw(shape)
 
     def contact(self, shape: Rim, at: Operating) -> Contact:
         """The points along the arc; more of them where a braking wheel shears both ways."""
