@@ -67,17 +67,25 @@ class Recipe:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
-def packaged(kind: str, name: str, folder: str) -> Path | None:
-    """A recipe or spec that comes with the package, by its bare name."""
-    inside = resources.files(kind).joinpath(folder, f"{name}.toml")
-    return Path(str(inside)) if inside.is_file() else None
+def located(path: str | os.PathLike[str], package: str, folder: str) -> Path:
+    """The file at `path`, or one that comes with the package, by its bare name.
+
+    Raises `InputError` naming those that there are.
+    """
+    file = Path(path)
+    if file.exists() or file.name != str(path):
+        return file
+    inside = Path(str(resources.files(package).joinpath(folder)))
+    own = inside / f"{file.name.removesuffix('.toml')}.toml"
+    if not own.is_file():
+        names = ", ".join(sorted(f.stem for f in inside.glob("*.toml")))
+        raise InputError(f"{path}: there is no such file; {folder} of the package: {names}")
+    return own
 
 
 def read_recipe(path: str | os.PathLike[str]) -> Recipe:
     """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
-    file = Path(path)
-    if not file.exists() and file.name == str(path):
-        file = packaged("datagen", str(path).removesuffix(".toml"), "recipes") or file
+    file = located(path, "datagen", "recipes")
     settings = read_settings(file)
     recipe = _take_recipe(settings, tomllib.loads(file.read_text(encoding="utf-8")))
     settings.finish()

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
+from soilml import __version__
 from soilml.errors import SoilmlError
 
 DESCRIPTION = """\
@@ -37,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     """The whole command line."""
     layout: Any = argparse.RawDescriptionHelpFormatter
     root = _Parser("soilml", description=DESCRIPTION, epilog=EPILOG, formatter_class=layout)
+    root.add_argument("--version", action="version", version=f"soilml {__version__}")
     commands = root.add_subparsers(metavar="COMMAND", required=True)
     found = {entry.name: entry for entry in entry_points(group="soilml.commands")}
     for name in sorted(found, key=lambda n: (ORDER.index(n) if n in ORDER else 99, n)):

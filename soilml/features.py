@@ -74,5 +74,12 @@ def readings(
                 f"{low:g} and {high:g} (unit {unit})"
             )
         arrays.append(array)
-    shape = np.broadcast_shapes(*(a.shape for a in arrays))
+    shape = arrays[0].shape
+    if all(a.shape == shape for a in arrays):
+        return [a.reshape(-1) for a in arrays], shape
+    try:
+        shape = np.broadcast_shapes(*(a.shape for a in arrays))
+    except ValueError:
+        sizes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
+        raise InputError(f"readings must have one shape, or broadcast; given: {sizes}") from None
     return [np.broadcast_to(a, shape).reshape(-1) for a in arrays], shape

@@ -14,14 +14,20 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from soilml.errors import ModelFileError
-from soilml.estimate import Estimate, Together, joined
+from soilml.errors import InputError, ModelFileError
+from soilml.estimate import Estimate, Known, Together, joined
 from soilml.features import readings
 
 Floats = NDArray[np.float64]
 
 #: Version of the file's contract: input and output names, metadata keys.
 FORMAT = "1"
+#: Keys of what the metadata says of joining rows.
+TOGETHER = ("rows", "worth", "widening", "reach", "doubt")
+#: Half-width of the 90 % interval of an answer that is the prior, in its standard deviations.
+GAUSSIAN_90 = 1.645
+#: A run of which less than this share is in range is not estimated.
+LEAST_SOUND = 0.9
 #: Answers to the file's own probe may differ by this share of the prior.
 PROBE_TOLERANCE = 1e-4
 
@@ -41,10 +47,7 @@ class Estimator:
     names: tuple[str, ...]
     units: tuple[str, ...]
     metadata: dict[str, str]
-    prior_mean: Floats
-    prior_std: Floats
-    prior_low: Floats
-    prior_high: Floats
+    prior: Known
     together: Together
     session: ort.InferenceSession
 
@@ -79,20 +82,14 @@ class Estimator:
                 names=tuple(entry["name"] for entry in outputs),
                 units=tuple(entry["unit"] for entry in outputs),
                 metadata=metadata,
-                prior_mean=_column(outputs, "prior_mean"),
-                prior_std=_column(outputs, "prior_std"),
-                prior_low=_column(outputs, "lower"),
-                prior_high=_column(outputs, "upper"),
-                together=Together(
-                    *(
-                        np.asarray(together[k], float)
-                        for k in ("rows", "worth", "widening", "reach")
-                    )
+                prior=Known(
+                    *(_column(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper"))
                 ),
+                together=Together(*(np.asarray(together[k], float) for k in TOGETHER)),
                 session=session,
             )
             answer = estimator(**probe["readings"])
-            off = np.abs(answer.mean - np.asarray(probe["mean"])) / estimator.prior_std
+            off = np.abs(answer.mean - np.asarray(probe["mean"])) / estimator.prior.std
             off = np.maximum(off, np.abs(answer.std - np.asarray(probe["std"])) / answer.prior_std)
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
@@ -122,20 +119,41 @@ class Estimator:
         )
 
     def run(self, **measured: Any) -> Estimate:
-        """One estimate from all readings together: rows driven on one soil, arrays (rows,)."""
-        arrays = {name: np.atleast_1d(value) for name, value in measured.items()}
-        if all(array.size == 1 for array in arrays.values()):
-            return self(**{name: array.reshape(()) for name, array in arrays.items()})
-        single = self(**arrays)
-        q = len(self.names)
-        means, covariances = single.mean.reshape(-1, q), single.covariance.reshape(-1, q, q)
-        worth, widening, reach = self.together.at(len(means))
-        mean, covariance = joined(means, covariances, self.prior_mean, self.prior_std, worth)
-        claimed = np.sqrt(np.diag(covariance))
-        widening = np.minimum(widening, np.maximum(self.prior_std / claimed, 1.0))
-        covariance = covariance * np.outer(widening, widening)
-        std = np.sqrt(np.diag(covariance))
-        return self._estimate(mean, covariance, std, np.asarray(single.in_range.all()), reach)
+        """One estimate from all readings together: rows driven on one soil, arrays (rows,).
+
+        Rows out of range are left out, up to a tenth of them. Where there are more, or where the
+        rows contradict each other as rows of one soil hardly ever do, `in_range` is false and the
+        answer is the prior. Raises `InputError` as a call does, and where there is no row.
+        """
+        flat, _ = readings(self.inputs, measured)
+        if flat[0].size == 0:
+            raise InputError("no reading given; needed is one or more")
+        single = self(**dict(zip(self.inputs, flat, strict=True)))
+        sound = single.in_range
+        if flat[0].size == 1:
+            parts = (single.mean[0], single.covariance[0], single.std[0], sound[0])
+            return self._estimate(*parts, self.together.at(1)[2])
+        count = int(sound.sum())
+        worth, widening, reach, doubt = self.together.at(max(count, 1))
+        if count < LEAST_SOUND * sound.size:
+            return self._unknown(reach)
+        joint = joined(single.mean[sound], single.covariance[sound], self.prior, worth)
+        if bool((joint.doubt > doubt).any()):
+            return self._unknown(reach)
+        claimed = np.sqrt(np.diag(joint.covariance))
+        widening = np.minimum(widening, np.maximum(self.prior.std / claimed, 1.0))
+        return self._estimate(
+            np.clip(joint.mean, self.prior.lower, self.prior.upper),
+            joint.covariance * np.outer(widening, widening),
+            claimed * widening,
+            np.asarray(True),
+            reach,
+        )
+
+    def _unknown(self, reach: Floats) -> Estimate:
+        """The prior, flagged."""
+        covariance = np.diag(self.prior.std**2)
+        return self._estimate(self.prior.mean, covariance, self.prior.std, np.asarray(False), reach)
 
     def _estimate(
         self,
@@ -145,16 +163,17 @@ class Estimator:
         in_range: NDArray[np.bool_],
         reach: Floats,
     ) -> Estimate:
+        half = np.where(in_range[..., None], reach, GAUSSIAN_90) * std
         return Estimate(
             names=self.names,
             units=self.units,
             mean=mean,
             std=std,
             covariance=covariance,
-            low=np.clip(mean - reach * std, self.prior_low, self.prior_high),
-            high=np.clip(mean + reach * std, self.prior_low, self.prior_high),
+            low=np.clip(mean - half, self.prior.lower, self.prior.upper),
+            high=np.clip(mean + half, self.prior.lower, self.prior.upper),
             in_range=in_range,
-            prior_std=self.prior_std,
+            prior_std=self.prior.std,
         )
 
 

@@ -111,9 +111,16 @@ def check(tree: Any, where: str = "") -> None:
             worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
             raise InputError(
                 f"{where}{path} is {worst:g} {unit_text(parameter.unit)}".rstrip()
-                + f"; it must lie between {parameter.lower:g} and {parameter.upper:g}"
+                + f"; it must lie {_range_text(parameter)}"
                 + _hint(parameter, worst)
             )
+
+
+def _range_text(parameter: Parameter) -> str:
+    """The bounds in words; those a hair inside a whole number exclude it."""
+    lower, upper = parameter.lower, parameter.upper
+    open_ends = (round(lower) != lower) and f"{lower:.6g}" == f"{round(lower):g}"
+    return f"between {lower:.6g} and {upper:.6g}" + (", these excluded" if open_ends else "")
 
 
 def unit_text(unit: str) -> str:

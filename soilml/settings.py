@@ -32,7 +32,9 @@ class Settings:
         self._known.append(key)
         if key not in self._left:
             if default is None:
-                self.fail(f"{key} is missing; needed is {needed}")
+                near = difflib.get_close_matches(key, self._left, 1, 0.6)
+                hint = f" (did you misspell it as {near[0]!r}?)" if near else ""
+                self.fail(f"{key} is missing{hint}; needed is {needed}")
             return default
         value = self._left.pop(key)
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):

@@ -51,7 +51,7 @@ def test_is_as_good_on_another_seed_as_its_card_says(name):
     truth = np.stack([rows[column(n)][alone] for n in estimator.names], axis=1)
     found = estimator(**readings)
     metrics = json.loads(estimator.metadata["metrics"])["estimator"]
-    relative = np.sqrt(np.mean((found.mean - truth) ** 2, axis=0)) / estimator.prior_std
+    relative = np.sqrt(np.mean((found.mean - truth) ** 2, axis=0)) / estimator.prior.std
     np.testing.assert_allclose(relative, metrics["rmse_share_of_prior"], atol=0.035)
     inside = np.mean((truth >= found.low) & (truth <= found.high), axis=0)
     assert (np.abs(inside - 0.9) < 0.02).all()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.estimate import Together, joined
+from soilml.estimate import Known, Together, joined
 from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 LEAST_GROUPS = 50
 MOST_OF_A_RUN = 4
+#: Share of sound sets that may be taken for contradictory.
+RARE = 0.005
 #: Shares of what a row seems to tell that are tried.
 WORTHS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05, 0.03)
 
@@ -48,49 +50,46 @@ def covariances(std: Floats, correlation: Floats) -> Floats:
     return np.asarray(std[:, :, None] * correlation * std[:, None, :])
 
 
-def together(
-    mean: Floats, covariance: Floats, data: Dataset, prior_mean: Floats, prior_std: Floats
-) -> Together:
+def together(mean: Floats, covariance: Floats, data: Dataset, prior: Known) -> Together:
     """How far joined estimates of several rows stray, against what they claim.
 
     `mean` (n, q) and `covariance` (n, q, q) are those of the rows of `data`. Where it has no runs
     of several rows, joining is not trusted to narrow anything.
     """
-    q = mean.shape[1]
-    runs = _runs(data)
-    rows, worths, widening, reach = [], [], [], []
+    runs = runs_of(data)
+    found = []
     for length in LENGTHS:
-        groups = _groups(runs, length)
+        groups = groups_of(runs, length)
         if len(groups) < LEAST_GROUPS:
             break
         truth = data.targets[groups[:, 0]]
-        best: tuple[float, Floats, Floats] | None = None
-        least = np.inf
-        for worth in WORTHS if length > 1 else WORTHS[:1]:
-            m, c = mean[groups[:, 0]], covariance[groups[:, 0]]
-            if length > 1:
-                m, c = joined(mean[groups], covariance[groups], prior_mean, prior_std, worth)
-            std = np.sqrt(np.diagonal(c, axis1=1, axis2=2))
-            off = np.abs(truth - m)
-            wide = np.sqrt(np.mean((off / std) ** 2, axis=0)) if length > 1 else np.ones(q)
-            # negative log likelihood of the widened Gaussian, but for constants
-            loss = float(np.mean(np.log(std * wide / prior_std)))
-            if loss < least:
-                least, best = loss, (worth, wide, np.quantile(off / (std * wide), 0.9, axis=0))
-        assert best is not None
-        rows.append(length)
-        worths.append(best[0])
-        widening.append(best[1])
-        reach.append(best[2])
-    if len(rows) == 1:  # nothing is known of joining: it narrows nothing
-        rows.append(LENGTHS[-1])
-        worths.append(1.0 / LENGTHS[-1])
-        widening.append(np.ones(q))
-        reach.append(reach[0])
-    return Together(*(np.asarray(part, dtype=float) for part in (rows, worths, widening, reach)))
+        tried = [
+            _measured(mean[groups], covariance[groups], truth, prior, length, worth)
+            for worth in (WORTHS if length > 1 else WORTHS[:1])
+        ]
+        found.append((length, *min(tried, key=lambda entry: entry[0])[1:]))
+    if len(found) == 1:  # nothing is known of joining: it narrows nothing
+        _, _, widening, reach, doubt = found[0]
+        found.append((LENGTHS[-1], 1.0 / LENGTHS[-1], widening, reach, np.full_like(doubt, 1e9)))
+    return Together(*(np.asarray(part, dtype=float) for part in zip(*found, strict=True)))
 
 
-def _groups(runs: list[NDArray[np.int64]], length: int) -> NDArray[np.int64]:
+def _measured(
+    mean: Floats, covariance: Floats, truth: Floats, prior: Known, length: int, worth: float
+) -> tuple[float, float, Floats, Floats, Floats]:
+    """Loss, worth, widening (q,), reach (q,) and doubt (2,) of groups of rows joined so."""
+    joint = joined(mean, covariance, prior, worth)
+    m, c = (joint.mean, joint.covariance) if length > 1 else (mean[:, 0], covariance[:, 0])
+    std = np.sqrt(np.diagonal(c, axis1=1, axis2=2))
+    off = np.abs(truth - np.clip(m, prior.lower, prior.upper))
+    wide = np.sqrt(np.mean((off / std) ** 2, axis=0)) if length > 1 else np.ones(std.shape[1])
+    reach = np.quantile(off / (std * wide), 0.9, axis=0)
+    # negative log likelihood of the widened Gaussian, but for constants
+    loss = float(np.mean(np.log(std * wide / prior.std)))
+    return loss, worth, wide, reach, np.quantile(joint.doubt, 1.0 - RARE, axis=0)
+
+
+def groups_of(runs: list[NDArray[np.int64]], length: int) -> NDArray[np.int64]:
     """Rows (groups, length) of one soil each; a run gives at most a few, lest it count too much."""
     found = [
         run[i : i + length]
@@ -100,7 +99,8 @@ def _groups(runs: list[NDArray[np.int64]], length: int) -> NDArray[np.int64]:
     return np.asarray(found, dtype=np.int64).reshape(-1, length)
 
 
-def _runs(data: Dataset) -> list[NDArray[np.int64]]:
+def runs_of(data: Dataset) -> list[NDArray[np.int64]]:
+    """Row numbers of each run."""
     order = np.argsort(data.run, kind="stable")
     ends = np.flatnonzero(np.diff(data.run[order])) + 1
     return [np.asarray(part) for part in np.split(order, ends)]

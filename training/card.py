@@ -63,10 +63,11 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
         "",
         *_scores(trained.scores, [o["name"] for o in outputs]),
         "",
-        "Several readings of one soil together (`run`): what each row adds is weighed, and the "
-        "standard deviation multiplied, by what held-out runs showed to be needed.",
+        "Several readings of one soil together (`run`): how much each row is taken to add, what "
+        "the standard deviation is multiplied by, and what came of it on runs that neither was "
+        "fitted to.",
         "",
-        *_together(json.loads(metadata["together"]), [o["name"] for o in outputs]),
+        *_together(trained, [o["name"] for o in outputs]),
         "",
         "## Made by",
         "",
@@ -123,11 +124,19 @@ def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
     return lines
 
 
-def _together(joint: Mapping[str, Any], names: list[str]) -> list[str]:
+def _together(trained: Trained, names: list[str]) -> list[str]:
+    head = " | ".join(f"{what} {n}" for what in ("widening", "error", "90 %") for n in names)
     lines = [
-        f"| rows | worth of a row | {' | '.join(f'widening {n}' for n in names)} |",
-        "|---:|---:|" + "---:|" * len(names),
+        f"| rows | sets | worth of a row | {head} |",
+        "|---:|---:|---:|" + "---:|" * (3 * len(names)),
     ]
-    for rows, worth, widening in zip(joint["rows"], joint["worth"], joint["widening"], strict=True):
-        lines.append(f"| {rows:g} | {worth:g} | {' | '.join(f'{w:.2f}' for w in widening)} |")
+    joint = trained.together
+    for rows, worth, widening in zip(joint.rows, joint.worth, joint.widening, strict=True):
+        cells = [f"{w:.2f}" for w in widening]
+        if score := trained.sets.get(int(rows)):
+            cells += [f"{v:.3f}" for v in score.relative] + [f"{v:.1%}" for v in score.cover90]
+            sets = str(score.rows)
+        else:
+            cells, sets = cells + [""] * (2 * len(names)), ""
+        lines.append(f"| {rows:g} | {sets} | {worth:g} | {' | '.join(cells)} |")
     return lines

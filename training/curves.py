@@ -67,7 +67,7 @@ def _rows(axis: Any, trained: Trained, regressors: list[Any]) -> None:
 
 def _relative(machine: Any, trained: Trained) -> float:
     check = trained.parts.choose
-    error = (check.targets - machine.predict(check.features)) / trained.prior_std
+    error = (check.targets - machine.predict(check.features)) / trained.prior.std
     return float(np.sqrt(np.mean(error**2, axis=0)).mean())
 
 

@@ -18,6 +18,9 @@ from soilml.status import Status
 
 Floats = NDArray[np.float64]
 
+#: With fewer rows no interval that is measured on a fifth of them can be believed.
+LEAST_ROWS = 200
+
 
 @dataclass(frozen=True)
 class Dataset:
@@ -76,14 +79,23 @@ def read_dataset(
     """
     inputs = inputs_of(features)
     needed = ["run", *(column(name) for name in (*inputs, *targets))]
-    table = read_table(path, needed, filled=("run",))
+    table = read_table(path, filled=("run",))
+    for name in needed:
+        if name not in table:
+            raise TableError(
+                f"{path}: column {name} is missing; the spec's features and targets must be in the "
+                f"data, which hold: {', '.join(table.columns)}"
+            )
     good = np.ones(len(table), dtype=bool)
     if "status" in table:
         good &= table["status"] == Status.OK.reason
     for name in needed[1:]:
         good &= np.isfinite(table[name])
-    if good.sum() < 50:
-        raise TableError(f"{path}: {int(good.sum())} usable rows; needed are 50 or more to train")
+    if good.sum() < LEAST_ROWS:
+        raise TableError(
+            f"{path}: {int(good.sum())} usable rows; needed are {LEAST_ROWS} or more to train, "
+            "calibrate and score"
+        )
     kept = table.rows(good)
     measured = {name: kept[column(name)] for name in inputs}
     truth = np.stack([kept[column(name)] for name in targets], axis=1)

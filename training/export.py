@@ -46,10 +46,12 @@ def draw(trained: Trained) -> Any:
     covariance = graph.op("Mul", outer, graph.constant(estimator.correlation))
     inside = trained.support.draw(graph, features)
     graph.op("Identity", inside, out="in_range")
-    prior = np.diag(trained.prior_std**2)
+    ends = [graph.constant(end) for end in (trained.prior.lower, trained.prior.upper)]
+    kept = graph.op("Min", graph.op("Max", mean, ends[0]), ends[1])
+    prior = np.diag(trained.prior.std**2)
     answers = {
-        "mean": (mean, trained.prior_mean, (-1, 1)),
-        "std": (std, trained.prior_std, (-1, 1)),
+        "mean": (kept, trained.prior.mean, (-1, 1)),
+        "std": (std, trained.prior.std, (-1, 1)),
         "covariance": (covariance, prior, (-1, 1, 1)),
     }
     for name, (value, otherwise, shape) in answers.items():
@@ -116,8 +118,8 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
             "unit": QUANTITIES[name].unit,
             "lower": float(data.lower[k]),
             "upper": float(data.upper[k]),
-            "prior_mean": float(trained.prior_mean[k]),
-            "prior_std": float(trained.prior_std[k]),
+            "prior_mean": float(trained.prior.mean[k]),
+            "prior_std": float(trained.prior.std[k]),
         }
         for k, name in enumerate(spec.targets)
     ]
@@ -134,6 +136,7 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
                 "worth": joint.worth.tolist(),
                 "widening": joint.widening.tolist(),
                 "reach": joint.reach.tolist(),
+                "doubt": joint.doubt.tolist(),
             }
         ),
         "probe": json.dumps(_probe(trained)),
@@ -152,6 +155,16 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
                     "rows": score.rows,
                 }
                 for name, score in trained.scores.items()
+            }
+        ),
+        "metrics_of_sets": json.dumps(
+            {
+                size: {
+                    "rmse_share_of_prior": score.relative.tolist(),
+                    "cover90": score.cover90.tolist(),
+                    "sets": score.rows,
+                }
+                for size, score in trained.sets.items()
             }
         ),
         "parity": f"{parity:.3e}",
@@ -183,7 +196,7 @@ def _parity(trained: Trained, content: bytes) -> float:
     feed = {name: values.astype(np.float32) for name, values in readings.items()}
     mean, std, flag = session.run(("mean", "std", "in_range"), feed)
     true_mean, true_std, inside = trained.predict(computed(trained.spec.features, readings))
-    off = np.maximum(np.abs(mean - true_mean), np.abs(std - true_std)) / trained.prior_std
+    off = np.maximum(np.abs(mean - true_mean), np.abs(std - true_std)) / trained.prior.std
     same = flag == inside  # a reading rounded across the edge of the range differs by its nature
     if same.mean() < 0.999:
         raise SoilmlError("the exported in-range flag differs from the original")

@@ -6,10 +6,9 @@ import json
 import os
 import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from datagen.recipe import packaged
+from datagen.recipe import located
 from soilml.features import inputs_of
 from soilml.fusion import RULES
 from soilml.quantities import QUANTITIES, SHEAR
@@ -46,9 +45,7 @@ class Spec:
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:
     """The spec in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
-    file = Path(path)
-    if not file.exists() and file.name == str(path):
-        file = packaged("training", str(path).removesuffix(".toml"), "specs") or file
+    file = located(path, "training", "specs")
     settings = read_settings(file)
     features = _words(settings, "features", ["slip", "torque/load", "load"])
     inputs_of(features)  # names the first that cannot be read

@@ -10,13 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.estimate import Together
+from soilml.estimate import Known, Together, joined
 from soilml.fusion import RULES
-from training.calibrate import Calibrated, calibrated, covariances, together
+from training.calibrate import (
+    LEAST_GROUPS,
+    Calibrated,
+    calibrated,
+    covariances,
+    groups_of,
+    runs_of,
+    together,
+)
 from training.dataset import Dataset, Split, split
 from training.fused import Fused, fused
 from training.mlp import GaussianMLP
-from training.score import Score, scored
+from training.score import NINETY, Score, scored
 from training.spec import Spec
 from training.support import Support
 
@@ -32,11 +40,11 @@ class Trained:
     estimator: Calibrated
     support: Support
     together: Together
-    prior_mean: Floats
-    prior_std: Floats
+    prior: Known
     data: Dataset
     parts: Split
     scores: dict[str, Score]
+    sets: dict[int, Score]
     members: tuple[Calibrated, ...]
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -46,9 +54,10 @@ class Trained:
         """
         mean, std = self.estimator.predict(features)
         inside = self.support.holds(features)
+        kept = np.clip(mean, self.prior.lower, self.prior.upper)
         return (
-            np.where(inside[:, None], mean, self.prior_mean),
-            np.where(inside[:, None], std, self.prior_std),
+            np.where(inside[:, None], kept, self.prior.mean),
+            np.where(inside[:, None], std, self.prior.std),
             inside,
         )
 
@@ -63,37 +72,38 @@ def train(
     figures are taken.
     """
     parts = split(data, spec.seed)
-    prior_mean, prior_std = parts.train.targets.mean(axis=0), parts.train.targets.std(axis=0)
+    targets = parts.train.targets
+    prior = Known(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
     first, second, third = _thirds(parts.calibrate.thinned(), spec.seed)
     members = []
     for regressor in spec.regressors:
         _fit(regressor, parts, partial(progress, f"fitting {regressor.kind}"))
         members.append(calibrated(regressor, first))
-    scores = {m.regressor.kind: _scored(m, third, prior_std) for m in members}
+    scores = {m.regressor.kind: _scored(m, third, prior.std) for m in members}
     if len(members) > 1:
         for rule in RULES:
             joined = fused(members, rule, first)
             claimed = joined.predict(third.features)
-            scores[f"{rule}, as claimed"] = scored(third.targets, *claimed, prior_std)
+            scores[f"{rule}, as claimed"] = scored(third.targets, *claimed, prior.std)
             widened = calibrated(joined, second)
-            scores[f"{rule}, recalibrated"] = _scored(widened, third, prior_std)
+            scores[f"{rule}, recalibrated"] = _scored(widened, third, prior.std)
         estimator = calibrated(fused(members, spec.rule, first), second)
     else:
         seen = parts.calibrate.thinned()
         estimator = calibrated(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
-    scores["estimator"] = _scored(estimator, third, prior_std)
-    mean, std = estimator.predict(parts.calibrate.features)
-    covariance = covariances(std, estimator.correlation)
+    scores["estimator"] = _scored(estimator, third, prior.std)
+    unseen = np.isin(parts.calibrate.run, third.run)
+    joint = _together(estimator, parts.calibrate.rows(~unseen), prior)
     return Trained(
         spec=spec,
         estimator=estimator,
         support=Support.of(parts.train.features, spec.seed),
-        together=together(mean, covariance, parts.calibrate, prior_mean, prior_std),
-        prior_mean=prior_mean,
-        prior_std=prior_std,
+        together=joint,
+        prior=prior,
         data=data,
         parts=parts,
         scores=scores,
+        sets=_set_scores(estimator, joint, parts.calibrate.rows(unseen), prior),
         members=tuple(members),
     )
 
@@ -119,6 +129,31 @@ def _thirds(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
     part = np.random.default_rng(seed + 1).permutation(len(codes)) % 3
     place = part[np.searchsorted(codes, data.run)]
     return data.rows(place == 0), data.rows(place == 1), data.rows(place == 2)
+
+
+def _together(estimator: Calibrated, data: Dataset, prior: Known) -> Together:
+    mean, std = estimator.predict(data.features)
+    return together(mean, covariances(std, estimator.correlation), data, prior)
+
+
+def _set_scores(
+    estimator: Calibrated, joint: Together, data: Dataset, prior: Known
+) -> dict[int, Score]:
+    """Figures of several rows joined, by their number, on runs that joining was not fitted to."""
+    mean, std = estimator.predict(data.features)
+    covariance = covariances(std, estimator.correlation)
+    found = {}
+    for length in joint.rows[1:].astype(int):
+        groups = groups_of(runs_of(data), int(length))
+        if len(groups) < LEAST_GROUPS:
+            break
+        worth, widening, reach, _ = joint.at(int(length))
+        answer = joined(mean[groups], covariance[groups], prior, worth)
+        claimed = np.sqrt(np.diagonal(answer.covariance, axis1=1, axis2=2))
+        spread = np.minimum(claimed * widening, prior.std) * reach / NINETY
+        kept = np.clip(answer.mean, prior.lower, prior.upper)
+        found[int(length)] = scored(data.targets[groups[:, 0]], kept, spread, prior.std)
+    return found
 
 
 def _scored(estimator: Calibrated, data: Dataset, prior_std: Floats) -> Score:

@@ -100,7 +100,7 @@ def show(log: Table, truth: dict[str, float], estimator: Estimator) -> None:
             (
                 f"{name.replace('_', ' ')} {unit}",
                 f"{truth[name] * factor:.3g}",
-                cell(estimator.prior_mean[k], estimator.prior_std[k]),
+                cell(estimator.prior.mean[k], estimator.prior.std[k]),
                 cell(rows.mean[0, k], rows.std[0, k]),
                 cell(joint.mean[k], joint.std[k]),
                 *analytic,
@@ -131,8 +131,8 @@ def draw(rows, joint, truth, nonlinear, estimator) -> None:  # type: ignore[no-u
         factor, unit = SHOWN[name]
         x = np.arange(1, len(rows.mean) + 1)
         axis.axhspan(
-            estimator.prior_low[k] * factor,
-            estimator.prior_high[k] * factor,
+            estimator.prior.lower[k] * factor,
+            estimator.prior.upper[k] * factor,
             color="0.93",
             label="prior",
         )

@@ -23,10 +23,14 @@ Find soil parameters with which MODEL.toml explains the rows of RUNS.csv.
   soilml identify MODEL.toml RUNS.csv --method linear --where run=sand_3
 
 RUNS.csv needs the columns run, slip, load_N, torque_Nm (blank where not measured) and may have
-drawbar_pull_N, sinkage_m, and <column>_std. All rows are taken for one soil. What has a prior in
-[soil.prior] is found, unless --free names other parameters. Methods: nonlinear (least squares on
-the full integrals, bounded, several starts), linear (c and phi from sinkage, K given), newton (phi,
-K and kphi on the closed form, c given). Read the warnings: they say what the rows cannot tell.
+drawbar_pull_N, sinkage_m, and <column>_std. All rows are taken for one soil; --by run identifies
+each run on its own. What has a prior is found, unless --free names other parameters. Methods:
+nonlinear (least squares on the full integrals, bounded, several starts), linear (c and phi from
+sinkage, K given), newton (phi, K and kphi on the closed form, c given). A channel takes part where
+its noise is declared. The answer is JSON: into --out, or into a pipe; a terminal shows a table.
+Read the warnings: they say what the rows cannot tell. `left of prior` is the width that the rows
+leave of the prior's; std is the expected distance to the truth, larger where the value of least
+squares stands anywhere in an open range.
 """
 
 
@@ -36,6 +40,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
     parser.add_argument("--method", default="nonlinear", help="nonlinear, linear or newton")
     parser.add_argument("--free", metavar="A,B,...", help="parameters to find")
+    parser.add_argument("--by", metavar="run", help="one answer for each value of this column")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.json", help="where to write the answer")
 
@@ -54,13 +59,19 @@ def run(args: argparse.Namespace) -> int:
     case = read_case(args.model)
     table = chosen_rows(args, RUNS)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
-    found = identify(case, table, free, args.method)
-    text = json.dumps(found.as_json(), indent=2) + "\n"
+    if args.by is None:
+        found = {"": identify(case, table, free, args.method)}
+        content = found[""].as_json()
+    else:
+        groups = table.groups(args.by)
+        found = {name: identify(case, rows, free, args.method) for name, rows in groups}
+        content = {"by": args.by, "runs": {name: fit.as_json() for name, fit in found.items()}}
+    text = json.dumps(content, indent=2) + "\n"
     if args.out is not None:
         save_text(args.out, text)
-        print(_for_people(found))
-    elif sys.stdout.isatty():
-        print(_for_people(found))
+    if args.out is not None or sys.stdout.isatty():
+        heads = {name: f"{args.by} {name}: " if name else "" for name in found}
+        print("\n\n".join(heads[name] + _for_people(fit) for name, fit in found.items()))
     else:
         sys.stdout.write(text)
     return 0
@@ -81,17 +92,17 @@ def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Any:
 
 def _for_people(found: Fit) -> str:
     rows = [
-        (name, f"{value:.5g}", f"{std:.2g}", unit, share)
-        for name, value, std, unit, share in zip(
+        (name, f"{value:.5g}", f"{std:.3g}", unit, left)
+        for name, value, std, unit, left in zip(
             found.names,
             found.values,
             found.std,
             found.units,
-            [f"{found.narrowed[n]:.0%}" if n in found.narrowed else "" for n in found.names],
+            [f"{found.left[n]:.0%}" if n in found.left else "" for n in found.names],
             strict=True,
         )
     ]
-    table = aligned(("parameter", "value", "std", "unit", "std / prior's"), rows)
+    table = aligned(("parameter", "value", "std", "unit", "left of prior"), rows)
     said = "\n".join(f"! {text}" for text in found.warnings)
     head = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
     return f"{head}\n\n{table}\n{said}".rstrip()

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from soilml.errors import InputError
 from soilml.saving import save_text
 from soilml.writing import aligned, csv_text
+
+#: Endings that would promise something else than is written.
+NOT_CSV = (".parquet", ".json", ".toml", ".onnx", ".xlsx")
 
 
 def deliver(columns: Mapping[str, Any], out: str | None) -> None:
     """Write the columns to `out`; without one, print them."""
     if out is not None:
+        if Path(out).suffix in NOT_CSV:
+            raise InputError(f"{out}: the output is a CSV file, name it ....csv")
         save_text(out, csv_text(columns))
-        print(f"{len(next(iter(columns.values())))} rows written to {out}", file=sys.stderr)
+        count = len(next(iter(columns.values())))
+        print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
     elif sys.stdout.isatty():
         print(for_people(columns))
     else:

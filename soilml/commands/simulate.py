@@ -19,7 +19,7 @@ DESCRIPTION = """\
 Solve the wheel-soil equilibrium of MODEL.toml at every slip and load given.
 
   soilml simulate MODEL.toml --slip 0:0.6:13 --load 60 --out curve.csv
-  soilml simulate MODEL.toml --slip -0.3,0,0.3 --load 30:120:4
+  soilml simulate MODEL.toml --slip -0.3,0,0.3 --load 30:120:4 --run sim    identify can read this
 
 Ranges are start:stop:count, or values with commas. A row without equilibrium has blank values and
 its reason in `status`; where no row at all has one, that is an error. Without --out the table is
@@ -32,6 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL.toml", help="gear, soil and effects")
     parser.add_argument("--slip", required=True, help="slip ratios, driving above 0, braking below")
     parser.add_argument("--load", required=True, help="vertical loads, N")
+    parser.add_argument("--run", dest="label", metavar="NAME", help="put a column run with this name in front")
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
 
 
@@ -46,8 +47,10 @@ def run(args: argparse.Namespace) -> int:
         worst = Status(int(force.status[0]))
         limit = f" (at most {force.load.max():.4g} N)" if worst is Status.TOO_HEAVY else ""
         raise InputError(f"no row has an answer; {worst.reason}{limit}: change --load or the soil")
+    named = {} if args.label is None else {"run": [args.label] * slip.size}
     deliver(
-        {
+        named
+        | {
             "slip": slip,
             "load_N": load,
             "torque_Nm": force.torque,

@@ -7,6 +7,7 @@ one line here.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from soilml.case import Case
 from soilml.errors import InputError
@@ -39,7 +40,9 @@ def identify(
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
-    return METHODS[method](case, measured_rows(case, table), chosen(case, free))
+    data = measured_rows(case, table)
+    fit = METHODS[method](case, data, chosen(case, free))
+    return replace(fit, warnings=(*fit.warnings, *data.notes))
 
 
 __all__ = ["METHODS", "Fit", "Free", "Measured", "identify"]

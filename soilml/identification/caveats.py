@@ -12,6 +12,7 @@ from soilml.case import Case
 from soilml.identification.fit import Fit
 from soilml.identification.free import Free
 from soilml.identification.measured import Measured
+from soilml.parameters import unit_text
 from soilml.quantities import column
 
 #: Share of the prior's width above which a parameter counts as not identified, or hardly.
@@ -34,21 +35,20 @@ def caveats(
     one_load = float(np.ptp(data.load)) <= 0.02 * float(np.mean(data.load))
     said = []
     for i, f in enumerate(free):
-        share = fit.narrowed[f.path]
-        if one_load and f.path == "cohesion" and share > HARDLY:
+        left = fit.left[f.path]
+        if one_load and f.path == "cohesion" and left > HARDLY:
             said.append("one load only: cohesion is not identified")
-        elif share > NOT:
-            said.append(f"{f.path} is not identified: its std is {share:.0%} of the prior's")
-        elif share > HARDLY:
-            said.append(f"{f.path} is hardly identified: its std is {share:.0%} of the prior's")
+        elif left > NOT:
+            said.append(f"{f.path} is not identified: the rows leave {left:.0%} of its prior")
+        elif left > HARDLY:
+            said.append(f"{f.path} is hardly identified: the rows leave {left:.0%} of its prior")
         if min(u[i], 1.0 - u[i]) < 1e-3:
             end = "lower" if u[i] < 0.5 else "upper"
             said.append(f"{f.path} stands at the {end} end of its prior: the prior holds it there")
         if f.assumed:
-            said.append(
-                f"{f.path} has no prior: {f.prior.lower:g} to {f.prior.upper:g} {f.unit} is assumed"
-            )
-    if one_load and "cohesion" in fit.names and fit.narrowed["cohesion"] <= HARDLY:
+            ends = f"{f.prior.lower:g} to {f.prior.upper:g} {unit_text(f.unit)}".rstrip()
+            said.append(f"{f.path} has no prior: {ends} is assumed")
+    if one_load and "cohesion" in fit.names and fit.left["cohesion"] <= HARDLY:
         said.append("one load only: cohesion rests on the change with slip alone")
     if data.cells < len(free):
         said.append(f"{data.cells} readings for {len(free)} parameters: the prior decides the rest")

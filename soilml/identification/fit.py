@@ -16,7 +16,8 @@ class Fit:
     """Values, their covariance, and what the user should know before believing them.
 
     `std` is the expected distance between value and truth, given the rows, the sensors' noise and
-    the prior: a parameter that the rows do not determine keeps the width of its prior.
+    the prior. Where the rows leave a parameter open it is larger than the prior's own: the value of
+    least squares then stands anywhere in the prior, often at its end, and the truth elsewhere.
     """
 
     method: str
@@ -26,8 +27,8 @@ class Fit:
     covariance: Floats  # (p, p)
     warnings: tuple[str, ...]
     rows_used: int
-    #: std left of the prior's, 1 where the rows tell nothing; empty where there was no prior
-    narrowed: dict[str, float] = field(default_factory=dict)
+    #: width that the rows leave of the prior, 1 where they tell nothing; empty without a prior
+    left: dict[str, float] = field(default_factory=dict)
     #: mean squared residual in standard deviations of the noise, per degree of freedom
     misfit: float = float("nan")
     channels: tuple[str, ...] = ()
@@ -53,7 +54,7 @@ class Fit:
             "method": self.method,
             "parameters": {
                 name: {"value": float(v), "std": float(s), "unit": unit}
-                | ({"std_share_of_prior": self.narrowed[name]} if name in self.narrowed else {})
+                | ({"left_of_prior": self.left[name]} if name in self.left else {})
                 for name, v, s, unit in rows
             },
             "correlation": {

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from soilml.case import Case
 from soilml.errors import InputError
+from soilml.parameters import Parameter
 from soilml.prior import Prior
 
 #: Where the shear parameters of natural soils lie, for a user who gives no prior.
@@ -16,6 +17,8 @@ _USUAL = {
     "shear_modulus": Prior(0.001, 0.1, log=True),
     "n": Prior(0.3, 1.8),
 }
+#: Bounds this many times the value are too wide to search; the search then reaches so far.
+DECADES, REACH = 100.0, 30.0
 
 
 @dataclass(frozen=True)
@@ -44,9 +47,16 @@ def chosen(case: Case, names: Sequence[str] | None) -> list[Free]:
         parameter, nominal = known[name]
         prior = case.prior.get(name) or _USUAL.get(name)
         if prior is None:
-            prior = Prior(parameter.lower, parameter.upper)
-            if nominal > 0.0:
-                low, high = max(nominal / 30.0, parameter.lower), min(nominal * 30, parameter.upper)
-                prior = Prior(low, high, log=low > 0.0)
+            prior = _wide(parameter, float(nominal))
         found.append(Free(name, parameter.unit, prior, float(nominal), name not in case.prior))
     return found
+
+
+def _wide(parameter: Parameter, nominal: float) -> Prior:
+    """Where a parameter may lie of which nothing is said: its bounds, or within reach of its value.
+
+    Bounds that span decades say nothing; thirty times to either side of the value is then taken.
+    """
+    if nominal > 0.0 and parameter.upper > DECADES * nominal:
+        return Prior(max(nominal / REACH, parameter.lower), nominal * REACH, log=True)
+    return Prior(parameter.lower, parameter.upper)

@@ -26,7 +26,7 @@ def with_given(case: Case, path: str, solve: Callable[[Case], Fit]) -> Fit:
     value = float(case.parameters()[path][1])
     if prior is None:
         said = f"{path} is taken as given, and believed: {value:g}"
-        return replace(fit, warnings=(said, *fit.warnings))
+        return replace(fit, warnings=(said, *fit.warnings, *_outside(fit, case)))
     covariance = fit.covariance.copy()
     for side in SIDES:
         moved = float(prior.at(np.asarray([side]))[0])
@@ -36,4 +36,23 @@ def with_given(case: Case, path: str, solve: Callable[[Case], Fit]) -> Fit:
             continue
         covariance += 0.5 * np.outer(change, change)
     said = f"{path} is taken as given: {value:g}; the width of its prior is carried into std"
-    return replace(fit, covariance=covariance, warnings=(said, *fit.warnings))
+    warnings = (said, *fit.warnings, *_outside(fit, case))
+    return replace(fit, covariance=covariance, warnings=warnings)
+
+
+def _outside(fit: Fit, case: Case) -> list[str]:
+    """What in an answer of a method without bounds cannot be believed."""
+    said = []
+    for name, value in zip(fit.names, fit.values, strict=True):
+        prior = case.prior.get(name)
+        if prior is not None and not prior.lower <= value <= prior.upper:
+            said.append(
+                f"{name} is {value:.4g}, outside its prior of {prior.lower:g} to {prior.upper:g}: "
+                "do not use it"
+            )
+    if fit.misfit > 4.0:
+        said.append(
+            f"residuals are {np.sqrt(fit.misfit):.1f} times the declared noise: the closed form "
+            "does not describe these rows; use --method nonlinear"
+        )
+    return said

@@ -35,6 +35,7 @@ class Measured:
     load_std: Floats
     channels: tuple[Channel, ...]
     left_out: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def cells(self) -> int:
@@ -73,7 +74,22 @@ def measured_rows(case: Case, table: Table) -> Measured:
         load_std=_input_noise(case, "load_N", table["load_N"]),
         channels=tuple(used),
         left_out=tuple(left_out),
+        notes=tuple(_notes(case, table)),
     )
+
+
+def _notes(case: Case, table: Table) -> list[str]:
+    """What a user may have overlooked in the table."""
+    said = []
+    runs = len(np.unique(table["run"])) if "run" in table else 1
+    if runs > 1:
+        said.append(f"{runs} runs are taken for one soil")
+    lugs = QUANTITIES["grouser_height"].column
+    if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
+        height = float(np.nanmax(table[lugs]))
+        if not any(effect.name == "grousers" for effect in case.model.effects):
+            said.append(f"{lugs} is {height:g}, but the model has no effect grousers")
+    return said
 
 
 def _input_noise(case: Case, key: str, reading: Floats) -> Floats:

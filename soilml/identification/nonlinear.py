@@ -24,6 +24,8 @@ LOOKS = 64
 STARTS = 4
 #: Two descents that end this close, as shares of the priors, found the same optimum.
 SAME = 1e-4
+#: Squared residuals, summed, that as many parameters as readings should never leave.
+UNEXPLAINED = 9.0
 #: Precision of a uniform distribution over the unit interval: 1 / its variance.
 UNIFORM = 12.0
 #: Residual, in standard deviations, of a row that has no equilibrium at a trial.
@@ -76,8 +78,10 @@ def _finished(
     freedom = cells - p
     misfit = best.cost / freedom if freedom > 0 else float("nan")
     # residuals beyond the declared noise are noise too, whatever causes them
-    surplus = freedom > 0 and not undeclared and misfit > 1.0 + 2.0 * np.sqrt(2.0 / freedom)
-    scale = misfit if surplus else 1.0
+    expected = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else UNEXPLAINED / cells
+    per_reading = misfit if freedom > 0 else best.cost / cells
+    surplus = not undeclared and per_reading > expected
+    scale = per_reading if surplus else 1.0
     inverse = np.linalg.inv(best.slope.T @ best.slope / scale + UNIFORM * np.eye(p))
     pulled = inverse @ (UNIFORM * (0.5 - best.u))
     spread = np.sqrt(np.diag(inverse))
@@ -92,8 +96,8 @@ def _finished(
         covariance=total * np.outer(rate, rate),
         warnings=(),
         rows_used=len(data.slip),
-        narrowed={f.path: float(np.sqrt(UNIFORM) * spread[i]) for i, f in enumerate(free)},
-        misfit=misfit,
+        left={f.path: float(np.sqrt(UNIFORM) * spread[i]) for i, f in enumerate(free)},
+        misfit=per_reading if surplus else misfit,
         channels=tuple(column(c.name) for c in data.channels),
     )
     return caveats(fit, case, data, free, best.u, surplus=bool(surplus), undeclared=undeclared)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -64,7 +65,7 @@ def soil(name: str, **changes: Real) -> Soil:
     """
     catalogue = soil_catalogue()
     if name not in catalogue:
-        near = [known for known in catalogue if name.split("/")[-1] in known]
+        near = difflib.get_close_matches(name, catalogue, 1, 0.5)
         hint = f"did you mean {near[0]!r}? " if near else ""
         raise InputError(f"no soil {name!r}: {hint}`soilml soils` lists the catalogue")
     try:

@@ -80,6 +80,16 @@ OTHERS = {
     "no model file": (["simulate", "none.toml", "--slip", "0.1", "--load", "9"], "no such file"),
     "missing option": (["simulate", "model.toml", "--slip", "0.1"], "--load"),
     "unknown command": (["simulat"], "simulat"),
+    "table under another name": (
+        ["simulate", "model.toml", "--slip", "0.1", "--load", "9", "--out", "o.parquet"],
+        "name it ....csv",
+    ),
+    "no such spec": (["train", "fusd", "good.parquet", "o.onnx"], "fused, linear, lssvm, mlp"),
+    "misspelt key": (["simulate", "typo.toml", "--slip", "0.1", "--load", "9"], "'raduis'"),
+    "another wheel": (
+        ["compare", "small.toml", "good.parquet", "good.onnx", "--out", "o"],
+        "radius 0.15",
+    ),
     "out into nowhere": (
         ["simulate", "model.toml", "--slip", "0.1", "--load", "9", "--out", "no/o.csv"],
         "no folder",
@@ -110,17 +120,23 @@ OTHERS = {
 def test_other_faults(folder, capsys, monkeypatch, what):
     (folder / "cut.parquet").write_bytes((folder / "good.parquet").read_bytes()[:5000])
     (folder / "cut.onnx").write_bytes((folder / "good.onnx").read_bytes()[:5000])
+    (folder / "typo.toml").write_text(MODEL.replace("radius", "raduis"))
+    (folder / "small.toml").write_text(MODEL.replace("radius = 0.15", "radius = 0.1"))
     command, said = OTHERS[what]
     refused(folder, command, capsys, monkeypatch, said)
 
 
-def test_a_blank_reading_that_the_model_needs_is_named(folder, capsys, monkeypatch):
-    (folder / "blank.csv").write_text(RUNS.replace("3.0", ""))
+def test_a_table_without_any_reading_that_the_model_needs_is_refused(folder, capsys, monkeypatch):
+    (folder / "blank.csv").write_text(RUNS.replace("3.0", "").replace("1.5", ""))
     command = ["estimate", "good.onnx", "blank.csv", "--out", "o.csv"]
-    refused(folder, command, capsys, monkeypatch, "line 3, column torque_Nm: is blank")
+    refused(folder, command, capsys, monkeypatch, "no row has all that this model reads")
 
 
 def test_a_log_of_another_wheel_is_refused(folder, capsys, monkeypatch):
+    lugs = RUNS.replace("torque_Nm", "torque_Nm,grouser_height_m")
+    (folder / "lugs.csv").write_text(lugs.replace("1.5", "1.5,0").replace("3.0", "3.0,0.01"))
+    command = ["estimate", "good.onnx", "lugs.csv"]
+    refused(folder, command, capsys, monkeypatch, "line 3, column grouser_height_m: 0.01 given")
     text = RUNS.replace("torque_Nm", "torque_Nm,wheel_radius_m")
     (folder / "other.csv").write_text(text.replace("1.5", "1.5,0.1").replace("3.0", "3.0,0.1"))
     for command in (

@@ -51,6 +51,37 @@ def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model
     assert "no equilibrium" in bad["status"]
 
 
+def test_estimate_leaves_rows_without_a_reading_blank(tmp_path, small_model, capsys):
+    text = "run,slip,load_N,torque_Nm\na,0.2,60,\na,0.3,60,3.0\nb,0.4,80,4.9\n"
+    (tmp_path / "runs.csv").write_text(text)
+    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv")]) == 0
+    captured = capsys.readouterr()
+    first, second, _ = rows_of(captured.out)
+    assert first["cohesion_Pa"] == first["cohesion_Pa_std"] == "" and first["in_range"] == "0"
+    assert float(second["cohesion_Pa"]) > 0 and second["in_range"] == "1"
+    assert "line 2" in captured.err
+    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv"), "--by", "run"]) == 0
+    assert [r["rows"] for r in rows_of(capsys.readouterr().out)] == ["1", "1"]
+
+
+def test_simulated_rows_can_be_identified(model_file, tmp_path, capsys):
+    out = str(tmp_path / "sim.csv")
+    command = ["simulate", str(model_file), "--slip", "0.1:0.6:6", "--load", "40,90"]
+    assert main([*command, "--run", "sim", "--out", out]) == 0
+    assert main(["identify", str(model_file), out]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["shear_modulus"]["value"] == pytest.approx(0.025, rel=1e-3)
+
+
+def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
+    assert main(["identify", str(model_file), str(runs_file), "--by", "run"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
+    assert content["runs"]["run_0"]["rows_used"] == 8
+    assert main(["identify", str(model_file), str(runs_file)]) == 0
+    assert "2 runs are taken for one soil" in json.loads(capsys.readouterr().out)["warnings"]
+
+
 def test_simulate_takes_braking_slip(model_file, capsys):
     assert main(["simulate", str(model_file), "--slip", "-0.5:0.5:3", "--load", "60"]) == 0
     torque = [float(r["torque_Nm"]) for r in rows_of(capsys.readouterr().out)]

@@ -10,7 +10,7 @@ from soilml import Bulldozing, ExitAngle, Grousers, Model, Operating, SlipSinkag
 MODEL = (
     Model(Wheel(radius=0.15, width=0.12))
     + SlipSinkage(n1=0.3)
-    + Grousers(height=0.01, count=12.0)
+    + Grousers(height=0.01)
     + ExitAngle(kappa=0.1)
     + Bulldozing(share=1.0)
 )

@@ -100,12 +100,12 @@ def test_bulldozing_costs_drawbar_pull_alone_and_as_its_formula_says():
     np.testing.assert_allclose(plain.drawbar_pull - force.drawbar_pull, expected, rtol=1e-10)
 
 
-def test_lugs_reach_deeper_with_their_count():
-    pull = [
-        (WHEEL + EFFECTS["grousers"](height=0.01, count=n))(SAND, AT).drawbar_pull
-        for n in (0.0, 8.0, 16.0)
-    ]
-    assert (pull[2] > pull[1]).all() and (pull[1] > pull[0]).all()
+def test_lugs_move_the_shearing_radius():
+    lugged = (WHEEL + EFFECTS["grousers"](height=0.01, shearing=0.5))(SAND, AT)
+    profile = (WHEEL + EFFECTS["grousers"](height=0.01, shearing=0.5)).profile(SAND, AT, 4001)
+    # by hand: r b times the integral of the shear stress, at the lever arm r + h / 2
+    arc = -np.trapezoid(profile.shear, profile.angle, axis=0) * 0.15 * 0.12
+    np.testing.assert_allclose(lugged.torque, arc * 0.155, rtol=1e-4)
 
 
 def test_an_effect_can_stand_in_a_model_once():

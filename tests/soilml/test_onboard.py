@@ -51,8 +51,8 @@ def test_readings_out_of_range_are_flagged_and_get_the_prior(estimator):
     for readings in cases.values():
         wild = estimator(**readings)
         assert not bool(wild.in_range)
-        np.testing.assert_allclose(wild.std, estimator.prior_std, rtol=1e-6)
-        np.testing.assert_allclose(wild.mean, estimator.prior_mean, rtol=1e-6)
+        np.testing.assert_allclose(wild.std, estimator.prior.std, rtol=1e-6)
+        np.testing.assert_allclose(wild.mean, estimator.prior.mean, rtol=1e-6)
 
 
 def test_impossible_readings_are_refused(estimator):
@@ -77,7 +77,46 @@ def test_rows_of_one_soil_together_say_more_than_one(estimator):
     alone = estimator(slip=slip, torque=force.torque, load=load)
     assert together.mean.shape == (3,)
     assert (together.std[1:] < 0.8 * np.median(alone.std, axis=0)[1:]).all()
-    assert (together.std <= estimator.prior_std * 1.0001).all()
+    assert (together.std <= estimator.prior.std * 1.0001).all()
+
+
+def test_rows_that_no_one_soil_gives_are_flagged_and_get_the_prior(estimator):
+    slip, load = np.asarray([0.1, 0.3, 0.5] * 4), np.asarray([40.0, 60.0, 80.0] * 4)
+    torque = load * 0.15 * np.asarray([0.45, 0.40, 0.35] * 4)  # falls where it must rise
+    wild = estimator.run(slip=slip, torque=torque, load=load)
+    assert not bool(wild.in_range)
+    np.testing.assert_allclose(wild.mean, estimator.prior.mean)
+    np.testing.assert_allclose(wild.std, estimator.prior.std)
+
+
+def test_a_stray_row_is_left_out_and_many_are_not_forgiven(estimator):
+    good = {"slip": np.full(20, 0.3), "torque": np.full(20, 3.0), "load": np.full(20, 60.0)}
+    stray = {name: values.copy() for name, values in good.items()}
+    stray["torque"][0] = 90.0
+    kept = estimator.run(**{name: values[1:] for name, values in good.items()})
+    np.testing.assert_allclose(estimator.run(**stray).mean, kept.mean)
+    stray["torque"][:5] = 90.0
+    assert not bool(estimator.run(**stray).in_range)
+
+
+def test_joined_answers_stay_inside_the_prior_and_inside_their_interval(estimator):
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        slip, load = rng.uniform(0.06, 0.59, 6), rng.uniform(31.0, 119.0, 6)
+        torque = load * 0.15 * (0.1 + rng.uniform(0.2, 0.8) * slip**0.5)
+        one = estimator.run(slip=slip, torque=torque, load=load)
+        assert (one.mean >= estimator.prior.lower).all() and (
+            one.mean <= estimator.prior.upper
+        ).all()
+        assert (one.low <= one.mean).all() and (one.mean <= one.high).all()
+        assert (one.low < one.high).all()
+
+
+def test_no_reading_and_readings_of_two_lengths_are_refused(estimator):
+    with pytest.raises(InputError, match="no reading"):
+        estimator.run(slip=[], torque=[], load=[])
+    with pytest.raises(InputError, match="one shape"):
+        estimator(slip=[0.1, 0.2], torque=[1.0, 2.0, 3.0], load=60.0)
 
 
 def test_one_row_together_is_that_row(estimator):

@@ -66,7 +66,7 @@ def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows,
     same = found.in_range == inside
     assert same.mean() > 0.999
     assert 0.1 < inside.mean() < 1.0
-    off = np.maximum(np.abs(found.mean - mean), np.abs(found.std - std)) / original.prior_std
+    off = np.maximum(np.abs(found.mean - mean), np.abs(found.std - std)) / original.prior.std
     assert off[same].max() < 1e-4
     assert off[same].max() <= max(3.0 * float(metadata["parity"]), 1e-6)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, TableError
+from soilml.estimate import Known
 from training.calibrate import calibrated, covariances, together
 from training.dataset import read_dataset, split
 from training.fused import fused
@@ -81,15 +82,15 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     member = calibrated(
         LinearGaussian().fit(parts.train.features, parts.train.targets), parts.choose
     )
-    prior_mean, prior_std = data.targets.mean(axis=0), data.targets.std(axis=0)
+    prior = Known(data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper)
     mean, std = member.predict(parts.calibrate.features)
     covariance = covariances(std, member.correlation)
-    joint = together(mean, covariance, parts.calibrate, prior_mean, prior_std)
+    joint = together(mean, covariance, parts.calibrate, prior)
     assert joint.rows.tolist() == [1, 2, 3, 4, 6, 8, 12, 16, 24, 32]
     assert (joint.worth[1:] <= joint.worth[0]).all()
     alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
     mean, std = member.predict(alone.features)
-    unknown = together(mean, covariances(std, member.correlation), alone, prior_mean, prior_std)
+    unknown = together(mean, covariances(std, member.correlation), alone, prior)
     assert unknown.worth[-1] == pytest.approx(1 / 32)  # nothing known: rows narrow nothing
 
 
@@ -153,7 +154,7 @@ def test_data_without_targets_or_with_too_few_rows_is_refused(tmp_path, small_da
 
     few = pq.read_table(small_data).slice(0, 20)
     pq.write_table(few, tmp_path / "few.parquet")
-    with pytest.raises(TableError, match="20 usable rows"):
+    with pytest.raises(TableError, match="20 usable rows; needed are 200"):
         read_dataset(tmp_path / "few.parquet", FEATURES, TARGETS)
 
 

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.saving import save_text
     from soilml.writing import csv_text
     from training import comparison_report as report
-    from training.compare import ANALYTIC_SETS, compare
+    from training.compare import ANALYTIC_SETS, compare, same_wheel
 
     case = read_case(args.model)
     table = read_table(args.test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
@@ -50,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if len(estimators) != len(args.files):
         raise InputError("two model files have the same name: rename one, names label the lines")
     names = next(iter(estimators.values())).names
+    same_wheel(case, table, estimators)
     with stages() as progress:
         lines = compare(case, table, estimators, progress, args.analytic_sets or ANALYTIC_SETS)
     folder = Path(args.out)

@@ -19,9 +19,16 @@ Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not lear
 Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
 
   features = ["slip", "torque/load", "load"]     # measured quantities, or ratios of them
+  targets = ["cohesion", "friction_angle", "shear_modulus"]        # what the recipe varies
+  rule = "best-linear"                           # or covariance-intersection, inverse-variance, ...
+  seed = 0
   [[regressor]]                                  # one or more; several are fused
-  type = "fixed-size-lssvm"                      # or lssvm, mlp, linear
+  type = "fixed-size-lssvm"                      # centres, gamma, width (chosen where left out)
   centres = 150
+  [[regressor]]
+  type = "mlp"                                   # hidden = [64, 64], epochs, batch, patience, ...
+  [[regressor]]
+  type = "linear"                                # or "lssvm", exact, for some thousand rows
 """
 
 
