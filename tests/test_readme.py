@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.recipe import read_recipe
 from soilml import read_case, read_table
-from soilml.cli import ORDER
+from soilml.cli import ORDER, main
 from soilml.reading import RUNS
-from training.spec import read_spec
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
@@ -35,17 +33,18 @@ def test_the_model_file_is_valid(tmp_path):
     (tmp_path / "model.toml").write_text(model)
     case = read_case(tmp_path / "model.toml")
     assert case.soil.friction_angle == 0.60
-    assert set(case.prior) == {"cohesion", "kphi"}
+    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus", "slip-sinkage.n1"}
 
 
-def test_the_recipe_and_the_spec_are_valid(tmp_path):
+def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
     model = next(b for b in blocks("toml") if "[gear]" in b)
-    extra = next(b for b in blocks("toml") if "[operating]" in b).replace("0.25", "1.0")
-    (tmp_path / "recipe.toml").write_text(f"rows = 64\nseed = 1\n{model}{extra}")
-    assert read_recipe(tmp_path / "recipe.toml").blocks[0].rows == 32
+    extra = next(b for b in blocks("toml") if "[operating]" in b)
+    (tmp_path / "recipe.toml").write_text(f"rows = 60000\nseed = 1\n{model}{extra}")
     spec = next(b for b in blocks("toml") if "[[regressor]]" in b)
     (tmp_path / "spec.toml").write_text(spec)
-    assert read_spec(tmp_path / "spec.toml").regressors[0].centres == 150
+    monkeypatch.chdir(tmp_path)
+    assert main(["generate", "recipe.toml", "data.parquet", "--rows", "3000"]) == 0
+    assert main(["train", "spec.toml", "data.parquet", "model.onnx"]) == 0
 
 
 def test_the_table_of_runs_is_valid(tmp_path):

@@ -32,7 +32,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL.toml", help="gear, soil and effects")
     parser.add_argument("--slip", required=True, help="slip ratios, driving above 0, braking below")
     parser.add_argument("--load", required=True, help="vertical loads, N")
-    parser.add_argument("--run", dest="label", metavar="NAME", help="put a column run with this name in front")
+    parser.add_argument(
+        "--run", dest="label", metavar="NAME", help="put a column run with this name in front"
+    )
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
 
 
