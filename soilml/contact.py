@@ -21,6 +21,7 @@ class Contact:
 
     depth: Array  # m, depth that sets the pressure
     sheared: Array  # m, shear displacement since entry, positive when it drives
+    rolled: Array  # m, how far the gear's surface has moved past the point since entry
     area: Array  # m^2, area that the point stands for
     up: Array  # m^2, that area, projected on the ground
     ahead: Array  # m^2, that area, projected on the direction of travel

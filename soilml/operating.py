@@ -17,8 +17,20 @@ MOST_SLIP = 1.0 - 1e-9
 class Operating:
     """Slip ratio and vertical load; numbers or arrays of any shapes that broadcast.
 
-    Slip is 1 - v/(r omega) when driving (0 to 1) and r omega/v - 1 when braking (-1 to 0).
+    Slip is 1 - v/(r omega) when driving (0 to 1) and r omega/v - 1 when braking (-1 to 0). The
+    others are None where nobody measured them; an effect that needs one then refuses.
     """
 
     slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
     load: Annotated[Real, Parameter("N", 1e-6, 1e7, "vertical load")]
+    speed: Annotated[
+        Real, Parameter("m/s", -100.0, 100.0, "travel speed, below zero in reverse")
+    ] = None
+    pass_number: Annotated[Real, Parameter("1", 1.0, 1e4, "1 on virgin soil, 2 in a rut")] = None
+    slip_angle: Annotated[Real, Parameter("rad", -1.6, 1.6, "between wheel plane and travel")] = (
+        None
+    )
+
+
+#: Fields of `Operating` that need not be known, and the column of each.
+COVARIATES = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}

@@ -59,11 +59,12 @@ def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
 
 
 def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
-    """Every parameter of the tree, dotted path -> (declaration, value)."""
+    """Every parameter of the tree that has a value, dotted path -> (declaration, value)."""
     found: dict[str, tuple[Parameter, Real]] = {}
     if is_dataclass(tree) and not isinstance(tree, type):
         for name, parameter in declared(type(tree)).items():
-            found[prefix + name] = parameter, getattr(tree, name)
+            if (value := getattr(tree, name)) is not None:
+                found[prefix + name] = parameter, value
     for name, _, part in _parts(tree):
         found |= located(part, f"{prefix}{name}.")
     return found

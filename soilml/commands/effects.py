@@ -34,9 +34,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"no effect {args.name!r}; there are: {', '.join(EFFECTS)}")
     cls = EFFECTS[args.name]
     acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if hasattr(cls, stage))
-    neutral = cls.about.neutral
+    neutral = cls()
     rows = [
-        (name, p.text, f"{neutral[name]:g}", f"{p.lower:g} .. {p.upper:g}", p.unit)
+        (name, p.text, f"{getattr(neutral, name):g}", f"{p.lower:g} .. {p.upper:g}", p.unit)
         for name, p in declared(cls).items()
     ]
     print(f"{args.name}: {cls.about.text}\nacts on: {acts}\nsource: {cls.about.source}\n")

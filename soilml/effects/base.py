@@ -6,6 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
+from soilml.arrays import Array
+from soilml.errors import InputError
+from soilml.operating import COVARIATES
+
 T = TypeVar("T")
 
 #: The stages of a model, in the order in which they run, and the value that each passes on.
@@ -24,8 +28,8 @@ class Effect(Protocol):
     """A named pure function of one stage of a model, or of several.
 
     An effect is a frozen dataclass of its parameters. It acts through the methods it has, any of
-    `STAGES`, each `(value, scene) -> value`. With its parameters at `neutral` it changes nothing,
-    to the last bit.
+    `STAGES`, each `(value, scene) -> value`. With its parameters at their defaults it changes
+    nothing, to the last bit.
     """
 
     name: ClassVar[str]
@@ -38,11 +42,33 @@ class EffectCard:
 
     text: str
     source: str
-    neutral: dict[str, float]
-    #: a size that matters on a small rover, for pictures and tests
+    #: where the cause sits: soil, wheel, rig or sensor
+    kind: str
+    #: its size and a value of it that matters on a small rover; the first parameter named here is
+    #: the one that a search for missing effects fits
     reference: dict[str, float]
     #: sign of the change that the reference size makes, channel -> -1 or +1, driving at slip > 0.1
     signs: dict[str, int]
+    #: runs that would tell it from others
+    isolate: str
+    #: fields of `Operating` that must be given, and must vary for the effect to be found
+    needs: tuple[str, ...] = ()
+    #: for sensors and rigs: how large the fault may be in a setup that was checked, one standard
+    #: deviation, in the unit of its size; None where nothing is known
+    calibration: float | None = None
+
+    @property
+    def size(self) -> str:
+        """The parameter that is the size of the effect."""
+        return next(iter(self.reference))
+
+
+def covariate(scene: Any, field: str, effect: str) -> Array:
+    """What an effect needs to know of the driving; raises `InputError` where nobody measured it."""
+    value = getattr(scene.at, field)
+    if value is None:
+        raise InputError(f"the effect {effect} needs the column {COVARIATES[field]}")
+    return value
 
 
 def through(effects: Iterable[Any], stage: str, value: T, scene: Any) -> T:

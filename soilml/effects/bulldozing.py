@@ -9,13 +9,14 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.contact import Force
 from soilml.effects.base import EffectCard
+from soilml.effects.shaped import Shaped
 from soilml.parameters import Parameter
 from soilml.scene import Scene
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Bulldozing:
+class Bulldozing(Shaped):
     r"""The wheel pushes a wall of soil before it; drawbar pull alone pays for it.
 
     .. math::
@@ -33,9 +34,10 @@ class Bulldozing:
     about: ClassVar[EffectCard] = EffectCard(
         text="the wheel pushes a wall of soil before it: less drawbar pull",
         source="Bekker 1969; Wong, Theory of Ground Vehicles, ch. 2",
-        neutral={"share": 0.0},
+        kind="soil",
         reference={"share": 1.0},
         signs={"drawbar_pull": -1},
+        isolate="the same runs driven the other way, which turns a slope around; heavier loads",
     )
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the formula's resistance")] = 0.0
 
@@ -54,4 +56,5 @@ class Bulldozing:
         resistance = width * (
             0.67 * soil.cohesion * z * k_c + 0.5 * z * z * soil.unit_weight * k_gamma
         )
-        return replace(force, drawbar_pull=force.drawbar_pull - self.share * resistance)
+        share = self.grown(self.share, scene)
+        return replace(force, drawbar_pull=force.drawbar_pull - share * resistance)

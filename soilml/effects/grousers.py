@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real
 from soilml.effects.base import EffectCard
+from soilml.effects.shaped import Shaped
 from soilml.gears.rim import Rim
 from soilml.parameters import Parameter
 from soilml.scene import Scene
@@ -14,7 +15,7 @@ from soilml.scene import Scene
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Grousers:
+class Grousers(Shaped):
     r"""Lugs carry the soil between them around: it shears further out than the rim.
 
     .. math:: r_s = r + \lambda h
@@ -31,12 +32,14 @@ class Grousers:
     about: ClassVar[EffectCard] = EffectCard(
         text="lugs carry the soil around: it shears further out than the rim",
         source="Ding et al. 2011, J. Terramechanics 48(1)",
-        neutral={"height": 0.0, "shearing": 0.75},
+        kind="wheel",
         reference={"height": 0.01},
         signs={"torque": +1, "drawbar_pull": +1},
+        isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
     )
     height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a lug above the rim")] = 0.0
     shearing: Annotated[Real, Parameter("1", 0.0, 1.0, "lambda, share of h added to r")] = 0.75
 
     def on_contact(self, rim: Rim, scene: Scene) -> Rim:
-        return replace(rim, shear_radius=rim.shear_radius + self.shearing * self.height)
+        out = self.shearing * self.grown(self.height, scene)
+        return replace(rim, shear_radius=rim.shear_radius + out, lever=rim.lever + out)

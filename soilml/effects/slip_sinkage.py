@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.effects.base import EffectCard
+from soilml.effects.shaped import Shaped
 from soilml.parameters import Parameter
 from soilml.scene import Scene
 from soilml.soils.base import Soil
@@ -14,7 +15,7 @@ from soilml.soils.base import Soil
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SlipSinkage:
+class SlipSinkage(Shaped):
     r"""A slipping wheel digs itself in: the exponent of sinkage grows with slip.
 
     .. math:: n = n_0 + n_1 |s|
@@ -28,12 +29,13 @@ class SlipSinkage:
     about: ClassVar[EffectCard] = EffectCard(
         text="a slipping wheel digs itself in: n grows with slip",
         source="Ding et al. 2011, J. Terramechanics 48(1)",
-        neutral={"n1": 0.0},
+        kind="soil",
         reference={"n1": 0.4},
         signs={"sinkage": +1},
+        isolate="runs at several slips under one load, with sinkage measured",
     )
     n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
 
     def on_soil(self, soil: Soil, scene: Scene) -> Soil:
         xp = namespace(scene.at.slip)
-        return replace(soil, n=soil.n + self.n1 * xp.abs(scene.at.slip))
+        return replace(soil, n=soil.n + self.grown(self.n1, scene) * xp.abs(scene.at.slip))

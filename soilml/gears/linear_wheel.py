@@ -46,11 +46,12 @@ class LinearWheel(RigidWheel):
                 [xp.full_like(peak, NO_DEPTH), shape.radius * (cos(peak) - cos(entry))], axis=0
             ),
             sheared=shape.shear_radius * (passed - (1.0 - at.slip) * (sin(entry) - sin(angle))),
+            rolled=shape.shear_radius * passed,
             area=scale * 0.5 * xp.stack([rear, front + rear], axis=0),
             up=scale * xp.stack([sin(peak) - sin(leave) - up_rear, up_rear + up_front], axis=0),
             ahead=scale
             * xp.stack([cos(leave) - cos(peak) - ahead_rear, ahead_rear + ahead_front], axis=0),
-            lever=shape.shear_radius,
+            lever=shape.lever,
             width=shape.width,
         )
 

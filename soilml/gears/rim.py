@@ -29,6 +29,7 @@ class Rim:
     sinkage: Array  # m
     radius: Real  # m
     shear_radius: Real  # m, radius at which soil is sheared; that of the rim unless lugs dig
+    lever: Real  # m, lever arm of the shear stress about the axle
     width: Real  # m
 
 
@@ -79,6 +80,7 @@ class RigidWheel(ABC):
             sinkage=sinkage,
             radius=self.radius,
             shear_radius=self.radius,
+            lever=self.radius,
             width=self.width,
         )
 

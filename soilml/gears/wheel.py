@@ -117,10 +117,11 @@ def contact_along(rim: Rim, at: Operating, passed: Array, depth: Array, arc: Arr
     return Contact(
         depth=depth,
         sheared=rim.shear_radius * (passed - (1.0 - at.slip) * sin_gone),
+        rolled=rim.shear_radius * passed,
         area=area,
         up=area * (cos_entry + cos_gained),
         ahead=area * (sin_entry - sin_gone),
-        lever=rim.shear_radius,
+        lever=rim.lever,
         width=rim.width,
     )
 
