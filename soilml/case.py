@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
-from soilml.effects import EFFECTS
+from soilml.effects import EFFECTS, Effect
 from soilml.errors import InputError
 from soilml.gears import GEARS
 from soilml.model import Model
@@ -58,15 +59,18 @@ class Case:
         )
 
 
-def read_case(path: str | os.PathLike[str]) -> Case:
-    """The case in a TOML file; raises `InputError` naming file, table and key."""
+def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
+    """The case in a TOML file; raises `InputError` naming file, table and key.
+
+    `effects` are those that [[effect]] may name.
+    """
     settings = read_settings(path)
-    case = take_case(settings)
+    case = take_case(settings, effects)
     settings.finish()
     return case
 
 
-def take_case(settings: Settings) -> Case:
+def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
     """Read [gear], [soil], [[effect]] and [noise], leaving other keys to the caller."""
     gear_settings = settings.table("gear")
     kind = gear_settings.text("type")
@@ -78,12 +82,12 @@ def take_case(settings: Settings) -> Case:
     model = Model(gear)
     for entry in settings.tables("effect"):
         name = entry.text("name")
-        if name not in EFFECTS:
-            entry.fail(f"name is {name!r}; there are: {', '.join(EFFECTS)}")
+        if name not in effects:
+            entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
         priors = entry.table("prior")
-        model = model + _filled(EFFECTS[name], entry)
+        model = model + _filled(effects[name], entry)
         entry.finish()
-        prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, EFFECTS[name]).items()}
+        prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, effects[name]).items()}
     noise = {}
     noise_settings = settings.table("noise")
     noise_settings.knows(COLUMNS)

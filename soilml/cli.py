@@ -23,7 +23,18 @@ shear modulus, with an uncertainty that can be believed.
   which to believe            soilml compare
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
-ORDER = ("soils", "effects", "simulate", "identify", "generate", "train", "estimate", "compare")
+ORDER = (
+    "soils",
+    "effects",
+    "simulate",
+    "identify",
+    "audit",
+    "gap",
+    "generate",
+    "train",
+    "estimate",
+    "compare",
+)
 _NEGATIVE = re.compile(r"-[\d.]")
 
 

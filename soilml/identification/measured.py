@@ -49,7 +49,7 @@ def measured_rows(case: Case, table: Table) -> Measured:
     Noise comes from `<column>_std`, else from [noise]. A channel for which neither speaks is left
     out if another is declared; if none is, all are used and their noise is estimated.
     """
-    _same_wheel(case, table)
+    same_wheel(case, table)
     found = []
     for name in CHANNELS:
         key = column(name)
@@ -98,7 +98,7 @@ def _input_noise(case: Case, key: str, reading: Floats) -> Floats:
     return np.asarray(case.noise[key].std(reading) + 0.0 * reading)
 
 
-def _same_wheel(case: Case, table: Table) -> None:
+def same_wheel(case: Case, table: Table) -> None:
     """A table that says which wheel was driven must say the case's wheel."""
     for name in ("radius", "width"):
         key = QUANTITIES[f"wheel_{name}"].column

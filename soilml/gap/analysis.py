@@ -1,0 +1,117 @@
+"""One analysis: gate, covariance, soil alone, search, and once more with what was learned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.effects.base import Effect
+from soilml.gap.candidate import Bench
+from soilml.gap.cells import Cells
+from soilml.gap.covariance import Covariance, Scatter, assembled, estimated, scatter_columns
+from soilml.gap.fit import GapFit
+from soilml.gap.predict import soil_axis
+from soilml.gap.search import Found, search
+from soilml.gap.signatures import signatures
+from soilml.gap.smooth import smooth_columns
+from soilml.gap.sound import MOST_STRAY, strays
+from soilml.identification.free import Free
+
+Floats = NDArray[np.float64]
+
+#: Passes of covariance, strays and search: the second knows what the first has found.
+PASSES = 2
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The bench that was used in the end, what was found on it, and what was set aside."""
+
+    bench: Bench
+    found: Found
+    strays: tuple[str, ...]
+    refused: str = ""
+
+
+def analysed(
+    case: Case,
+    free: Sequence[Free],
+    cells: Cells,
+    effects: Mapping[str, type[Effect]],
+    calibration: Mapping[str, float],
+    seed: int,
+) -> Analysis:
+    """Search the cells for what the soil alone does not explain."""
+    axes = tuple(soil_axis(f) for f in free)
+    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
+    starts = [nominal, np.full(len(free), 0.5), np.full(len(free), 0.25)]
+    plain = Scatter(np.ones(len(cells.channels)), 0.0, 0.0, 0.0, 1.0)
+    none = np.zeros((len(cells), 2))
+    bench = Bench(case, axes, cells, assembled(cells, none, plain), effects, calibration)
+    soil = bench.soil_only(starts)
+    if not np.isfinite(soil.prediction).all():
+        bad = int(cells.row[np.flatnonzero(~np.isfinite(soil.prediction))[0]])
+        return Analysis(
+            bench, _nothing(soil), (), f"the model cannot carry the load of row {bad + 1}"
+        )
+    best, found, dropped = soil, None, np.zeros(0, dtype=np.int64)
+    for _ in range(PASSES):
+        bench, best, lost = _scattered(bench, best, cells)
+        dropped = np.append(dropped, lost)
+        if dropped.size > MOST_STRAY * (len(cells) + dropped.size):
+            text = f"{dropped.size} readings stray from all others: look at the sensors first"
+            return Analysis(bench, _nothing(soil), (), text)
+        cells = bench.cells
+        soil = bench.soil_only([soil.x])
+        again = search(bench, soil, seed)
+        done = found is not None and _same(found, again)
+        found = again
+        if done or not found.causes:
+            break
+        best = found.causes[0].shaped
+    assert found is not None
+    return Analysis(bench, found, tuple(f"{n}" for n in dropped))
+
+
+def _same(one: Found, other: Found) -> bool:
+    return [c.names for c in one.causes] == [c.names for c in other.causes]
+
+
+def _scattered(bench: Bench, fit: GapFit, cells: Cells) -> tuple[Bench, GapFit, list[str]]:
+    """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
+    case, reading = fit.fitted(), cells.reading
+    known, _ = signatures(case, cells, bench.effects)
+    raw = np.linalg.solve(bench.covariance.whiten, fit.slope)
+    space = np.column_stack([raw, *[s.column for s in known], smooth_columns(cells)])
+    residual = reading - fit.prediction
+    typical = Scatter(np.ones(len(cells.channels)), np.deg2rad(0.5), 0.05, 0.0, 1.0)
+    columns = scatter_columns(case, cells)
+    wide = assembled(cells, columns if len(cells.runs) > 1 else 0.0 * columns, typical)
+    explained = fit.prediction + _explained(wide, residual, space)
+    cells = cells.expecting(explained)
+    away = strays(assembled(cells, columns, typical), residual, space)
+    lost = [f"{cells.channels[cells.channel[i]]}@{cells.row[i]}" for i in np.flatnonzero(away)]
+    kept = ~away
+    cells = cells.keeping(kept)
+    covariance = estimated(cells, columns[kept], residual[kept], space[kept])
+    new = replace(bench, cells=cells, covariance=covariance)
+    return new, fit, lost
+
+
+def _explained(covariance: Covariance, residual: Floats, space: Floats) -> Floats:
+    """What the columns of a space explain of the residuals, by generalised least squares."""
+    white = covariance.whiten @ space
+    weights = np.linalg.lstsq(white, covariance.whiten @ residual, rcond=1e-6)[0]
+    return np.asarray(space @ weights)
+
+
+def _nothing(soil: GapFit) -> Found:
+    from soilml.gap.score import Scores
+    from soilml.gap.search import Left
+
+    blank = Scores(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0))
+    return Found(soil, Left((), blank, 1.0), (), (), Left((), blank, 1.0), {})

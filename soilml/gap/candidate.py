@@ -1,0 +1,121 @@
+"""Fits of the model with effects added: by their own law, and with the law left open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.effects.base import Effect
+from soilml.errors import InputError
+from soilml.gap.cells import Cells
+from soilml.gap.covariance import Covariance
+from soilml.gap.fit import GapFit, descend
+from soilml.gap.predict import Axis, shape_axes, size_axis
+from soilml.gap.signatures import grown
+
+Floats = NDArray[np.float64]
+
+#: Sizes, in reference sizes, that a fit of a new effect starts from.
+STARTS = (0.7,)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Effects by name and the two fits with them: by their own laws, and with shapes free."""
+
+    names: tuple[str, ...]
+    strict: GapFit
+    shaped: GapFit
+
+    @property
+    def cost(self) -> float:
+        """The objective with form uncertainty included."""
+        return self.shaped.cost
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All that stays the same while candidates are tried."""
+
+    case: Case
+    soil: tuple[Axis, ...]
+    cells: Cells
+    covariance: Covariance
+    effects: Mapping[str, type[Effect]]
+    calibration: Mapping[str, float]
+
+    def with_effects(self, names: Sequence[str]) -> Case:
+        """The case with these effects added."""
+        case = self.case
+        for name in names:
+            case = grown(case, self.effects[name])
+        return case
+
+    def sizes(self, names: Sequence[str]) -> list[Axis]:
+        """The axes of the effects' sizes."""
+        found = []
+        for name in names:
+            effect = self.effects[name]
+            known = self.calibration.get(name, effect.about.calibration)
+            found.append(size_axis(effect, known))
+        return found
+
+    def shapes(self, names: Sequence[str]) -> list[Axis]:
+        """The axes of the effects' shapes, as far as slip and load vary."""
+        found = [axis for name in names for axis in shape_axes(self.effects[name])]
+        varies = {"by_slip": np.ptp(self.cells.slip) > 0.05, "by_load": self._loads()}
+        return [axis for axis in found if varies[axis.path.rpartition(".")[2]]]
+
+    def _loads(self) -> bool:
+        return bool(np.ptp(np.log(self.cells.load)) > 0.1)
+
+    def soil_only(self, starts: Sequence[Floats]) -> GapFit:
+        """The best fit of the soil alone."""
+        fits = [
+            descend(self.case, self.soil, self.cells, self.covariance.whiten, start)
+            for start in starts
+        ]
+        return min(fits, key=lambda fit: fit.cost)
+
+    def fit(
+        self, names: Sequence[str], start: Mapping[str, float], *, shaped: bool = True
+    ) -> Candidate:
+        """The model with these effects, from coordinates by path; those not given start small."""
+        case = self.with_effects(names)
+        sizes = self.sizes(names)
+        axes = [*self.soil, *sizes]
+        strict = self._from(case, axes, start)
+        if not shaped:
+            return Candidate(tuple(names), strict, strict)
+        open_axes = [*axes, *self.shapes(names)]
+        if len(open_axes) == len(axes):
+            return Candidate(tuple(names), strict, strict)
+        begin = {a.path: float(x) for a, x in zip(axes, strict.x, strict=True)}
+        loose = self._from(case, open_axes, begin)
+        if loose.cost > strict.cost:
+            loose = strict
+        return Candidate(tuple(names), strict, loose)
+
+    def _from(self, case: Case, axes: Sequence[Axis], start: Mapping[str, float]) -> GapFit:
+        begin = np.asarray([start.get(axis.path, _small(axis)) for axis in axes])
+        try:
+            return descend(case, axes, self.cells, self.covariance.whiten, begin)
+        except InputError:  # a trial past what the model allows: start from nothing
+            begin = np.asarray([start.get(a.path, 0.0) if "." not in a.path else 0.0 for a in axes])
+            return descend(case, axes, self.cells, self.covariance.whiten, begin)
+
+
+def _small(axis: Axis) -> float:
+    """Where a new coordinate starts: off zero, where some effects have no slope."""
+    if axis.path.rpartition(".")[2] in ("by_slip", "by_load"):
+        return 0.0
+    return STARTS[0] if axis.upper > 0.0 else -STARTS[0]
+
+
+def coordinates(fit: GapFit) -> dict[str, float]:
+    """Where a fit stands, by path, for another to start from."""
+    return {axis.path: float(x) for axis, x in zip(fit.axes, fit.x, strict=True)}

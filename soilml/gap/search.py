@@ -1,0 +1,177 @@
+"""The search for missing effects: add, swap and drop until nothing is left to explain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.gap.candidate import Bench, Candidate, coordinates
+from soilml.gap.fit import GapFit
+from soilml.gap.score import Scores, outside, scores
+from soilml.gap.signatures import Signature, signatures
+from soilml.gap.smooth import smooth_columns
+
+Floats = NDArray[np.float64]
+
+#: Family-wise level of the test for a gap.
+LEVEL = 0.05
+#: Level below which what a candidate leaves is no noise.
+ADEQUATE = 0.01
+#: Objective above the best one's at which a candidate is rejected.
+REJECTED = 6.0
+#: How much a further effect must lower the objective.
+EARNS = 12.0
+#: Candidates that are fitted in full, and effects that are added at most.
+FITTED = 7
+MOST = 3
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a fit leaves: scores of the catalogue and of smooth shapes, tested together."""
+
+    names: tuple[str, ...]
+    scores: Scores
+    #: p value of the largest score among all columns
+    p: float
+
+    @property
+    def by_name(self) -> dict[str, float]:
+        """Score of each effect of the catalogue."""
+        return {n: float(z) for n, z in zip(self.names, self.scores.z, strict=False)}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the search ended with."""
+
+    soil: GapFit
+    first: Left
+    #: candidates that the data do not reject against the best, the best first
+    causes: tuple[Candidate, ...]
+    #: everything that was fitted, for the table of candidates
+    tried: tuple[Candidate, ...]
+    #: what the best leaves, or the soil alone where nothing was found
+    left: Left
+    predicted_gain: dict[str, float]
+
+    @property
+    def gap(self) -> bool:
+        """Whether there is anything to explain."""
+        return self.first.p < LEVEL
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the best candidate leaves no more than noise."""
+        return self.left.p >= ADEQUATE
+
+
+def left_by(bench: Bench, fit: GapFit, known: Sequence[Signature], seed: int) -> Left:
+    """Test what a fit leaves, with everything that it could move projected off."""
+    whiten = bench.covariance.whiten
+    smooth = smooth_columns(bench.cells)
+    columns = whiten @ np.column_stack([*[s.column for s in known], smooth])
+    signs = np.asarray([s.sign for s in known] + [0] * smooth.shape[1], dtype=np.float64)
+    space = np.column_stack([fit.slope])
+    found = scores(fit.residual, columns, space, signs, bench.covariance.scatter.freedom, seed)
+    return Left(tuple(s.name for s in known), found, found.worst)
+
+
+def predicted_gains(bench: Bench, fit: GapFit, known: Sequence[Signature]) -> dict[str, float]:
+    """By how much each effect, its form left open, should lower the objective: linearised."""
+    whiten = bench.covariance.whiten
+    slip, load = bench.cells.slip, np.log(bench.cells.load)
+    forms = [np.ones_like(slip), slip - slip.mean(), load - load.mean()]
+    gains = {}
+    for s in known:
+        shaped = bench.shapes([s.name])
+        white = whiten @ np.stack([s.column * f for f in forms[: 1 + len(shaped)]], axis=1)
+        beyond = outside(white, fit.slope)
+        main = beyond[:, 0]
+        power = float(main @ main)
+        if power <= 0.0:
+            gains[s.name] = 0.0
+            continue
+        size = float(main @ fit.residual) / power
+        if s.sign and size * s.sign <= 0:
+            size = 0.02 * s.sign
+        std = bench.sizes([s.name])[0].std
+        precision = np.asarray([std**-2, *[(axis.std * size) ** -2 for axis in shaped]])
+        normal = beyond.T @ beyond + np.diag(precision)
+        moment = beyond.T @ fit.residual
+        gains[s.name] = float(moment @ np.linalg.solve(normal, moment))
+    return gains
+
+
+def search(bench: Bench, soil: GapFit, seed: int) -> Found:
+    """Name what the soil alone does not explain.
+
+    Candidates are fitted jointly with the soil, by their own law and with its form left open. As
+    long as the best leaves more than noise, every candidate in the running is tried with one more;
+    a set of effects that explains no more than a smaller one gives way to it.
+    """
+    known, _ = signatures(soil.fitted(), bench.cells, bench.effects)
+    first = left_by(bench, soil, known, seed)
+    gains = predicted_gains(bench, soil, known)
+    nothing = Found(soil, first, (), (), first, gains)
+    if first.p >= LEVEL:
+        return nothing
+    tried: dict[tuple[str, ...], Candidate] = {}
+    start = coordinates(soil)
+    level: list[Candidate] = []
+    for name in _promising(gains):
+        tried[name,] = bench.fit([name], start)
+        level.append(tried[name,])
+    level = [c for c in level if c.cost < soil.cost - EARNS / 2]
+    if not level:
+        return nothing
+    best = min(level, key=lambda c: c.cost)
+    left = _left(bench, best, seed)
+    for _ in range(MOST - 1):
+        if left.p >= ADEQUATE:
+            break
+        wider = _one_more(bench, level, tried, seed)
+        if not wider:
+            break
+        better = min(wider, key=lambda c: c.cost)
+        if better.cost > best.cost - EARNS:
+            break
+        level, best = wider, better
+        left = _left(bench, best, seed)
+    final = [c for c in level if c.cost <= best.cost + REJECTED]
+    final.sort(key=lambda c: c.cost)
+    return Found(soil, first, tuple(final), tuple(tried.values()), left, gains)
+
+
+def _left(bench: Bench, candidate: Candidate, seed: int) -> Left:
+    fit = candidate.shaped
+    known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
+    return left_by(bench, fit, known, seed)
+
+
+def _promising(gains: dict[str, float]) -> list[str]:
+    ordered = sorted(gains, key=lambda name: -gains[name])
+    return [name for name in ordered if gains[name] > 4.0][:FITTED]
+
+
+def _one_more(
+    bench: Bench,
+    level: Sequence[Candidate],
+    tried: dict[tuple[str, ...], Candidate],
+    seed: int,
+) -> list[Candidate]:
+    """Sets of one effect more: the best few of this level, each with what its residuals ask for."""
+    found = []
+    for candidate in sorted(level, key=lambda c: c.cost)[:3]:
+        fit = candidate.shaped
+        known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
+        gains = predicted_gains(bench, fit, known)
+        for name in _promising(gains)[:4]:
+            names = tuple(sorted((*candidate.names, name)))
+            if names not in tried:
+                tried[names] = bench.fit(names, coordinates(fit))
+            found.append(tried[names])
+    return list({c.names: c for c in found}.values())

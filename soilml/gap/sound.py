@@ -1,0 +1,118 @@
+"""The gate: which data can be analysed at all, and which readings are set aside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.gap.cells import Cells
+from soilml.gap.covariance import Covariance
+from soilml.gap.smooth import distinct
+from soilml.quantities import column
+from soilml.table import Table
+
+Floats = NDArray[np.float64]
+
+#: Readings that stray further than this, in standard deviations, are set aside; more than this
+#: share of them is no stray any more.
+STRAY, MOST_STRAY = 4.5, 0.1
+#: Degrees of freedom that repeated rows must give before they speak for the noise.
+LEAST_REPEATS = 6
+#: Readings beyond the number of soil parameters that an analysis needs.
+SPARE = 8
+
+
+@dataclass(frozen=True)
+class Gate:
+    """What the gate says: reasons to refuse, reasons to name nothing, and notes."""
+
+    refused: tuple[str, ...] = ()
+    unnameable: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def without_repeats(table: Table) -> tuple[Table, int]:
+    """The table without rows that repeat another one to the last digit, and how many there were."""
+    names = [n for n in table.columns if n != "source"]
+    keys = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
+    first = {key: i for i, key in reversed(list(enumerate(keys)))}
+    kept = np.asarray(sorted(first.values()), dtype=np.int64)
+    return (table, 0) if kept.size == len(table) else (table.rows(kept), len(table) - kept.size)
+
+
+def repeated_noise(cells: Cells) -> tuple[dict[str, float], list[str]]:
+    """Noise of the channels that declare none, from rows driven alike, and notes about it."""
+    found, notes = {}, []
+    for i, name in enumerate(cells.channels):
+        here = np.flatnonzero((cells.channel == i) & ~np.isfinite(cells.std))
+        if here.size == 0:
+            continue
+        slip, load = cells.slip[here], cells.load[here]
+        key = np.stack([np.round(slip / 0.02), np.round(np.log(load) / 0.05)], axis=1)
+        _, group = np.unique(key, axis=0, return_inverse=True)
+        count = np.bincount(group)
+        mean = np.bincount(group, cells.reading[here]) / count
+        freedom = int((count - 1).sum())
+        if freedom < LEAST_REPEATS:
+            continue
+        spread = float(np.sum((cells.reading[here] - mean[group]) ** 2))
+        found[name] = float(np.sqrt(spread / freedom))
+        notes.append(
+            f"noise of {column(name)} is not declared: {found[name]:.3g} from rows driven alike"
+        )
+    return found, notes
+
+
+def examined(cells: Cells, table: Table, repeats: int, parameters: int) -> Gate:
+    """What these data allow, before anything is fitted."""
+    refused: list[str] = []
+    unnameable: list[str] = []
+    notes: list[str] = []
+    for i, name in enumerate(cells.channels):
+        here = cells.channel == i
+        if not np.isfinite(cells.std[here]).all():
+            refused.append(
+                f"the noise of {column(name)} is not declared and no rows were driven alike: give "
+                f"[noise] {column(name)}, or {column(name)}_std"
+            )
+        readings = cells.reading[here]
+        if readings.size > 3 and np.ptp(readings) == 0.0:
+            refused.append(f"{column(name)} is the same in every row: is the sensor alive?")
+    if repeats:
+        text = f"{repeats} rows repeat another one to the last digit and are left out"
+        (refused if repeats > 0.2 * (len(table) + repeats) else notes).append(text)
+    if not cells.channels:
+        refused.append("no torque, drawbar pull or sinkage was measured")
+    elif len(cells) < parameters + SPARE:
+        refused.append(
+            f"{len(cells)} readings for {parameters} soil parameters: nothing is left to show a gap"
+        )
+    if len(cells.runs) < 2:
+        unnameable.append("one run only: soil that differs from run to run cannot be told apart")
+    if cells.channels and distinct(np.log(cells.load)) < 2:
+        unnameable.append("one load only: soil parameters and effects trade off")
+    if cells.channels and distinct(cells.slip) < 3:
+        unnameable.append("fewer than three slips: nothing that runs with slip can be told apart")
+    return Gate(tuple(refused), tuple(unnameable), tuple(notes))
+
+
+def strays(covariance: Covariance, residual: Floats, space: Floats) -> NDArray[np.bool_]:
+    r"""Readings (m,) that all others together do not expect.
+
+    .. math:: t_i = (P r)_i / \sqrt{P_{ii}}, \quad
+        P = V^{-1} - V^{-1} X (X^T V^{-1} X)^{-1} X^T V^{-1}
+
+    against the median size of t. References: Cook and Weisberg, Residuals and Influence, 1982.
+    """
+    white = covariance.whiten @ space
+    u, s, _ = np.linalg.svd(white, full_matrices=False)
+    basis = u[:, s > max(1e-3 * float(s[0]), 0.3)]
+    inside = np.eye(len(residual)) - basis @ basis.T
+    p = covariance.whiten.T @ inside @ covariance.whiten
+    diagonal = np.diag(p)
+    sure = diagonal > 1e-3 / covariance.std**2
+    t = np.where(sure, (p @ residual) / np.sqrt(np.where(sure, diagonal, 1.0)), 0.0)
+    typical = max(1.0, float(np.median(np.abs(t[sure]))) / 0.6745) if sure.any() else 1.0
+    return np.asarray(np.abs(t) > STRAY * typical)
