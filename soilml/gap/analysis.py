@@ -10,9 +10,16 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.effects.base import Effect
-from soilml.gap.candidate import Bench
+from soilml.gap.candidate import Bench, coordinates
 from soilml.gap.cells import Cells
-from soilml.gap.covariance import Covariance, Scatter, assembled, estimated, scatter_columns
+from soilml.gap.covariance import (
+    SCATTER,
+    Covariance,
+    Scatter,
+    assembled,
+    estimated,
+    scatter_columns,
+)
 from soilml.gap.fit import GapFit
 from soilml.gap.predict import soil_axis
 from soilml.gap.search import Found, search
@@ -58,30 +65,38 @@ def analysed(
         return Analysis(
             bench, _nothing(soil), (), f"the model cannot carry the load of row {bad + 1}"
         )
-    best, found, dropped = soil, None, np.zeros(0, dtype=np.int64)
+    best, dropped = soil, []
+    found = _nothing(soil)
     for _ in range(PASSES):
-        bench, best, lost = _scattered(bench, best, cells)
-        dropped = np.append(dropped, lost)
-        if dropped.size > MOST_STRAY * (len(cells) + dropped.size):
-            text = f"{dropped.size} readings stray from all others: look at the sensors first"
+        before = bench.covariance.scatter
+        bench, lost = _scattered(bench, best, cells)
+        dropped += lost
+        if len(dropped) > MOST_STRAY * (len(cells) + len(dropped)):
+            text = f"{len(dropped)} readings stray from all others: look at the sensors first"
             return Analysis(bench, _nothing(soil), (), text)
+        if found.causes and not lost and _alike(before, bench.covariance.scatter):
+            break
         cells = bench.cells
         soil = bench.soil_only([soil.x])
-        again = search(bench, soil, seed)
-        done = found is not None and _same(found, again)
-        found = again
-        if done or not found.causes:
+        starts = {c.names: coordinates(c.strict) for c in found.tried}
+        found = search(bench, soil, seed, starts)
+        if not found.causes:
             break
         best = found.causes[0].shaped
-    assert found is not None
-    return Analysis(bench, found, tuple(f"{n}" for n in dropped))
+    return Analysis(bench, found, tuple(dropped))
 
 
-def _same(one: Found, other: Found) -> bool:
-    return [c.names for c in one.causes] == [c.names for c in other.causes]
+def _alike(one: Scatter, other: Scatter) -> bool:
+    """Whether two scatters would weigh the data alike."""
+    return (
+        bool(np.all(np.abs(one.scale / other.scale - 1.0) < 0.2))
+        and one.memory == other.memory
+        and abs(one.friction_angle - other.friction_angle) < 0.3 * SCATTER["friction_angle"]
+        and abs(one.bearing - other.bearing) < 0.3 * SCATTER["bearing"]
+    )
 
 
-def _scattered(bench: Bench, fit: GapFit, cells: Cells) -> tuple[Bench, GapFit, list[str]]:
+def _scattered(bench: Bench, fit: GapFit, cells: Cells) -> tuple[Bench, list[str]]:
     """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
     case, reading = fit.fitted(), cells.reading
     known, _ = signatures(case, cells, bench.effects)
@@ -98,8 +113,7 @@ def _scattered(bench: Bench, fit: GapFit, cells: Cells) -> tuple[Bench, GapFit, 
     kept = ~away
     cells = cells.keeping(kept)
     covariance = estimated(cells, columns[kept], residual[kept], space[kept])
-    new = replace(bench, cells=cells, covariance=covariance)
-    return new, fit, lost
+    return replace(bench, cells=cells, covariance=covariance), lost
 
 
 def _explained(covariance: Covariance, residual: Floats, space: Floats) -> Floats:

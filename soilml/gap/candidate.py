@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,15 @@ from soilml.gap.cells import Cells
 from soilml.gap.covariance import Covariance
 from soilml.gap.fit import GapFit, descend
 from soilml.gap.predict import Axis, shape_axes, size_axis
+from soilml.gap.score import outside
 from soilml.gap.signatures import grown
 
 Floats = NDArray[np.float64]
 
 #: Sizes, in reference sizes, that a fit of a new effect starts from.
 STARTS = (0.7,)
+#: Spread of the fault of a sensor or rig that nobody checked, in reference sizes.
+UNCHECKED = 2.0
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,9 @@ class Bench:
         """The axes of the effects' sizes."""
         found = []
         for name in names:
-            effect = self.effects[name]
-            known = self.calibration.get(name, effect.about.calibration)
-            found.append(size_axis(effect, known))
+            about = self.effects[name].about
+            usual = UNCHECKED * about.reference[about.size] if about.calibration else None
+            found.append(size_axis(self.effects[name], self.calibration.get(name, usual)))
         return found
 
     def shapes(self, names: Sequence[str]) -> list[Axis]:
@@ -81,24 +84,30 @@ class Bench:
         ]
         return min(fits, key=lambda fit: fit.cost)
 
-    def fit(
-        self, names: Sequence[str], start: Mapping[str, float], *, shaped: bool = True
-    ) -> Candidate:
-        """The model with these effects, from coordinates by path; those not given start small."""
-        case = self.with_effects(names)
-        sizes = self.sizes(names)
-        axes = [*self.soil, *sizes]
-        strict = self._from(case, axes, start)
-        if not shaped:
-            return Candidate(tuple(names), strict, strict)
-        open_axes = [*axes, *self.shapes(names)]
-        if len(open_axes) == len(axes):
-            return Candidate(tuple(names), strict, strict)
-        begin = {a.path: float(x) for a, x in zip(axes, strict.x, strict=True)}
-        loose = self._from(case, open_axes, begin)
-        if loose.cost > strict.cost:
-            loose = strict
-        return Candidate(tuple(names), strict, loose)
+    def fit(self, names: Sequence[str], start: Mapping[str, float]) -> Candidate:
+        """The model with these effects, each by its own law; coordinates not given start small."""
+        strict = self._from(self.with_effects(names), [*self.soil, *self.sizes(names)], start)
+        return Candidate(tuple(names), strict, strict)
+
+    def loosened(self, candidate: Candidate) -> Candidate:
+        """The same candidate with the shapes of its effects free as well."""
+        strict = candidate.strict
+        shapes = self.shapes(candidate.names)
+        if not shapes:
+            return candidate
+        loose = self._from(strict.case, [*strict.axes, *shapes], coordinates(strict))
+        return candidate if loose.cost > strict.cost else replace(candidate, shaped=loose)
+
+    def loose_gain(self, candidate: Candidate) -> float:
+        """By how much free shapes should lower the objective at most: linearised, no prior."""
+        fit = candidate.strict
+        forms = (self.cells.slip, np.log(self.cells.load))
+        raw = np.linalg.solve(self.covariance.whiten, fit.slope[:, len(self.soil) :])
+        columns = np.column_stack([raw * form[:, None] for form in forms])
+        beyond = outside(self.covariance.whiten @ columns, fit.slope)
+        u, s, _ = np.linalg.svd(beyond, full_matrices=False)
+        kept = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
+        return float(np.sum((kept.T @ fit.residual) ** 2))
 
     def _from(self, case: Case, axes: Sequence[Axis], start: Mapping[str, float]) -> GapFit:
         begin = np.asarray([start.get(axis.path, _small(axis)) for axis in axes])

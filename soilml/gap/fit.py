@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 ROUNDS = 25
 #: Whitened residual of a reading for which a trial has no equilibrium.
 NO_ANSWER = 1e2
-#: A descent ends when a step lowers the objective by less than this.
-ENOUGH = 1e-3
+#: A descent ends when a step lowers the objective by less than this, or by less than this share.
+ENOUGH, SHARE = 0.01, 2e-3
 
 
 @dataclass(frozen=True)
@@ -106,23 +106,25 @@ def descend(
         free = ~held
         normal = steep[:, free].T @ steep[:, free] + np.diag(weight[free] ** 2)
         scale = np.diag(np.diag(normal) + 1e-9)
-        dampings = damping * np.asarray([0.01, 1.0, 100.0, 1e4])
+        dampings = damping * np.asarray([0.01, 1.0, 100.0])
         trials = np.tile(x, (len(dampings), 1))
         for i, d in enumerate(dampings):
             trials[i, free] += np.linalg.solve(normal + d * scale, gradient[free])
         trials = np.clip(trials, lower, upper)
         costs = objective(residuals(predicted(case, axes, trials, cells)), trials)
         best = int(np.argmin(costs))
-        if not costs[best] < cost - ENOUGH:
-            converged = bool(costs[-1] < cost + 1.0) or bool(np.abs(trials[0] - x).max() < 1e-3)
-            if costs[best] >= cost:
-                break
         gained = cost - float(costs[best])
-        x, cost, damping = trials[best], float(costs[best]), float(dampings[best])
-        damping = min(max(damping, 1e-9), 1e9)
+        if gained <= 0.0:
+            # a step of no length that does not help is an optimum; a long one asks for more damping
+            converged = float(np.abs(trials[-1] - x).max()) < 1e-3
+            damping *= 1e3
+            if converged or damping > 1e9:
+                break
+            continue
+        x, cost, damping = trials[best], float(costs[best]), max(float(dampings[best]), 1e-9)
         y, slope = linearised(case, axes, x, cells)
         off, steep = residuals(y), whiten @ np.nan_to_num(slope)
-        if gained < ENOUGH:
+        if gained < max(ENOUGH, SHARE * (cost - len(cells))):
             converged = True
             break
     return GapFit(case, tuple(axes), x, y, off, steep, cost, converged)

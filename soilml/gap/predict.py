@@ -18,7 +18,7 @@ from soilml.prior import Prior
 Floats = NDArray[np.float64]
 
 #: Step of differences: a share of a soil parameter's prior, or of an effect's reference size.
-STEP = 1e-4
+STEP = 1e-5
 #: Prior spread of an effect's two shape coefficients, in their own units.
 SHAPE_STD = {"by_slip": 3.0, "by_load": 1.0}
 
@@ -91,11 +91,9 @@ def predicted(case: Case, axes: Sequence[Axis], x: Floats, cells: Cells) -> Floa
 def linearised(case: Case, axes: Sequence[Axis], x: Floats, cells: Cells) -> tuple[Floats, Floats]:
     """Predictions (m,) at `x` (p,) and their derivatives (m, p), from one call of the model."""
     p = len(axes)
-    lower = np.asarray([axis.lower for axis in axes])
     upper = np.asarray([axis.upper for axis in axes])
-    up, down = np.minimum(x + STEP, upper), np.maximum(x - STEP, lower)
-    sets = np.tile(x, (2 * p + 1, 1))
-    sets[np.arange(p), np.arange(p)] = up
-    sets[p + np.arange(p), np.arange(p)] = down
+    step = np.where(x + STEP <= upper, STEP, -STEP)
+    sets = np.tile(x, (p + 1, 1))
+    sets[np.arange(p), np.arange(p)] += step
     y = predicted(case, axes, sets, cells)
-    return y[-1], np.asarray(((y[:p] - y[p:-1]) / (up - down)[:, None]).T)
+    return y[-1], np.asarray(((y[:-1] - y[-1]) / step[:, None]).T)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,8 @@ EARNS = 12.0
 #: Candidates that are fitted in full, and effects that are added at most.
 FITTED = 7
 MOST = 3
+#: The gain that free shapes are hoped for, in linearised gains: those fall short where sizes move.
+HOPE = 3.0
 
 
 @dataclass(frozen=True)
@@ -106,25 +108,27 @@ def predicted_gains(bench: Bench, fit: GapFit, known: Sequence[Signature]) -> di
     return gains
 
 
-def search(bench: Bench, soil: GapFit, seed: int) -> Found:
+Starts = Mapping[tuple[str, ...], Mapping[str, float]]
+
+
+def search(bench: Bench, soil: GapFit, seed: int, starts: Starts | None = None) -> Found:
     """Name what the soil alone does not explain.
 
-    Candidates are fitted jointly with the soil, by their own law and with its form left open. As
-    long as the best leaves more than noise, every candidate in the running is tried with one more;
-    a set of effects that explains no more than a smaller one gives way to it.
+    Candidates are fitted jointly with the soil, by their own law; where that could bring them into
+    the running, with their form left open. As long as the best leaves more than noise, those in the
+    running are tried with one effect more; a set that explains no more than a smaller one gives way
+    to it. `starts` are coordinates by names, from an earlier search.
     """
+    starts = starts or {}
     known, _ = signatures(soil.fitted(), bench.cells, bench.effects)
     first = left_by(bench, soil, known, seed)
     gains = predicted_gains(bench, soil, known)
     nothing = Found(soil, first, (), (), first, gains)
     if first.p >= LEVEL:
         return nothing
-    tried: dict[tuple[str, ...], Candidate] = {}
     start = coordinates(soil)
-    level: list[Candidate] = []
-    for name in _promising(gains):
-        tried[name,] = bench.fit([name], start)
-        level.append(tried[name,])
+    level = _loosened(bench, [bench.fit([n], starts.get((n,), start)) for n in _promising(gains)])
+    tried = {c.names: c for c in level}
     level = [c for c in level if c.cost < soil.cost - EARNS / 2]
     if not level:
         return nothing
@@ -133,7 +137,8 @@ def search(bench: Bench, soil: GapFit, seed: int) -> Found:
     for _ in range(MOST - 1):
         if left.p >= ADEQUATE:
             break
-        wider = _one_more(bench, level, tried, seed)
+        wider = _loosened(bench, _one_more(bench, level, tried, starts))
+        tried |= {c.names: c for c in wider}
         if not wider:
             break
         better = min(wider, key=lambda c: c.cost)
@@ -144,6 +149,18 @@ def search(bench: Bench, soil: GapFit, seed: int) -> Found:
     final = [c for c in level if c.cost <= best.cost + REJECTED]
     final.sort(key=lambda c: c.cost)
     return Found(soil, first, tuple(final), tuple(tried.values()), left, gains)
+
+
+def _loosened(bench: Bench, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates, with forms left open where that could bring them close to the best."""
+    found: list[Candidate] = []
+    lowest = np.inf
+    for candidate in sorted(candidates, key=lambda c: c.cost):
+        hope = candidate.cost - HOPE * bench.loose_gain(candidate)
+        loose = bench.loosened(candidate) if hope < lowest + REJECTED else candidate
+        lowest = min(lowest, loose.cost)
+        found.append(loose)
+    return found
 
 
 def _left(bench: Bench, candidate: Candidate, seed: int) -> Left:
@@ -160,18 +177,17 @@ def _promising(gains: dict[str, float]) -> list[str]:
 def _one_more(
     bench: Bench,
     level: Sequence[Candidate],
-    tried: dict[tuple[str, ...], Candidate],
-    seed: int,
+    tried: Mapping[tuple[str, ...], Candidate],
+    starts: Starts,
 ) -> list[Candidate]:
     """Sets of one effect more: the best few of this level, each with what its residuals ask for."""
-    found = []
+    found: dict[tuple[str, ...], Candidate] = {}
     for candidate in sorted(level, key=lambda c: c.cost)[:3]:
         fit = candidate.shaped
         known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
         gains = predicted_gains(bench, fit, known)
         for name in _promising(gains)[:4]:
             names = tuple(sorted((*candidate.names, name)))
-            if names not in tried:
-                tried[names] = bench.fit(names, coordinates(fit))
-            found.append(tried[names])
-    return list({c.names: c for c in found}.values())
+            if names not in found and names not in tried:
+                found[names] = bench.fit(names, starts.get(names, coordinates(candidate.strict)))
+    return list(found.values())
