@@ -45,14 +45,20 @@ def loaded(scene: Scene, sinkage: Array) -> Force:
 
 
 def settled(scene: Scene) -> Force:
+    """What the sensors report of a gear at rest in the soil; arrays (batch,)."""
+    force = at_rest(scene)
+    return _blanked(through(scene.effects, "on_reading", force, prepared(scene)))
+
+
+def at_rest(scene: Scene) -> Force:
     """Forces at the first sinkage at which the soil carries the load; arrays (batch,)."""
     scene = prepared(scene)
     leaves = list(values(scene).values())
     with untracked(leaves):
-        force = _at_rest(scene)
+        force = _carried(scene)
     if tracked(leaves):
         force = _differentiable(scene, force)
-    return _blanked(through(scene.effects, "on_reading", force, scene))
+    return _blanked(force)
 
 
 def prepared(scene: Scene) -> Scene:
@@ -72,7 +78,7 @@ def stresses_along(scene: Scene, sinkage: Array, points: int) -> tuple[Array, St
     return angle, through(scene.effects, "on_stress", found, scene)
 
 
-def _at_rest(scene: Scene) -> Force:
+def _carried(scene: Scene) -> Force:
     """Forces at equilibrium, of every row: directly where that works, by search where not."""
     xp = namespace(scene.at.load)
     soil, at, gear = scene.soil, scene.at, scene.gear

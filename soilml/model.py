@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from soilml.arrays import Array, Real, namespace
 from soilml.contact import Force
-from soilml.effects.base import Effect
-from soilml.equilibrium import settled, stresses_along
+from soilml.effects.base import Effect, through
+from soilml.equilibrium import at_rest, settled, stresses_along
 from soilml.errors import InputError
 from soilml.gears.base import Gear
 from soilml.operating import Operating
@@ -47,13 +48,10 @@ class Model:
         `InputError` for a value outside its bounds; a row without equilibrium is NaN with its
         reason in `status`.
         """
-        check(at)
-        check(soil, "soil ")
-        check(self)
-        flat, shape = flattened(Scene(self.gear, soil, at, self.effects))
-        xp = namespace(flat.at.slip)
+        scene, shape = self._scene(soil, at)
+        xp = namespace(scene.at.slip)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = _in_chunks(flat)
+            force = _in_chunks(scene, settled)
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
@@ -61,13 +59,19 @@ class Model:
 
         NaN in rows without equilibrium. Raises `InputError` as a call does.
         """
-        force = self(soil, at)
-        flat, shape = flattened(Scene(self.gear, soil, at, self.effects))
-        xp = namespace(flat.at.slip)
+        scene, shape = self._scene(soil, at)
+        xp = namespace(scene.at.slip)
         with np.errstate(all="ignore"):
-            angle, stresses = stresses_along(flat, xp.reshape(force.sinkage, (-1,)), points)
+            sinkage = _in_chunks(scene, at_rest).sinkage  # not what a sensor makes of it
+            angle, stresses = stresses_along(scene, sinkage, points)
         parts = (angle, stresses.normal, stresses.shear)
         return Profile(*(xp.reshape(part, (part.shape[0], *shape)) for part in parts))
+
+    def _scene(self, soil: Soil, at: Operating) -> tuple[Scene, tuple[int, ...]]:
+        check(at)
+        check(soil, "soil ")
+        check(self)
+        return flattened(Scene(self.gear, soil, at, self.effects))
 
 
 @dataclass(frozen=True)
@@ -100,17 +104,17 @@ def _float64(value: Real, xp: Any, device: Any) -> Array:
     return xp.asarray(value, dtype=xp.float64, device=device)
 
 
-def _in_chunks(scene: Scene) -> Force:
-    """Driving rows and braking rows apart, since they are cut into different points."""
+def _in_chunks(scene: Scene, solve: Callable[[Scene], Force]) -> Force:
+    """Rows that truly drive and rows that brake apart: they are cut into different points."""
     xp = namespace(scene.at.slip)
-    braking = scene.at.slip < 0
+    braking = through(scene.effects, "on_operating", scene.at, scene).slip < 0
     size = braking.shape[0]
     parts, order = [], []
     for group in (xp.nonzero(~braking)[0], xp.nonzero(braking)[0]):
         for start in range(0, group.shape[0], CHUNK):
             index = group[start : min(start + CHUNK, group.shape[0])]
             whole = index.shape[0] == size
-            parts.append(settled(scene if whole else rows(scene, index)))
+            parts.append(solve(scene if whole else rows(scene, index)))
             order.append(index)
     if not parts:
         nothing: dict[str, Array] = {f.name: xp.zeros_like(scene.at.slip) for f in fields(Force)}
