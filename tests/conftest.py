@@ -68,14 +68,14 @@ def input_box(count: int, seed: int) -> dict[str, np.ndarray]:
     }
 
 
-def solved(box: dict[str, np.ndarray], effects=(), gear=None):
-    """The package's answer for rows of a box."""
+def solved(box: dict[str, np.ndarray], effects=(), gear=None, **known):
+    """The package's answer for rows of a box; `known` are further fields of Operating."""
     from soilml import Model, Operating, Soil, Wheel
 
     names = ("cohesion", "friction_angle", "shear_modulus", "n", "kc", "kphi", "a0", "a1")
     soil = Soil(**{name: box[name] for name in names})
     gear = (gear or Wheel)(radius=box["radius"], width=box["width"])
-    return Model(gear, tuple(effects))(soil, Operating(slip=box["slip"], load=box["load"]))
+    return Model(gear, tuple(effects))(soil, Operating(slip=box["slip"], load=box["load"], **known))
 
 
 @pytest.fixture

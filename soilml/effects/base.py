@@ -22,6 +22,9 @@ STAGES = {
     "on_reading": "Force at equilibrium -> what the sensors report",
 }
 
+#: Where the cause of an effect may sit.
+KINDS = ("soil", "wheel", "rig", "sensor")
+
 
 @runtime_checkable
 class Effect(Protocol):
@@ -42,7 +45,7 @@ class EffectCard:
 
     text: str
     source: str
-    #: where the cause sits: soil, wheel, rig or sensor
+    #: where the cause sits, one of `KINDS`
     kind: str
     #: its size and a value of it that matters on a small rover; the first parameter named here is
     #: the one that a search for missing effects fits

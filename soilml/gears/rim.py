@@ -24,7 +24,7 @@ class Rim:
     """
 
     entry: Array  # rad
-    exit: Array  # rad, zero or negative
+    exit: Array  # rad, zero or negative, unless stress sits at the front of the contact
     peak: Array  # rad, where the normal stress is largest
     sinkage: Array  # m
     radius: Real  # m

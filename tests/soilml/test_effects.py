@@ -1,67 +1,115 @@
 """One contract for every effect of the catalogue."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from conftest import input_box, solved
 
-from soilml import EFFECTS, Model, Operating, Status, Wheel, soil
-from soilml.effects.base import STAGES
+from soilml import EFFECTS, GEARS, Model, Operating, Status, Wheel, soil
+from soilml.effects.base import KINDS, STAGES
+from soilml.effects.shaped import Shaped
+from soilml.equilibrium import prepared
 from soilml.errors import InputError
-from soilml.parameters import declared
+from soilml.operating import COVARIATES
+from soilml.parameters import check, declared
+from soilml.scene import Scene
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
-AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0)
+KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
+AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0, **KNOWN)
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
+FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
 every = pytest.mark.parametrize("name", EFFECTS)
+shaped = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if issubclass(c, Shaped)])
+needy = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if c.about.needs])
 
 
+def sized(name, share=1.0, **more):
+    """The effect at a share of its reference size, or at the bound of it."""
+    cls = EFFECTS[name]
+    bounds = declared(cls)
+    sizes = {k: min(share * v, bounds[k].upper) for k, v in cls.about.reference.items()}
+    return cls(**sizes, **more)
+
+
+def known_to(count):
+    """Speeds forward and back, passes and slip angles for rows of a box."""
+    rows = np.arange(count)
+    return {
+        "speed": np.where(rows % 3, 1.0, -1.0) * 10.0 ** (-3 + 4 * (rows % 17) / 16),
+        "pass_number": 1.0 + rows % 6,
+        "slip_angle": -1.5 + 3.0 * (rows % 29) / 28,
+    }
+
+
+@cache
+def plain(gear):
+    return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
+
+
+@pytest.mark.parametrize("gear", GEARS)
 @every
-def test_neutral_changes_nothing_to_the_last_bit(name):
+def test_neutral_changes_nothing_to_the_last_bit(name, gear):
     box = input_box(128, seed=4)
-    plain, neutral = solved(box), solved(box, [EFFECTS[name]()])
-    for field in ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status"):
-        np.testing.assert_array_equal(getattr(neutral, field), getattr(plain, field))
+    assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
+    neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(128))
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
+@pytest.mark.parametrize("gear", GEARS)
 @every
-def test_finite_over_the_whole_box_or_flagged(name):
-    box = input_box(512, seed=8)
+def test_finite_over_the_whole_box_or_flagged(name, gear):
+    box, known = input_box(512, seed=8), known_to(512)
     for share in (0.5, 2.0):
-        sized = {k: share * v for k, v in EFFECTS[name].about.reference.items()}
-        force = solved(box, [EFFECTS[name](**sized)])
+        effect = sized(name, share)
+        force = solved(box, [effect], GEARS[gear], **known)
         ok = force.status == Status.OK
         assert ok.mean() > 0.3
         for channel in CHANNELS:
             assert np.isfinite(getattr(force, channel)[ok]).all()
             assert np.isnan(getattr(force, channel)[~ok]).all()
-        np.testing.assert_allclose(force.load[ok], box["load"][ok], rtol=1e-6)
+        at = Operating(slip=box["slip"], load=box["load"], **known)
+        true = prepared(Scene(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
+        np.testing.assert_allclose(force.load[ok], true.load[ok], rtol=1e-6)
+        assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
+
+
+@every
+def test_any_size_within_its_bounds_is_answered_or_flagged(name):
+    box, known = input_box(64, seed=6), known_to(64)
+    size = EFFECTS[name].about.size
+    bounds = declared(EFFECTS[name])[size]
+    for value in (bounds.lower, bounds.upper):
+        force = solved(box, [EFFECTS[name](**{size: value})], **known)
+        ok = force.status == Status.OK
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
 
 
 @every
 def test_signs_are_as_declared(name):
-    effect = EFFECTS[name](**EFFECTS[name].about.reference)
-    plain, changed = WHEEL(SAND, AT), (WHEEL + effect)(SAND, AT)
-    assert effect.about.signs
+    effect = sized(name)
+    before, changed = WHEEL(SAND, AT), (WHEEL + effect)(SAND, AT)
+    assert set(effect.about.signs) <= set(CHANNELS)
     for channel, sign in effect.about.signs.items():
-        assert (sign * (getattr(changed, channel) - getattr(plain, channel)) > 0).all()
+        assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
+    assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
 
 
 @every
 def test_answers_change_smoothly_with_the_size(name):
-    cls = EFFECTS[name]
-
     def at_size(share):
-        effect = cls(**{k: share * v for k, v in cls.about.reference.items()})
-        force = (WHEEL + effect)(SAND, AT)
+        force = (WHEEL + sized(name, share))(SAND, AT)
         return np.stack([getattr(force, c) for c in CHANNELS])
 
     h = 1e-4
-    coarse = (at_size(1 + 10 * h) - at_size(1 - 10 * h)) / (20 * h)
-    fine = (at_size(1 + h) - at_size(1 - h)) / (2 * h)
+    coarse = (at_size(0.9 + 10 * h) - at_size(0.9 - 10 * h)) / (20 * h)
+    fine = (at_size(0.9 + h) - at_size(0.9 - h)) / (2 * h)
     scale = np.abs(fine).max(axis=1, keepdims=True) + 1e-12
     assert np.abs((coarse - fine) / scale).max() < 1e-4
 
@@ -69,40 +117,62 @@ def test_answers_change_smoothly_with_the_size(name):
 @every
 def test_is_described(name):
     cls = EFFECTS[name]
+    card, parameters = cls.about, declared(cls)
     assert cls.name == name
     assert any(hasattr(cls, stage) for stage in STAGES)
-    assert cls.about.text and cls.about.source and "References:" in cls.__doc__
-    assert set(cls.about.reference) <= set(declared(cls))
+    assert card.text and card.source and card.isolate and "References:" in cls.__doc__
+    assert ".. math::" in cls.__doc__
+    assert card.kind in KINDS
+    assert issubclass(cls, Shaped) == (card.kind in ("soil", "wheel"))
+    assert (card.calibration is not None) == (card.kind in ("rig", "sensor"))
+    assert card.size == next(iter(parameters if card.kind in ("rig", "sensor") else card.reference))
+    assert card.reference[card.size] != 0 and getattr(cls(), card.size) == 0
+    assert set(card.reference) <= set(parameters) and set(card.needs) <= set(COVARIATES)
+    check(cls())
+    check(sized(name))
 
 
-def test_slip_sinkage_raises_the_exponent():
-    effect = EFFECTS["slip-sinkage"](n1=0.4)
-    with_effect = (WHEEL + effect)(SAND, AT)
-    by_hand = WHEEL(replace(SAND, n=SAND.n + 0.4 * AT.slip), AT)
-    np.testing.assert_allclose(with_effect.torque, by_hand.torque, rtol=1e-12)
+@needy
+def test_what_nobody_measured_is_asked_for_by_its_column(name):
+    (need,) = EFFECTS[name].about.needs
+    for effect in (EFFECTS[name](), sized(name)):
+        with pytest.raises(InputError) as caught:
+            (WHEEL + effect)(SAND, replace(AT, **{need: None}))
+        assert str(caught.value) == f"the effect {name} needs the column {COVARIATES[need]}"
 
 
-def test_bulldozing_costs_drawbar_pull_alone_and_as_its_formula_says():
-    force, plain = (WHEEL + EFFECTS["bulldozing"](share=1.0))(SAND, AT), WHEEL(SAND, AT)
-    np.testing.assert_array_equal(force.torque, plain.torque)
-    np.testing.assert_array_equal(force.sinkage, plain.sinkage)
-    tan = 2 / 3 * np.tan(SAND.friction_angle)
-    phi = np.arctan(tan)
-    n_q = np.exp(np.pi * tan) * np.tan(np.pi / 4 + phi / 2) ** 2
-    n_c, n_gamma = (n_q - 1) / tan, 2 * (n_q + 1) * tan
-    k_c = (n_c - tan) * np.cos(phi) ** 2
-    k_gamma = (2 * n_gamma / tan + 1) * np.cos(phi) ** 2
-    z, b = plain.sinkage, 0.12
-    expected = b * (0.67 * SAND.cohesion * z * k_c + 0.5 * z**2 * SAND.unit_weight * k_gamma)
-    np.testing.assert_allclose(plain.drawbar_pull - force.drawbar_pull, expected, rtol=1e-10)
+@every
+def test_nothing_else_is_asked_for(name):
+    spare = {field: None for field in COVARIATES if field not in EFFECTS[name].about.needs}
+    assert ((WHEEL + sized(name))(SAND, replace(AT, **spare)).status == 0).all()
 
 
-def test_lugs_move_the_shearing_radius():
-    lugged = (WHEEL + EFFECTS["grousers"](height=0.01, shearing=0.5))(SAND, AT)
-    profile = (WHEEL + EFFECTS["grousers"](height=0.01, shearing=0.5)).profile(SAND, AT, 4001)
-    # by hand: r b times the integral of the shear stress, at the lever arm r + h / 2
-    arc = -np.trapezoid(profile.shear, profile.angle, axis=0) * 0.15 * 0.12
-    np.testing.assert_allclose(lugged.torque, arc * 0.155, rtol=1e-4)
+@shaped
+@pytest.mark.parametrize("slip, load", [(0.3, 100.0), (0.5, 40.0), (-0.2, 130.0)])
+def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
+    at = replace(AT, slip=slip, load=load)
+    growth = np.exp(0.7 * (abs(slip) - 0.3)) * (load / 100.0) ** 0.2
+    running = (WHEEL + sized(name, 0.8, by_slip=0.7, by_load=0.2))(SAND, at)
+    size = EFFECTS[name].about.size
+    scaled = {size: growth * getattr(sized(name, 0.8), size)}
+    fixed = (WHEEL + replace(sized(name, 0.8), **scaled))(SAND, at)
+    for channel in CHANNELS:
+        np.testing.assert_allclose(
+            getattr(running, channel), getattr(fixed, channel), rtol=1e-9, atol=1e-12
+        )
+
+
+@every
+def test_a_row_is_answered_alike_alone_and_among_others(name):
+    slips = np.asarray([-0.3, -0.004, 0.004, 0.012, 0.2, 0.6])
+    model = WHEEL + sized(name, -1.0 if name == "slip-scale" else 1.0)
+    together = model(SAND, replace(AT, slip=slips))
+    for i, slip in enumerate(slips):
+        alone = model(SAND, replace(AT, slip=slip))
+        for channel in CHANNELS:
+            np.testing.assert_allclose(
+                getattr(together, channel)[i], getattr(alone, channel), rtol=1e-13
+            )
 
 
 def test_an_effect_can_stand_in_a_model_once():
