@@ -78,8 +78,8 @@ def analysed(
             break
         cells = bench.cells
         soil = bench.soil_only([soil.x])
-        starts = {c.names: coordinates(c.strict) for c in found.tried}
-        found = search(bench, soil, seed, starts)
+        known = {c.names: coordinates(c.strict) for c in found.tried}
+        found = search(bench, soil, seed, known)
         if not found.causes:
             break
         best = found.causes[0].shaped

@@ -67,7 +67,7 @@ def scatter_columns(case: Case, cells: Cells) -> Floats:
         stiffer = {k: float(getattr(case.soil, k)) * (1.0 + sign * 1e-4) for k in ("kc", "kphi")}
         sides.append(linearised(case.with_values(stiffer), [], np.zeros(0), cells)[0])
     by_bearing = (sides[0] - sides[1]) / 2e-4 * SCATTER["bearing"]
-    return np.nan_to_num(np.stack([by_angle, by_bearing], axis=1))
+    return np.asarray(np.nan_to_num(np.stack([by_angle, by_bearing], axis=1)))
 
 
 def assembled(cells: Cells, columns: Floats, scatter: Scatter) -> Covariance:
