@@ -1,0 +1,125 @@
+"""What others would do: regressions on residuals, for names and for predictions."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from soilml.case import Case
+from soilml.effects import EFFECTS
+from soilml.gap.cells import cells_of
+from soilml.gap.predict import linearised, predicted, soil_axis
+from soilml.gap.signatures import signatures
+from soilml.identification.free import chosen
+from soilml.quantities import CHANNELS, column
+from soilml.table import Table
+
+
+def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
+    """The effect that each baseline names, '' where it sees no gap."""
+    cells = cells_of(case, table)
+    known, _ = signatures(soil_only, cells, EFFECTS)
+    y = predicted(soil_only, [], np.zeros((1, 0)), cells)[0]
+    r = (cells.reading - y) / cells.std
+    g = np.stack([s.column for s in known], axis=1) / cells.std[:, None]
+    labels = [s.name for s in known]
+    free = chosen(case, None)
+    axes = [soil_axis(f) for f in free]
+    at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
+    j = linearised(case, axes, at, cells)[1] / cells.std[:, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return {
+            "residual correlation": _correlated(g, r, labels),
+            "STLSQ (pysindy)": _stlsq(g, r, labels),
+            "Lasso, BIC": _lasso(g, r, labels),
+            "stepwise, AIC": _stepwise(g, r, j, labels, 2.0),
+            "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
+            "random forest sees a gap": _forest(cells.slip, cells.load, cells.channel, r),
+        }
+
+
+def _correlated(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
+    correlation = [abs(np.corrcoef(column_, r)[0, 1]) for column_ in g.T]
+    return labels[int(np.nanargmax(correlation))]
+
+
+def _largest(weights: np.ndarray, g: np.ndarray, labels: list[str]) -> str:
+    share = np.abs(weights) * np.linalg.norm(g, axis=0)
+    return labels[int(np.argmax(share))] if share.max() > 0 else ""
+
+
+def _stlsq(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
+    import pysindy
+
+    norm = np.linalg.norm(g, axis=0)
+    optimizer = pysindy.STLSQ(threshold=1.0, alpha=1e-3)
+    optimizer.fit(g / norm, r[:, None])
+    return _largest(optimizer.coef_[0] / norm, g, labels)
+
+
+def _lasso(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
+    from sklearn.linear_model import LassoLarsIC
+
+    norm = np.linalg.norm(g, axis=0)
+    fitted = LassoLarsIC(criterion="bic", noise_variance=1.0).fit(g / norm, r)
+    return _largest(fitted.coef_ / norm, g, labels)
+
+
+def _stepwise(g: np.ndarray, r: np.ndarray, j: np.ndarray, labels: list[str], price: float) -> str:
+    """The first effect that a joint regression of soil and effects takes in."""
+
+    def left(columns: np.ndarray) -> float:
+        weights = np.linalg.lstsq(columns, r, rcond=None)[0]
+        return float(np.sum((r - columns @ weights) ** 2))
+
+    base = left(j)
+    costs = [left(np.column_stack([j, column_])) + price for column_ in g.T]
+    best = int(np.argmin(costs))
+    return labels[best] if costs[best] < base else ""
+
+
+def _forest(slip: np.ndarray, load: np.ndarray, channel: np.ndarray, r: np.ndarray) -> str:
+    """'gap' where a random forest explains residuals it has not seen."""
+    from sklearn.ensemble import RandomForestRegressor
+
+    x = np.column_stack([slip, np.log(load), channel])
+    forest = RandomForestRegressor(100, oob_score=True, min_samples_leaf=3, random_state=0)
+    return "gap" if forest.fit(x, r).oob_score_ > 0.0 else ""
+
+
+def remainders(
+    case: Case, table: Table, plain: dict[str, np.ndarray], region: Table
+) -> dict[str, dict[str, np.ndarray]]:
+    """What regressions of the residuals of a soil-only fit on slip and load say in a region."""
+    from sklearn.ensemble import RandomForestRegressor
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+    from sklearn.linear_model import Ridge
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import PolynomialFeatures
+
+    def features(rows: Table) -> np.ndarray:
+        return np.column_stack([rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4])
+
+    def process() -> GaussianProcessRegressor:
+        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0, 1.0], (0.2, 20.0)) + WhiteKernel(1.0)
+        return GaussianProcessRegressor(kernel, random_state=0)
+
+    makers = {
+        "Gaussian process": process,
+        "random forest": lambda: RandomForestRegressor(200, min_samples_leaf=2, random_state=0),
+        "quadratic": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
+    }
+    found: dict[str, dict[str, np.ndarray]] = {label: {} for label in makers}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name in CHANNELS:
+            key = column(name)
+            std = case.noise[key].std(table[key])
+            scale = float(np.median(std))
+            for label, make in makers.items():
+                learned = make().fit(features(table), (table[key] - plain[name]) / scale)
+                found[label][name] = learned.predict(features(region)) * scale
+    return found
