@@ -1,0 +1,71 @@
+"""What is passed along while the forces on a wheel are worked out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """Wheel, soil and driving of a batch; every field is an array (n,), in SI."""
+
+    slip: Floats
+    load: Floats  # N
+    radius: Floats  # m
+    width: Floats  # m
+    cohesion: Floats  # Pa
+    friction_angle: Floats  # rad
+    shear_modulus: Floats  # m
+    kc: Floats  # N/m^(n+1)
+    kphi: Floats  # N/m^(n+2)
+    n: Floats
+    a0: Floats
+    a1: Floats
+    unit_weight: Floats  # N/m^3
+    speed: Floats  # m/s
+    pass_number: Floats
+    slip_angle: Floats  # rad
+
+
+@dataclass(frozen=True)
+class Arc:
+    """The part of the rim that touches the soil; arrays (n,), angles from straight down, rad."""
+
+    entry: Floats
+    exit: Floats
+    peak: Floats
+    sinkage: Floats  # m
+    radius: Floats  # m, of the circle that stands in the soil
+    shear_radius: Floats  # m
+    lever: Floats  # m
+
+
+@dataclass(frozen=True)
+class Points:
+    """Stresses (Pa) at points of the arc; arrays (points, n)."""
+
+    theta: Floats  # rad
+    gone: Floats  # rad, entry angle less theta
+    depth: Floats  # m, that sets the pressure
+    sheared: Floats  # m, shear displacement
+    normal: Floats
+    strength: Floats  # c + sigma tan(phi)
+    shear: Floats
+
+
+@dataclass(frozen=True)
+class Push:
+    """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
+
+    NaN where the soil does not carry the load down to the hub.
+    """
+
+    load: Floats
+    pull: Floats
+    torque: Floats
+    sinkage: Floats
