@@ -71,6 +71,15 @@ def _rate_power(points: Points, arc: Arc, rows: Rows, m: float) -> Floats:
     return np.asarray(points.shear * (rows.speed / 0.05) ** m)
 
 
+def _along_velocity(points: Points, arc: Arc, rows: Rows, share: float) -> Floats:
+    """Shear points along the velocity of slip at each point, not along the displacement."""
+    aside = (1.0 - rows.slip) * np.tan(rows.slip_angle) * share
+    j = np.hypot(points.sheared, arc.shear_radius * points.gone * aside)
+    along = 1.0 - (1.0 - rows.slip) * np.cos(points.theta)
+    tau = points.strength * -np.expm1(-j / rows.shear_modulus)
+    return np.asarray(tau * along / np.hypot(along, aside))
+
+
 def _saturating_passes(rows: Rows, growth: float) -> Rows:
     stiffer = 1.0 - growth * np.expm1(-(rows.pass_number - 1.0) / 1.5)
     return replace(rows, kc=rows.kc * stiffer, kphi=rows.kphi * stiffer)
@@ -152,5 +161,14 @@ FORMS = (
         unit="1",
         soil=_saturating_passes,
         needs="pass_number",
+    ),
+    Cause(
+        name="lateral-slip",
+        form="velocity",
+        size="share",
+        reference=1.0,
+        unit="1",
+        shear=_along_velocity,
+        needs="slip_angle",
     ),
 )

@@ -101,12 +101,11 @@ def _multipass(rows: Rows, growth: float) -> Rows:
 
 
 def _lateral_slip(points: Points, arc: Arc, rows: Rows, share: float) -> Floats:
-    """Shear grows with both displacements and points along the velocity of slip."""
-    aside = (1.0 - rows.slip) * np.tan(rows.slip_angle) * share
+    """Shear grows with both displacements and points along their sum."""
+    aside = share * (1.0 - rows.slip) * np.tan(rows.slip_angle)
     j = np.hypot(points.sheared, arc.shear_radius * points.gone * aside)
-    along = 1.0 - (1.0 - rows.slip) * np.cos(points.theta)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
-    return np.asarray(tau * along / np.hypot(along, aside))
+    return np.asarray(tau * points.sheared / j)
 
 
 KNOWN = (

@@ -58,8 +58,8 @@ def _load_gain(rows: Rows, gain: float) -> Rows:
 
 
 def _slip_scale(rows: Rows, scale: float) -> Rows:
-    """1 - s' = (1 - s)(1 + e), s reported and s' what the wheel does."""
-    return replace(rows, slip=np.asarray(1.0 - (1.0 - rows.slip) * (1.0 + scale)))
+    """1 - s' = (1 - s)(1 + e), s what the wheel does and s' what is reported."""
+    return replace(rows, slip=np.asarray(1.0 - (1.0 - rows.slip) / (1.0 + scale)))
 
 
 #: The rig: an unmeasured slope, load carried by the pull, friction in the wheel's bearing.
