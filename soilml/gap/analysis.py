@@ -30,8 +30,8 @@ from soilml.identification.free import Free
 
 Floats = NDArray[np.float64]
 
-#: Passes of covariance, strays and search: the second knows what the first has found.
-PASSES = 2
+#: Passes of covariance, strays and search: each knows what the one before has found.
+PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def analysed(
         found = search(bench, soil, seed, known)
         if not found.causes:
             break
-        best = found.causes[0].shaped
+        best = found.causes[0].fit
     return Analysis(bench, found, tuple(dropped))
 
 

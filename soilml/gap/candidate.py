@@ -14,7 +14,7 @@ from soilml.errors import InputError
 from soilml.gap.cells import Cells
 from soilml.gap.covariance import Covariance
 from soilml.gap.fit import GapFit, descend
-from soilml.gap.predict import Axis, shape_axes, size_axis
+from soilml.gap.predict import SHAPE_STD, Axis, shape_axes, size_axis
 from soilml.gap.score import outside
 from soilml.gap.signatures import grown
 
@@ -35,9 +35,40 @@ class Candidate:
     shaped: GapFit
 
     @property
+    def price(self) -> float:
+        r"""What free shapes must gain before they are believed: their Occam factor.
+
+        .. math:: \sum_k \ln(1 + \sigma_k^2 / s_k^2)
+
+        with the spreads of the prior and of the posterior. References: MacKay, Neural Computation
+        4, 1992.
+        """
+        prior = self.shaped.precision
+        shapes = [i for i, a in enumerate(self.shaped.axes) if _is_shape(a)]
+        spread = np.diag(self.shaped.covariance)[shapes]
+        return float(np.sum(np.log1p(1.0 / (prior[shapes] * np.maximum(spread, 1e-12)))))
+
+    @property
+    def open(self) -> bool:
+        """Whether the data ask for another law than the catalogue's."""
+        return self.shaped.cost + self.price < self.strict.cost
+
+    @property
     def cost(self) -> float:
         """The objective with form uncertainty included."""
-        return self.shaped.cost
+        return min(self.strict.cost, self.shaped.cost + self.price)
+
+    @property
+    def fit(self) -> GapFit:
+        """The fit that stands for the candidate."""
+        return self.shaped if self.open else self.strict
+
+    @property
+    def strain(self) -> float:
+        """How far the shapes are from the catalogue's law, in squared prior spreads."""
+        x, prior = self.fit.x, self.fit.precision
+        shapes = [i for i, a in enumerate(self.fit.axes) if _is_shape(a)]
+        return float(np.sum(x[shapes] ** 2 * prior[shapes]))
 
 
 @dataclass(frozen=True)
@@ -98,6 +129,22 @@ class Bench:
         loose = self._from(strict.case, [*strict.axes, *shapes], coordinates(strict))
         return candidate if loose.cost > strict.cost else replace(candidate, shaped=loose)
 
+    def forms(self, fit: GapFit) -> list[Floats]:
+        """What further bends in the laws of a fit's effects would do, whitened, (m, k) each."""
+        raw = [
+            fit.slope[:, i]
+            for i, axis in enumerate(fit.axes)
+            if "." in axis.path
+            and shape_axes(self.effects[axis.path.rpartition(".")[0]])
+            and not _is_shape(axis)
+        ]
+        if not raw:
+            return []
+        s, w = self.cells.slip, np.log(self.cells.load)
+        s, w = s - s.mean(), w - w.mean()
+        plain = np.linalg.solve(self.covariance.whiten, np.stack(raw, axis=1))
+        return [self.covariance.whiten @ (plain * f[:, None]) for f in (s * s, s * w, w * w)]
+
     def loose_gain(self, candidate: Candidate) -> float:
         """By how much free shapes should lower the objective at most: linearised, no prior."""
         fit = candidate.strict
@@ -118,9 +165,13 @@ class Bench:
             return descend(case, axes, self.cells, self.covariance.whiten, begin)
 
 
+def _is_shape(axis: Axis) -> bool:
+    return axis.path.rpartition(".")[2] in SHAPE_STD
+
+
 def _small(axis: Axis) -> float:
     """Where a new coordinate starts: off zero, where some effects have no slope."""
-    if axis.path.rpartition(".")[2] in ("by_slip", "by_load"):
+    if _is_shape(axis):
         return 0.0
     return STARTS[0] if axis.upper > 0.0 else -STARTS[0]
 

@@ -182,7 +182,8 @@ def _climb(
         for k in range(channels):
             trials = [
                 (objective(_with(scale, k, s), tau), s)
-                for s in (scale[k] * f for f in (0.87, 1.0, 1.15, 1.32, 1.75))
+                for s in (1.0, *(scale[k] * f for f in (0.93, 1.0, 1.15, 1.32, 1.75)))
+                if s >= 1.0
             ]
             value, s = min(trials)
             scale = _with(scale, k, s)

@@ -14,7 +14,7 @@ from soilml.gap.fit import GapFit
 from soilml.gap.menu import CHECKS, cells_at, menu
 from soilml.gap.predict import linearised, predicted
 from soilml.gap.report import NextRun
-from soilml.gap.shrink import best, spread
+from soilml.gap.shrink import spread
 from soilml.operating import COVARIATES
 from soilml.quantities import column
 
@@ -32,7 +32,7 @@ def next_runs(bench: Bench, rivals: Sequence[Candidate]) -> list[NextRun]:
     """
     if len(rivals) < 2:
         return []
-    fits = {"+".join(c.names): best(c) for c in rivals[:5]}
+    fits = {"+".join(c.names): c.fit for c in rivals[:5]}
     names = list(fits)
     found = []
     for option in menu(bench.cells):

@@ -17,15 +17,16 @@ from soilml.gap.smooth import smooth_columns
 Floats = NDArray[np.float64]
 
 #: Family-wise level of the test for a gap.
-LEVEL = 0.05
+LEVEL = 0.03
 #: Level below which what a candidate leaves is no noise.
-ADEQUATE = 0.01
+ADEQUATE = 0.003
 #: Objective above the best one's at which a candidate is rejected.
-REJECTED = 6.0
+REJECTED = 9.0
 #: How much a further effect must lower the objective.
 EARNS = 12.0
-#: Candidates that are fitted in full, and effects that are added at most.
-FITTED = 7
+#: Candidates that are fitted in full: those whose predicted gain comes this close to the largest,
+#: and so many more; and effects that are added at most.
+CLOSE, FITTED = 15.0, 6
 MOST = 3
 #: The gain that free shapes are hoped for, in linearised gains: those fall short where sizes move.
 HOPE = 3.0
@@ -72,12 +73,15 @@ class Found:
 
 
 def left_by(bench: Bench, fit: GapFit, known: Sequence[Signature], seed: int) -> Left:
-    """Test what a fit leaves, with everything that it could move projected off."""
+    """Test what a fit leaves, with everything that it could move projected off.
+
+    Other laws of the effects that are there count as such: see `Bench.forms`.
+    """
     whiten = bench.covariance.whiten
     smooth = smooth_columns(bench.cells)
     columns = whiten @ np.column_stack([*[s.column for s in known], smooth])
     signs = np.asarray([s.sign for s in known] + [0] * smooth.shape[1], dtype=np.float64)
-    space = np.column_stack([fit.slope])
+    space = np.column_stack([fit.slope, *bench.forms(fit)])
     found = scores(fit.residual, columns, space, signs, bench.covariance.scatter.freedom, seed)
     return Left(tuple(s.name for s in known), found, found.worst)
 
@@ -164,14 +168,18 @@ def _loosened(bench: Bench, candidates: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _left(bench: Bench, candidate: Candidate, seed: int) -> Left:
-    fit = candidate.shaped
+    fit = candidate.fit
     known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
     return left_by(bench, fit, known, seed)
 
 
-def _promising(gains: dict[str, float]) -> list[str]:
-    ordered = sorted(gains, key=lambda name: -gains[name])
-    return [name for name in ordered if gains[name] > 4.0][:FITTED]
+def _promising(gains: Mapping[str, float]) -> list[str]:
+    """Effects worth a full fit, the most promising first."""
+    ordered = [n for n in sorted(gains, key=lambda name: -gains[name]) if gains[n] > 4.0]
+    if not ordered:
+        return []
+    close = [n for n in ordered if gains[n] > gains[ordered[0]] - CLOSE]
+    return ordered[: max(FITTED, len(close))]
 
 
 def _one_more(
@@ -183,10 +191,10 @@ def _one_more(
     """Sets of one effect more: the best few of this level, each with what its residuals ask for."""
     found: dict[tuple[str, ...], Candidate] = {}
     for candidate in sorted(level, key=lambda c: c.cost)[:3]:
-        fit = candidate.shaped
+        fit = candidate.fit
         known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
         gains = predicted_gains(bench, fit, known)
-        for name in _promising(gains)[:4]:
+        for name in _promising(gains)[:3]:
             names = tuple(sorted((*candidate.names, name)))
             if names not in found and names not in tried:
                 found[names] = bench.fit(names, starts.get(names, coordinates(candidate.strict)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.candidate import Bench, Candidate
+from soilml.gap.candidate import Bench
 from soilml.gap.cells import Cells
 from soilml.gap.covariance import Covariance, assembled, scatter_columns
 from soilml.gap.fit import GapFit, descend
@@ -115,17 +115,3 @@ def spread(bench: Bench, fit: GapFit, cells: Cells) -> Covariance:
     scale = np.asarray([own.scale[place[n]] if n in place else 1.0 for n in cells.channels])
     columns = scatter_columns(fit.fitted(), cells)
     return assembled(cells, columns, replace(own, scale=scale))
-
-
-def best(candidate: Candidate) -> GapFit:
-    """The fit that stands for a candidate: with shapes where they earn their place."""
-    return candidate.shaped if form_is_open(candidate) else candidate.strict
-
-
-#: How much free shapes must lower the objective before the catalogue's law is given up.
-FORM = 9.0
-
-
-def form_is_open(candidate: Candidate) -> bool:
-    """Whether the data ask for another law than the catalogue's."""
-    return candidate.strict.cost - candidate.shaped.cost > FORM

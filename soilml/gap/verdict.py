@@ -9,31 +9,40 @@ from numpy.typing import NDArray
 
 from soilml.gap.candidate import Bench, Candidate
 from soilml.gap.fit import GapFit
-from soilml.gap.report import NamedEffect, Value, Where
+from soilml.gap.report import NamedEffect, Shrink, Value, Where
 from soilml.gap.score import outside, scores
 from soilml.gap.search import Found
-from soilml.gap.shrink import best, form_is_open
 from soilml.gap.signatures import signatures
 from soilml.gap.smooth import places
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
+#: Squared prior spreads that a law may be bent by before it is another one.
+STRAINED = 6.0
+#: Share of the gap that may be left on runs that an explanation was not fitted to.
+CARRIES = 0.5
 #: Places on the map that are listed.
 LISTED = 12
 
 
-def status_of(found: Found, unnameable: Sequence[str]) -> str:
-    """What may be said, see `soilml.gap.report.STATUSES`."""
+def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> str:
+    """What may be said, see `soilml.gap.report.STATUSES`.
+
+    An explanation that leaves more than noise, that needs a law far from any known, or that does
+    not predict runs it was not fitted to, explains nothing.
+    """
     if not found.gap:
         return "no-gap"
     if unnameable:
         return "not-testable"
-    if not found.causes or not found.adequate:
+    if not found.causes or not found.adequate or found.causes[0].strain > STRAINED:
+        return "unknown"
+    if runs is not None and runs.after - 1.0 > CARRIES * (runs.before - 1.0) > 0.0:
         return "unknown"
     if len(found.causes) > 1:
         return "class"
-    return "form-open" if form_is_open(found.causes[0]) else "named"
+    return "form-open" if found.causes[0].open else "named"
 
 
 def values_of(fit: GapFit, *, soil: bool) -> dict[str, Value]:
@@ -51,7 +60,7 @@ def named(bench: Bench, soil: GapFit, causes: Sequence[Candidate]) -> list[Named
     if not causes:
         return []
     chosen = causes[0]
-    fit = best(chosen)
+    fit = chosen.fit
     parameters = values_of(fit, soil=False)
     found = []
     for name in chosen.names:
@@ -105,7 +114,7 @@ def mimicry(bench: Bench, found: Found) -> float:
     """Largest cosine between the best cause's signature and another's, soil projected off."""
     if not found.causes:
         return 0.0
-    fit = best(found.causes[0])
+    fit = found.causes[0].fit
     known, _ = signatures(found.soil.fitted(), bench.cells, bench.effects)
     columns = bench.covariance.whiten @ np.stack([s.column for s in known], axis=1)
     columns = outside(columns, fit.slope[:, : len(bench.soil)])

@@ -21,7 +21,7 @@ from soilml.gap.predict import predicted
 from soilml.gap.remainder import remainder
 from soilml.gap.report import Curves, GapReport, Shrink, Tried
 from soilml.gap.search import REJECTED
-from soilml.gap.shrink import best, held_out_region, held_out_runs, shrink, unseen
+from soilml.gap.shrink import held_out_region, held_out_runs, shrink, unseen
 from soilml.gap.signatures import signatures
 from soilml.gap.sound import Gate, examined, repeated_noise, without_repeats
 from soilml.gap.verdict import map_of, mimicry, named, status_of, values_of
@@ -114,11 +114,11 @@ def _reported(
     seed: int,
 ) -> GapReport:
     bench, found = analysis.bench, analysis.found
-    status = status_of(found, gate.unnameable)
-    after = best(found.causes[0]) if found.causes else found.soil
+    after = found.causes[0].fit if found.causes else found.soil
+    gaps = _gaps(analysis, after, beyond, what, seed)
+    status = status_of(found, gate.unnameable, gaps.get("held_out_runs"))
     named_effects = named(bench, found.soil, found.causes) if status != "unknown" else []
     _, cannot = signatures(found.soil.fitted(), bench.cells, bench.effects)
-    gaps = _gaps(analysis, after, beyond, what, seed)
     rivals = _rivals(found.causes, found.tried)
     report = GapReport(
         status=status,
