@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import fields, replace
+from typing import Any
 
 from soilml.arrays import Array, namespace, tracked, untracked
 from soilml.contact import Force, Stress, integrate, stress
@@ -18,20 +19,24 @@ from soilml.status import Status
 BALANCE = 1e-7
 #: A row that was not solved directly is looked at at this many sinkages.
 SCAN_POINTS = 32
+#: Shear that pulls the wheel down by less than this share of the load cannot hide an earlier rest.
+SMALL = 0.2
+#: Where it does more, the row is looked at at this many sinkages, up to this share of that found,
+#: and searched where the soil nearly carries the load there, or where the load carried rises with
+#: less than this power of sinkage about the one found, and a peak may lie close.
+LOOKS, DEEPEST_LOOK, NEARLY, GENTLE = 12, 0.9, 0.95, 0.4
 #: The search begins at this share of the deepest sinkage.
 SHALLOWEST = 1e-14
 
 
-def loaded(scene: Scene, sinkage: Array) -> Force:
+def loaded(scene: Scene, sinkage: Array, *, rough: bool = False) -> Force:
     """Forces on a gear that stands this deep (m) in the soil, whatever load that carries."""
     xp = namespace(sinkage)
-    gear, soil, at, effects = scene.gear, scene.soil, scene.at, scene.effects
-    shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
-    contact = gear.contact(shape, at)
-    stresses = through(effects, "on_stress", stress(contact, soil, at), scene)
+    soil = scene.soil
+    shape, stresses = _stressed(scene, sinkage, rough=rough)
     load, pull, torque = integrate(stresses)
-    flaw = gear.flaw(shape)
-    bearing = soil.kc / contact.width + soil.kphi + 0.0 * load
+    flaw = scene.gear.flaw(shape)
+    bearing = soil.kc / stresses.contact.width + soil.kphi + 0.0 * load
     status = xp.where((flaw == 0) & ~(bearing > 0), flaw + int(Status.NO_BEARING), flaw)
     force = Force(
         load=load,
@@ -41,7 +46,15 @@ def loaded(scene: Scene, sinkage: Array) -> Force:
         entry_angle=shape.entry,
         status=status,
     )
-    return through(effects, "on_force", force, scene)
+    return through(scene.effects, "on_force", force, scene)
+
+
+def _stressed(scene: Scene, sinkage: Array, *, rough: bool) -> tuple[Any, Stress]:
+    """The gear's shape this deep (m) in the soil, and the stresses on it."""
+    gear, soil, at, effects = scene.gear, scene.soil, scene.at, scene.effects
+    shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
+    contact = gear.rough(shape, at) if rough else gear.contact(shape, at)
+    return shape, through(effects, "on_stress", stress(contact, soil, at), scene)
 
 
 def settled(scene: Scene) -> Force:
@@ -85,13 +98,44 @@ def _carried(scene: Scene) -> Force:
     deepest = xp.log(gear.deepest() + 0.0 * at.load)
     guess = xp.log(gear.guess(soil, at))
     guess = xp.where(guess < deepest - 0.1, guess, deepest - 0.1)
-    found, force = _balanced(
+    found, force, slope = _balanced(
         scene, deepest + math.log(SHALLOWEST), deepest, guess, soil.n + 0.5 + 0.0 * at.load
     )
+    found = found & ~_reached_before(scene, force, slope)
     if not bool(xp.all(found)):
         index = xp.nonzero(~found)[0]
         force = _with_rows(force, found, _searched(rows(scene, index)))
     return force
+
+
+def _reached_before(scene: Scene, force: Force, slope: Array) -> Array:
+    """Rows that may carry the load at a smaller sinkage already, as a few points tell.
+
+    A driving wheel's shear lifts it everywhere in front of the axle, and its load only rises. A
+    braking wheel's pulls it down, and so does a driving wheel's behind the axle: without it the
+    load would be reached earlier, but hardly so where it is small.
+    """
+    xp = namespace(slope)
+    if not scene.effects and not bool(xp.any(scene.at.slip < 0)):
+        return xp.zeros_like(slope, dtype=xp.bool)
+    _, stresses = _stressed(scene, force.sinkage, rough=True)
+    lift = stresses.shear * stresses.contact.ahead
+    down = xp.sum(xp.maximum(-lift, xp.zeros_like(lift)), axis=0)
+    doubted = down > SMALL * scene.at.load
+    if any(hasattr(effect, "on_stress") for effect in scene.effects):
+        doubted = xp.ones_like(doubted)
+    if any(hasattr(effect, "on_force") for effect in scene.effects):
+        own = integrate(stresses)[0]
+        doubted = doubted | (loaded(scene, force.sinkage, rough=True).load != own)
+    index = xp.nonzero(doubted)[0]
+    looked, sinkage = rows(scene, index), force.sinkage[index]
+    most = xp.zeros_like(sinkage)
+    for i in range(LOOKS):
+        look = loaded(looked, sinkage * (DEEPEST_LOOK * ((i + 1) / LOOKS) ** 2), rough=True)
+        most = xp.maximum(most, look.load)
+    place = xp.clip(xp.cumulative_sum(xp.astype(doubted, xp.int64)) - 1, 0, None)
+    reached = xp.take(xp.concat([most, xp.zeros_like(slope[:1])]), place) > NEARLY * scene.at.load
+    return (slope < GENTLE) | (doubted & reached)
 
 
 def _differentiable(scene: Scene, force: Force) -> Force:
@@ -115,14 +159,14 @@ def _differentiable(scene: Scene, force: Force) -> Force:
 
 def _balanced(
     scene: Scene, low: Array, high: Array, guess: Array, steepness: Array
-) -> tuple[Array, Force]:
-    """Which rows have an equilibrium between two logs of sinkage, and the forces there."""
+) -> tuple[Array, Force, Array]:
+    """Which rows have an equilibrium between two logs of sinkage, the forces, the slope there."""
     xp = namespace(guess)
     excess = _excess(scene)
     root = crossing(excess, low, high, guess, steepness)
     force = loaded(scene, xp.exp(root.x))
     balanced = xp.abs(force.load / scene.at.load - 1.0) < BALANCE
-    return root.found & balanced & (root.slope > 0), force
+    return root.found & balanced & (root.slope > 0), force, root.slope
 
 
 def _excess(scene: Scene) -> Callable[[Array], Array]:
@@ -147,19 +191,19 @@ def _searched(scene: Scene) -> Force:
     excess = _excess(scene)
     steps = [3.0 * math.log((i + 1) / SCAN_POINTS) for i in range(SCAN_POINTS)]
     grid = xp.stack([deepest + step for step in [math.log(SHALLOWEST), *steps]], axis=0)
-    low, high, exists, highest = scan(excess, grid)
-    for _ in range(2):  # closer to a peak that stayed below the load
+    low, high, exists, peak = scan(excess, grid)
+    for _ in range(2):  # closer to a peak below the load, or within the interval found
         last = grid.shape[0] - 1
-        left = xp.take_along_axis(grid, xp.clip(highest - 1, 0, last)[None, :], axis=0)[0, :]
-        right = xp.take_along_axis(grid, xp.clip(highest + 1, 0, last)[None, :], axis=0)[0, :]
+        left = xp.take_along_axis(grid, xp.clip(peak - 1, 0, last)[None, :], axis=0)[0, :]
+        right = xp.take_along_axis(grid, xp.clip(peak + 1, 0, last)[None, :], axis=0)[0, :]
         grid = xp.stack([left + (right - left) * i / 16 for i in range(17)], axis=0)
-        low_near, high_near, near, highest = scan(excess, grid)
-        low = xp.where(exists, low, low_near)
-        high = xp.where(exists, high, high_near)
+        low_near, high_near, near, peak = scan(excess, grid)
+        first = near & (~exists | (low_near < high))
+        low, high = xp.where(first, low_near, low), xp.where(first, high_near, high)
         exists = exists | near
-    top = xp.take_along_axis(grid, highest[None, :], axis=0)[0, :]
+    top = xp.take_along_axis(grid, peak[None, :], axis=0)[0, :]
     low, high = xp.where(exists, low, top - 1e-3), xp.where(exists, high, top)
-    found, force = _balanced(scene, low, high, 0.5 * (low + high), 1.0 / (high - low))
+    found, force, _ = _balanced(scene, low, high, 0.5 * (low + high), 1.0 / (high - low))
     at_top = loaded(scene, xp.exp(top))
     status = xp.where(exists, int(Status.NOT_CONVERGED) + 0 * force.status, force.status)
     status = xp.where(exists, status, int(Status.TOO_HEAVY) + 0 * force.status)

@@ -5,6 +5,7 @@ Every element of a batch is its own scalar problem; all are stepped together.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -75,17 +76,25 @@ def crossing(
 
 
 def scan(f: Callable[[Array], Array], grid: Array) -> tuple[Array, Array, Array, Array]:
-    """First interval of `grid` in which `f` rises through zero: (lower, upper, exists, highest).
+    """First interval of `grid` in which `f` rises through zero: (lower, upper, exists, peak).
 
-    `grid` has shape (points, batch), rising along its first axis. `highest` is the index of the
-    largest value of `f`, for a caller who wants to look closer at a peak that stays below zero.
+    `grid` has shape (points, batch), rising along its first axis. `peak` is the index of the point
+    about which a caller may look closer for an earlier crossing between points: the highest before
+    the interval from which `f` falls again, without such a point the start of the interval, and
+    without an interval the highest of all.
     """
     xp = namespace(grid)
     y = xp.stack([f(grid[i, :]) for i in range(grid.shape[0])], axis=0)
     up = (y[1:, :] >= 0) & (y[:-1, :] < 0)
     exists = xp.any(up, axis=0)
     first = xp.argmax(xp.astype(up, xp.int64), axis=0)
-    highest = xp.argmax(y, axis=0)
+    falls = (y[1:-1, :] >= y[:-2, :]) & (y[1:-1, :] > y[2:, :])
+    inner = xp.arange(1, grid.shape[0] - 1, device=grid.device)[:, None]
+    before = falls & exists[None, :] & (inner < first[None, :])
+    least = xp.full_like(y[1:-1, :], -math.inf)
+    earlier = 1 + xp.argmax(xp.where(before, y[1:-1, :], least), axis=0)
+    peak = xp.where(exists, first, xp.argmax(y, axis=0))
+    peak = xp.where(xp.any(before, axis=0), earlier, peak)
     lower = xp.take_along_axis(grid, first[None, :], axis=0)[0, :]
     upper = xp.take_along_axis(grid, (first + 1)[None, :], axis=0)[0, :]
-    return lower, upper, exists, highest
+    return lower, upper, exists, peak

@@ -40,6 +40,10 @@ class Gear(Protocol):
         """The points along the contact, for integration."""
         ...
 
+    def rough(self, shape: Any, at: Operating) -> Contact:
+        """Fewer points, good for a few per cent of the load."""
+        ...
+
     def stations(self, shape: Any, at: Operating, points: int) -> tuple[Array, Contact]:
         """Points along the contact for looking at: their angles (points, batch), and themselves."""
         ...

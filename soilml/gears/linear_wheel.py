@@ -55,6 +55,10 @@ class LinearWheel(RigidWheel):
             width=shape.width,
         )
 
+    def rough(self, shape: Rim, at: Operating) -> Contact:
+        """The same two points."""
+        return self.contact(shape, at)
+
     def stations(self, shape: Rim, at: Operating, points: int) -> tuple[Array, Contact]:
         """Exit and maximum: the stresses are straight between them, and to nothing at entry."""
         xp = namespace(shape.entry)

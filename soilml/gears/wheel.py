@@ -8,7 +8,7 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.contact import Contact
-from soilml.gears.reversal import reversal
+from soilml.gears.reversal import reversals
 from soilml.gears.rim import NO_DEPTH, RigidWheel, Rim
 from soilml.operating import Operating
 from soilml.quadrature import Nodes, crowded_ends, crowded_start
@@ -17,6 +17,8 @@ from soilml.quadrature import Nodes, crowded_ends, crowded_start
 #: quadrature.
 DRIVING_NODES = 16
 BRAKING_NODES = 24
+#: Enough for a few per cent, to see whether the load was nearly reached.
+ROUGH_NODES = 5
 
 
 @final
@@ -33,8 +35,8 @@ class Wheel(RigidWheel):
 
     References: Wong and Reece, J. Terramechanics 4(1), 1967; the same set in Nagatani et al. 2009,
     eqs. 3-10. Holds for a rim that does not deform, straight travel, sinkage up to the hub, and
-    wheels large against the soil's grains; below about half a metre of diameter the measured
-    stress is narrower and further forward (Nagatani et al. 2009, section IV).
+    wheels large against the soil's grains. Under the one wheel that Nagatani et al. measured, of
+    0.11 m diameter, the stress is narrower and further forward (section IV).
     """
 
     name: ClassVar[str] = "wheel"
@@ -44,7 +46,11 @@ class Wheel(RigidWheel):
         xp = namespace(shape.entry)
         if bool(xp.any(at.slip < 0)):
             return _braking(shape, at)
-        return _driving(shape, at)
+        return _halves(shape, at, DRIVING_NODES)
+
+    def rough(self, shape: Rim, at: Operating) -> Contact:
+        """Few points whichever way the wheel slips."""
+        return _halves(shape, at, ROUGH_NODES)
 
     def stations(self, shape: Rim, at: Operating, points: int) -> tuple[Array, Contact]:
         """Evenly spaced from entry to exit; they stand for no area."""
@@ -60,10 +66,10 @@ class Wheel(RigidWheel):
         )
 
 
-def _driving(rim: Rim, at: Operating) -> Contact:
+def _halves(rim: Rim, at: Operating, count: int) -> Contact:
     """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
     xp = namespace(rim.entry)
-    x, weight = _columns(crowded_start(DRIVING_NODES), rim.entry)
+    x, weight = _columns(crowded_start(count), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
     passed = xp.concat([x * front, (rim.entry - rim.exit) - x * rear], axis=0)
     depth = depth_along(rim, x * front)  # nodes stand alike in both parts: the same pressures
@@ -72,14 +78,21 @@ def _driving(rim: Rim, at: Operating) -> Contact:
 
 
 def _braking(rim: Rim, at: Operating) -> Contact:
-    """Three parts: shear displacement may change its direction, and the shear curve bends there."""
+    """Parts that end where shear displacement changes its direction and the shear curve bends.
+
+    Three of them, or four where the rim reaches behind the axle and it may do so twice.
+    """
     xp = namespace(rim.entry)
     x, weight = _columns(crowded_ends(BRAKING_NODES), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
+    turn, turns = reversals(rim.entry, rim.exit, at.slip)
     halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
-    turn, turns = reversal(rim.entry, rim.exit, at.slip)
-    inner = xp.where(turns, turn, halfway)
-    ends = [rim.exit, xp.minimum(rim.peak, inner), xp.maximum(rim.peak, inner), rim.entry]
+    inner = [rim.peak, xp.where(turns[0, :], turn[0, :], halfway)]
+    if bool(xp.any(turns[1, :])):
+        below = 0.5 * (rim.exit + xp.minimum(*inner))
+        inner.append(xp.where(turns[1, :], turn[1, :], below))
+    between = xp.sort(xp.stack(inner, axis=0), axis=0)
+    ends = [rim.exit, *(between[i, :] for i in range(len(inner))), rim.entry]
     passed, mapped, arc = [], [], []
     for low, high in pairwise(ends):
         length = high - low

@@ -34,8 +34,16 @@ def test_says_so_where_there_is_no_root_and_ends_at_the_upper_bound():
 
 def test_scan_takes_the_first_of_several_crossings():
     grid = np.linspace(0.1, 9.0, 200)[:, None]
-    low, high, exists, highest = scan(lambda x: np.sin(x) - 0.5, grid)
+    low, high, exists, _ = scan(lambda x: np.sin(x) - 0.5, grid)
     assert exists.all()
     assert low[0] < np.pi / 6 <= high[0]
-    assert abs(grid[highest[0], 0] - np.pi / 2) < 0.05
-    assert not scan(lambda x: np.sin(x) - 1.5, grid)[2].any()
+    _, _, exists, peak = scan(lambda x: np.sin(x) - 1.5, grid)
+    assert not exists.any()
+    assert abs(np.sin(grid[peak[0], 0]) - 1.0) < 1e-3
+
+
+def test_scan_points_to_a_peak_before_the_crossing():
+    grid = np.linspace(0.1, 9.0, 200)[:, None]
+    low, _, exists, peak = scan(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
+    assert exists.all() and low[0] > 6.0
+    assert abs(grid[peak[0], 0] - np.pi / 2) < 0.2

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from conftest import input_box, solved
-from reference import equilibrium, forces, stresses
+from reference import equilibrium, forces, stresses, turning_points
 
 from soilml import ExitAngle, LinearWheel, Model, Operating, Soil, Status, Wheel, soil
+from soilml.gears.reversal import reversals
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
@@ -97,6 +98,67 @@ def test_a_braking_wheel_rests_at_the_first_depth_that_carries_it():
         row = {name: values[i] for name, values in box.items()}
         shallower = np.linspace(0.02, 0.999, 60) * force.entry_angle[i]
         assert all(forces(t, row)[0] < row["load"] for t in shallower)
+
+
+SHALLOW = [  # radius, width, c, phi, K, kc, kphi, n, slip, load; first rest, m
+    (0.132, 0.2, 4740, 0.384, 0.0029, 283, 200700, 1.165, -0.0835, 10.59, 0.02372),
+    (0.1881, 0.2425, 2458, 0.2759, 0.005924, 1142, 68130, 1.289, -0.2171, 10.25, 0.04573),
+    (0.20922514, 0.38138873, 3038.31, 0.4060822, 0.00284310443, 30767.961, 61492.867, 1.51986868,
+     -0.47842663, 21.615, 0.09319),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SHALLOW)
+def test_a_braking_wheel_rests_at_the_first_of_several_depths(case):
+    radius, width, c, phi, K, kc, kphi, n, slip, load, first = case
+    ground = Soil(cohesion=c, friction_angle=phi, shear_modulus=K, kc=kc, kphi=kphi, n=n)
+    force = Model(Wheel(radius=radius, width=width))(ground, Operating(slip=slip, load=load))
+    assert force.status == Status.OK
+    assert force.sinkage == pytest.approx(first, rel=5e-4)
+    row = {"radius": radius, "width": width, "slip": slip}
+    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    assert forces(float(force.entry_angle), row)[0] == pytest.approx(load, rel=1e-7)
+    assert max(forces(t, row)[0] for t in np.linspace(0.1, 0.99, 20) * force.entry_angle) < load
+    deeper = [forces(t, row)[0] for t in np.linspace(force.entry_angle, np.pi / 2, 30)]
+    assert min(deeper) < load < deeper[-1]  # there is another further down
+
+
+TWICE = [  # radius, width, c, phi, K, kc, kphi, n, slip, load, kappa
+    (0.2649, 0.2286, 4552.0, 0.3675, 0.005238, 1094.0, 267500.0, 1.495, -0.0468, 40.82, 0.793),
+    (0.1669, 0.2375, 1653.7, 0.75319, 0.010844, 0.0, 326000.0, 1.289, -0.2662, 553.64, 0.97),
+]
+
+
+@pytest.mark.parametrize("case", TWICE)
+def test_shear_that_turns_behind_the_axle_agrees_with_adaptive_quadrature(case):
+    radius, width, c, phi, K, kc, kphi, n, slip, load, kappa = case
+    ground = Soil(cohesion=c, friction_angle=phi, shear_modulus=K, kc=kc, kphi=kphi, n=n)
+    model = Model(Wheel(radius=radius, width=width)) + ExitAngle(kappa=kappa)
+    force = model(ground, Operating(slip=slip, load=load))
+    entry = float(force.entry_angle)
+    leave = -float(np.arccos(1.0 - kappa * force.sinkage / radius))
+    assert len([t for t in turning_points(entry, leave, slip) if entry - t > 1e-6]) == 2
+    row = {"radius": radius, "width": width, "slip": slip}
+    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    carried, pull, torque = forces(entry, row, leave)
+    assert carried == pytest.approx(load, rel=1e-7)
+    assert force.torque == pytest.approx(torque, rel=1e-7)
+    assert abs(force.drawbar_pull - pull) < 1e-7 * load
+
+
+def test_all_angles_at_which_displacement_vanishes_are_found():
+    rng = np.random.default_rng(0)
+    slip = -np.exp(rng.uniform(np.log(1e-3), np.log(0.95), 400))
+    turning = np.arccos(1.0 / (1.0 - slip))
+    entry = np.minimum(turning * rng.uniform(0.3, 2.2, 400), np.pi / 2)
+    leave = -entry * rng.random(400)
+    angle, there = reversals(entry, leave, slip)
+    assert there.sum(axis=0).max() == 2
+    for i in range(400):
+        expected = [t for t in turning_points(entry[i], leave[i], slip[i]) if entry[i] - t > 1e-6]
+        np.testing.assert_allclose(np.sort(angle[there[:, i], i]), expected, atol=1e-9)
 
 
 def test_a_place_of_maximum_stress_outside_the_contact_is_a_reason():
