@@ -21,6 +21,11 @@ HARDLY = 0.5
 TRADE_OFF = 0.95
 
 
+def pinned(u: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which fractions of priors stand at one of their ends."""
+    return np.asarray(np.minimum(u, 1.0 - u) < 1e-3)
+
+
 def caveats(
     fit: Fit,
     case: Case,
@@ -42,7 +47,7 @@ def caveats(
             said.append(f"{f.path} is not identified: the rows leave {left:.0%} of its prior")
         elif left > HARDLY:
             said.append(f"{f.path} is hardly identified: the rows leave {left:.0%} of its prior")
-        if min(u[i], 1.0 - u[i]) < 1e-3:
+        if pinned(u)[i]:
             end = "lower" if u[i] < 0.5 else "upper"
             said.append(f"{f.path} stands at the {end} end of its prior: the prior holds it there")
         if f.assumed:
@@ -51,7 +56,8 @@ def caveats(
     if one_load and "cohesion" in fit.names and fit.left["cohesion"] <= HARDLY:
         said.append("one load only: cohesion rests on the change with slip alone")
     if data.cells < len(free):
-        said.append(f"{data.cells} readings for {len(free)} parameters: the prior decides the rest")
+        count = "1 reading" if data.cells == 1 else f"{data.cells} readings"
+        said.append(f"{count} for {len(free)} parameters: the prior decides the rest")
     said += _trade_offs(fit)
     if surplus:
         said.append(

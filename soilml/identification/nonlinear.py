@@ -10,11 +10,18 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.errors import FitError, MissingLibraryError
-from soilml.identification.caveats import caveats
+from soilml.identification.caveats import caveats, pinned
 from soilml.identification.fit import Fit
 from soilml.identification.free import Free
 from soilml.identification.measured import Measured
-from soilml.identification.prediction import input_noise, linearised, predicted, readings, stacked
+from soilml.identification.prediction import (
+    declared_at,
+    input_noise,
+    linearised,
+    predicted,
+    readings,
+    stacked,
+)
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -49,10 +56,15 @@ def nonlinear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     .. math:: \min_\theta \sum_i \left(\frac{y_i - f(s_i, W_i; \theta)}{\sigma_i}\right)^2
 
     over the priors' ranges, with noise of slip and load carried into sigma (effective variance).
+    Noise that is a share is taken of the prediction: of the reading it would draw the fit low, by
+    about twice its square, since readings that err low would count for more.
     The covariance is that of the linearised problem together with the prior, and the distance
     from the optimum to where the prior would draw it is added: a parameter that the rows do not
-    determine keeps an honest width. References: Bard, Nonlinear Parameter Estimation, 1974; Orear,
-    Am. J. Phys. 50(10), 1982 (effective variance).
+    determine keeps an honest width. Where the optimum stands at an end of a prior, values as good
+    lie along a valley that bends away from it: covariance and distance are then also taken where
+    the prior, as a Gaussian of its width, draws the optimum itself, and the wider std holds.
+    References: Bard, Nonlinear Parameter Estimation, 1974; Orear, Am. J. Phys. 50(10), 1982
+    (effective variance).
     """
     undeclared = [c for c in data.channels if not c.declared]
     if undeclared and data.cells <= len(free):
@@ -65,14 +77,24 @@ def nonlinear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     best = _best(case, data, free, reading, std, nominal)
     for _ in range(3 if undeclared else 1):
+        declared = declared_at(case, data, free, best.u)
         total = np.hypot(declared, input_noise(case, data, free, best.u))
         std = np.where(np.isfinite(total), total, _estimated(data, reading, best, std, len(free)))
         best = _descended(case, data, free, reading, std, best.u)
-    return _finished(case, data, free, best, undeclared=bool(undeclared))
+    centre = best
+    if np.any(pinned(best.u)):
+        centre = _descended(case, data, free, reading, std, best.u, UNIFORM)
+    return _finished(case, data, free, best, centre, undeclared=bool(undeclared))
 
 
 def _finished(
-    case: Case, data: Measured, free: Sequence[Free], best: _Optimum, *, undeclared: bool
+    case: Case,
+    data: Measured,
+    free: Sequence[Free],
+    best: _Optimum,
+    centre: _Optimum,
+    *,
+    undeclared: bool,
 ) -> Fit:
     p, cells = len(free), len(best.residual)
     freedom = cells - p
@@ -85,8 +107,10 @@ def _finished(
     inverse = np.linalg.inv(best.slope.T @ best.slope / scale + UNIFORM * np.eye(p))
     pulled = inverse @ (UNIFORM * (0.5 - best.u))
     spread = np.sqrt(np.diag(inverse))
-    total = inverse * np.outer(np.hypot(spread, pulled), np.hypot(spread, pulled))
-    total /= np.outer(spread, spread)
+    bent = np.linalg.inv(centre.slope.T @ centre.slope / scale + UNIFORM * np.eye(p))
+    beside = np.hypot(np.sqrt(np.diag(bent)), centre.u - best.u)
+    wide = np.maximum(np.hypot(spread, pulled), beside)
+    total = inverse * np.outer(wide / spread, wide / spread)
     rate = np.asarray([float(f.prior.rate(best.u[i : i + 1])[0]) for i, f in enumerate(free)])
     fit = Fit(
         method="nonlinear",
@@ -135,8 +159,15 @@ def _best(
 
 
 def _descended(
-    case: Case, data: Measured, free: Sequence[Free], reading: Floats, std: Floats, start: Floats
+    case: Case,
+    data: Measured,
+    free: Sequence[Free],
+    reading: Floats,
+    std: Floats,
+    start: Floats,
+    draw: float = 0.0,
 ) -> _Optimum:
+    """The optimum below a start; with the precision `draw` of a prior that draws to its middle."""
     from scipy.optimize import least_squares
 
     last: dict[bytes, tuple[Floats, Floats]] = {}
@@ -150,10 +181,11 @@ def _descended(
             last[key] = residual, np.nan_to_num(slope / std[:, None])
         return last[key]
 
+    pull = np.sqrt(draw)
     found = least_squares(
-        lambda u: around(u)[0],
+        lambda u: np.append(around(u)[0], pull * (u - 0.5)),
         np.clip(start, 1e-6, 1.0 - 1e-6),
-        jac=lambda u: around(u)[1],
+        jac=lambda u: np.vstack([around(u)[1], pull * np.eye(len(u))]),
         bounds=(0.0, 1.0),
         ftol=1e-10,
         xtol=1e-9,

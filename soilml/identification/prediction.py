@@ -11,6 +11,7 @@ from soilml.case import Case
 from soilml.identification.free import Free
 from soilml.identification.measured import Measured
 from soilml.operating import Operating
+from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +46,23 @@ def readings(data: Measured) -> tuple[Floats, Floats]:
     reading = [c.reading[k] for c, k in zip(data.channels, kept, strict=True)]
     std = [c.std[k] for c, k in zip(data.channels, kept, strict=True)]
     return np.concatenate(reading), np.concatenate(std)
+
+
+def declared_at(case: Case, data: Measured, free: Sequence[Free], u: Floats) -> Floats:
+    """Declared standard deviations (cells,), those of [noise] taken at the predictions at `u`.
+
+    Those that the table gives stay, and so do those of readings for which nothing is predicted.
+    """
+    y = predicted(case, free, u[None, :], data.slip, data.load)
+    parts = []
+    for c in data.channels:
+        kept, noise = np.isfinite(c.reading), case.noise.get(column(c.name))
+        std = c.std[kept]
+        if noise is not None:
+            expected = noise.std(y[c.name][0, kept])
+            std = np.where((std == noise.std(c.reading[kept])) & (expected > 0), expected, std)
+        parts.append(std)
+    return np.concatenate(parts)
 
 
 def linearised(

@@ -68,9 +68,46 @@ def test_one_load_does_not_identify_cohesion_and_says_so(case):
     assert (np.mean(inside, axis=0) > 0.78).all()
 
 
+def test_the_std_holds_where_the_prior_holds_another_parameter(case):
+    """The equally good values lie along a valley that bends away from the end of the prior."""
+    rng = np.random.default_rng(11)
+    slip, load = np.full(3, 0.3), np.asarray([40.0, 70.0, 110.0])
+    far = []
+    for k in range(80):
+        truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
+        fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
+        far.append(np.abs(fit.values - list(truth.values())) / fit.std)
+    assert np.max(far) < 3.0
+    assert (np.mean(np.less(far, 2.0), axis=0) > 0.93).all()
+
+
+def test_a_share_of_noise_does_not_draw_the_fit_low(case):
+    rng = np.random.default_rng(3)
+    slip, load = rng.uniform(0.1, 0.6, 1000), rng.uniform(40.0, 110.0, 1000)
+    noisy = replace(case, noise={"torque_Nm": Noise(share=0.1)}).with_values(TRUTH)
+    bias = []
+    for seed in range(3):
+        fit = identify(
+            noisy, measured(case, TRUTH, slip, load, noise=0.1, seed=seed), ["friction_angle"]
+        )
+        found, true = noisy.with_values({"friction_angle": fit["friction_angle"]}), noisy
+        at = Operating(slip=slip, load=load)
+        bias.append((found.model(found.soil, at).torque / true.model(true.soil, at).torque).mean())
+    assert abs(np.mean(bias) - 1.0) < 0.006  # 0.1 / sqrt(3000) is 0.002; of readings: -0.02
+
+
+def test_a_std_given_in_the_table_stands(case):
+    table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
+    table.columns["torque_Nm_std"] = 0.1 * table["torque_Nm"]
+    assert (
+        identify(case, table).std
+        > 1.3 * identify(case, measured(case, TRUTH, SLIPS, LOADS, noise=0.02)).std
+    ).any()
+
+
 def test_a_single_row_leaves_the_prior_and_says_so(case):
     fit = identify(case, measured(case, TRUTH, SLIPS[:1], LOADS[:1], noise=0.02))
-    assert any("prior decides the rest" in said for said in fit.warnings)
+    assert "1 reading for 3 parameters: the prior decides the rest" in fit.warnings
     assert fit.left["cohesion"] > 0.8
     assert fit.std[0] > 500.0
 
