@@ -43,7 +43,8 @@ class Force:
     """What a running gear feels; arrays of the batch's shape.
 
     A row whose `status` is not 0 has no equilibrium: its torque, drawbar pull, sinkage and entry
-    angle are NaN, and its `load` is the largest that the soil carried.
+    angle are NaN. Its `load` is the largest that the soil carried where it is TOO_HEAVY, and means
+    nothing otherwise.
     """
 
     load: Array  # N, vertical load carried

@@ -25,9 +25,10 @@ class Bulldozing(Shaped):
         K_\gamma = \left(\frac{2 N_\gamma}{\tan\varphi'} + 1\right) \cos^2\varphi', \quad
         \tan\varphi' = \tfrac23 \tan\varphi
 
-    with the bearing capacity factors N_c of Terzaghi and N_gamma of Vesic. References: Bekker 1969
-    and Wong, Theory of Ground Vehicles, chapter 2, eqs. for bulldozing resistance in local shear
-    failure. `share` scales it: 1 is the formula. It pulls back whichever way the wheel slips.
+    with the bearing capacity factors N_q and N_c of Prandtl and Reissner and N_gamma of Vesic.
+    References: Bekker 1969 and Wong, Theory of Ground Vehicles, chapter 2, eqs. for bulldozing
+    resistance in local shear failure. `share` scales it: 1 is the formula. It pulls back whichever
+    way the wheel slips.
     """
 
     name: ClassVar[str] = "bulldozing"

@@ -175,6 +175,15 @@ def test_a_row_is_answered_alike_alone_and_among_others(name):
             )
 
 
+def test_the_two_forms_of_the_exit_angle_exclude_each_other():
+    exit_angle = EFFECTS["exit-angle"]
+    with pytest.raises(InputError, match="kappa or b0"):
+        exit_angle(kappa=0.1, b0=-0.1)
+    with pytest.raises(InputError, match="kappa or b0"):
+        exit_angle(kappa=np.asarray([0.0, 0.2]), b0=np.asarray([0.0, -0.1]))
+    exit_angle(kappa=np.asarray([0.0, 0.2]), b0=np.asarray([-0.1, 0.0]))
+
+
 def test_an_effect_can_stand_in_a_model_once():
     with pytest.raises(InputError, match="already"):
         _ = WHEEL + EFFECTS["slip-sinkage"]() + EFFECTS["slip-sinkage"]()
