@@ -5,13 +5,17 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 from soilml import __version__
 from soilml.errors import SoilmlError
+from soilml.saving import check_apart
 
 DESCRIPTION = """\
 What soil does the rover drive on? From slip, torque and load to cohesion, friction angle and
@@ -38,6 +42,10 @@ ORDER = (
 _NEGATIVE = re.compile(r"-[\d.]")
 
 
+class _Stopped(SystemExit):
+    """A signal asked to stop."""
+
+
 class _Parser(argparse.ArgumentParser):
     """Says in one line what is wrong and where help is."""
 
@@ -61,25 +69,99 @@ def parser() -> argparse.ArgumentParser:
             formatter_class=layout,
         )
         module.add(sub)
-        sub.set_defaults(run=module.run)
+        sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", _no_outputs))
     return root
 
 
+def _no_outputs(args: argparse.Namespace) -> list[Any]:
+    return []
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; 0 when it ran, 2 with one line on standard error for bad input."""
+    """Run one command; 0 when it ran, 2 with one line on standard error for bad input.
+
+    A signal that asks to stop ends it with 128 and the signal's number, and nothing half-written.
+    """
+    _hold_descriptors()
     given = _joined(list(sys.argv[1:] if arguments is None else arguments))
     args = parser().parse_args(given)
     try:
-        return int(args.run(args) or 0)
+        with _stoppable():
+            check_apart(args.outputs(args), _files(args))
+            status = int(args.run(args) or 0)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+            return status
     except SoilmlError as error:
-        print(f"soilml: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("soilml: interrupted; nothing half-written was left", file=sys.stderr)
-        return 130
+        return _said(str(error), 2)
+    except (KeyboardInterrupt, _Stopped) as stop:
+        code = stop.code if isinstance(stop, _Stopped) else 128 + signal.SIGINT
+        return _said("interrupted; nothing half-written was left", int(code or 0))
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence_output()
         return 0
+    except OSError as error:
+        if error.filename is None:
+            _silence_output()
+        what = error.filename or "standard output"
+        return _said(f"{what} cannot be read or written: {error.strerror or error}", 2)
+    except UnicodeEncodeError as error:
+        odd = error.object[error.start : error.end]
+        hint = "set PYTHONIOENCODING=utf-8, or give --out"
+        return _said(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
+    except MemoryError:
+        return _said("the memory of this machine is too small for it: ask for fewer rows", 2)
+
+
+def _said(text: str, status: int) -> int:
+    """Say one line on standard error; the status."""
+    print(f"soilml: {' '.join(text.split())}", file=sys.stderr)
+    return status
+
+
+def _hold_descriptors() -> None:
+    """Take the numbers of closed standard streams, so that no file gets what is said to them."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
+        pass
+    os.close(descriptor)
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(2, "w", closefd=False)  # print(file=None) would go to the output
+
+
+def _silence_output() -> None:
+    """Let nothing more go to a standard output that takes nothing, not even what waits in it."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _files(args: argparse.Namespace) -> list[str]:
+    """Every argument that may name a file to read."""
+    given = (v if isinstance(v, list) else [v] for k, v in vars(args).items() if k != "out")
+    return [value for values in given for value in values if isinstance(value, str)]
+
+
+@contextmanager
+def _stoppable() -> Iterator[None]:
+    """Inside, the signals that end a process raise, so that what was begun is cleared away."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: Any) -> NoReturn:
+        signal.signal(number, signal.SIG_IGN)
+        raise _Stopped(128 + number)
+
+    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
+    before = {n: signal.getsignal(n) for n in numbers if n is not None}
+    for number, handler in before.items():
+        if handler is signal.SIG_DFL:
+            signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is signal.SIG_DFL:
+                signal.signal(number, handler)
 
 
 def _joined(words: list[str]) -> list[str]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
-from soilml.errors import InputError
+from soilml.saving import named
 
 HELP = "synthetic measurements from a recipe, as Parquet"
 DESCRIPTION = """\
@@ -32,6 +33,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="instead of the recipe's")
 
 
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".parquet")
+
+
 def run(args: argparse.Namespace) -> int:
     """Generate the file."""
     from soilml.needs import need
@@ -41,8 +47,6 @@ def run(args: argparse.Namespace) -> int:
     from datagen.progress import bar
     from datagen.recipe import read_recipe
 
-    if not args.out.endswith(".parquet"):
-        raise InputError(f"{args.out}: the output is a Parquet file, name it ....parquet")
     recipe = read_recipe(args.recipe).sized(args.rows, args.seed)
     with bar("simulating", recipe.rows) as progress:
         made = generate(recipe, args.out, progress)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from soilml.needs import need
 from soilml.onboard import LEAST_SOUND, Estimator
 from soilml.quantities import QUANTITIES, column
 from soilml.reading import RUNS
+from soilml.saving import named
 from soilml.table import Table
 
 #: Share of the prior's width above which an estimate is mostly the prior.
@@ -46,6 +48,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--by", metavar="run", help="one estimate for each value of this column")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the estimates")
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".csv")
 
 
 def run(args: argparse.Namespace) -> int:

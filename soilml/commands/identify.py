@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from soilml.case import read_case
 from soilml.identification.fit import Fit
 from soilml.needs import need
 from soilml.reading import RUNS, read_table
-from soilml.saving import save_text
+from soilml.saving import named, save_text
 from soilml.writing import aligned
 
 HELP = "soil parameters from measured rows, by least squares on a model"
@@ -49,6 +50,11 @@ def add_row_options(parser: argparse.ArgumentParser) -> None:
     """Options that choose rows and forgive columns."""
     parser.add_argument("--where", metavar="COLUMN=VALUE", help="take these rows alone")
     parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".json")
 
 
 def run(args: argparse.Namespace) -> int:

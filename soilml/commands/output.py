@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,22 +12,27 @@ from soilml.errors import InputError
 from soilml.saving import save_text
 from soilml.writing import aligned, csv_text
 
-#: Endings that would promise something else than is written.
-NOT_CSV = (".parquet", ".json", ".toml", ".onnx", ".xlsx")
-
 
 def deliver(columns: Mapping[str, Any], out: str | None) -> None:
     """Write the columns to `out`; without one, print them."""
     if out is not None:
-        if Path(out).suffix in NOT_CSV:
-            raise InputError(f"{out}: the output is a CSV file, name it ....csv")
         save_text(out, csv_text(columns))
         count = len(next(iter(columns.values())))
         print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
-    elif sys.stdout.isatty():
-        print(for_people(columns))
     else:
-        sys.stdout.write(csv_text(columns))
+        put(f"{for_people(columns)}\n" if watched() else csv_text(columns))
+
+
+def watched() -> bool:
+    """Whether a person looks at standard output."""
+    return sys.stdout is not None and sys.stdout.isatty()
+
+
+def put(text: str) -> None:
+    """Write an answer to standard output; raises `InputError` where that is closed."""
+    if sys.stdout is None:
+        raise InputError("standard output is closed: open it, or give --out where there is one")
+    sys.stdout.write(text)
 
 
 def for_people(columns: Mapping[str, Any]) -> str:

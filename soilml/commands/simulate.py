@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,11 @@ from soilml.case import read_case
 from soilml.commands.output import deliver
 from soilml.errors import InputError
 from soilml.operating import Operating
+from soilml.saving import named
 from soilml.status import Status
+
+#: Rows beyond which the table would not fit into the memory of a small machine.
+MOST_ROWS = 10_000_000
 
 HELP = "forces and sinkage over slip and load, from a model"
 DESCRIPTION = """\
@@ -38,10 +43,20 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
 
 
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".csv")
+
+
 def run(args: argparse.Namespace) -> int:
     """Simulate and deliver the table."""
     case = read_case(args.model)
     slips, loads = numbers("--slip", args.slip), numbers("--load", args.load)
+    if slips.size * loads.size > MOST_ROWS:
+        raise InputError(
+            f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "
+            f"at most {MOST_ROWS} are simulated at once"
+        )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     force = case.model(case.soil, Operating(slip=slip, load=load))
     failed = int(np.count_nonzero(force.status))
@@ -73,11 +88,16 @@ def numbers(option: str, text: str) -> NDArray[np.float64]:
     try:
         if ":" in text:
             start, stop, count = text.split(":")
+            if int(count) > MOST_ROWS:
+                raise InputError(f"{option} is {text!r}; at most {MOST_ROWS} values are taken")
             found = np.linspace(float(start), float(stop), int(count)).round(12)
         else:
             found = np.asarray([float(part) for part in text.split(",")])
+    except InputError:
+        raise
     except ValueError:
         found = np.zeros(0)
     if found.size == 0 or not np.all(np.isfinite(found)):
-        raise InputError(f"{option} is {text!r}; needed is start:stop:count or values with commas")
+        shown = text if len(text) <= 80 else f"{text[:80]}..."
+        raise InputError(f"{option} is {shown!r}; needed is start:stop:count or values with commas")
     return found

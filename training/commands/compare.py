@@ -8,6 +8,10 @@ from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.needs import need
+from soilml.saving import made_folder, replacing_all
+
+#: What goes into the folder.
+FILES = ("compare.csv", "compare.png", "compare.md")
 
 HELP = "models against analytic identification and the prior, on the same data"
 DESCRIPTION = """\
@@ -28,8 +32,24 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", metavar="MODEL.onnx", nargs="+")
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for table and picture")
     parser.add_argument(
-        "--analytic-sets", type=int, default=None, help="sets of a size for analytic methods"
+        "--analytic-sets",
+        type=_sets,
+        default=120,
+        help="sets of a size for analytic methods",
     )
+
+
+def _sets(text: str) -> int:
+    """A number of sets; raises `ArgumentTypeError` for none."""
+    if not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
+    return int(text)
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes, where their folder is there already."""
+    folder = Path(args.out)
+    return [folder / name for name in FILES] if folder.is_dir() else []
 
 
 def run(args: argparse.Namespace) -> int:
@@ -39,10 +59,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.case import read_case
     from soilml.onboard import Estimator
     from soilml.reading import read_table
-    from soilml.saving import save_text
     from soilml.writing import csv_text
     from training import comparison_report as report
-    from training.compare import ANALYTIC_SETS, compare, same_wheel
+    from training.compare import compare, same_wheel
 
     case = read_case(args.model)
     table = read_table(args.test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
@@ -51,16 +70,13 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("two model files have the same name: rename one, names label the lines")
     names = next(iter(estimators.values())).names
     same_wheel(case, table, estimators)
-    with stages() as progress:
-        lines = compare(case, table, estimators, progress, args.analytic_sets or ANALYTIC_SETS)
-    folder = Path(args.out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror}") from None
-    save_text(folder / "compare.csv", csv_text(report.columns(lines, names)))
-    report.draw(lines, names, folder / "compare.png")
-    save_text(folder / "compare.md", report.page(lines, names, Path(args.test).name))
+    with made_folder(args.out) as folder:
+        with stages() as progress:
+            lines = compare(case, table, estimators, progress, args.analytic_sets)
+        with replacing_all([folder / name for name in FILES]) as (rows, picture, page):
+            rows.write_text(csv_text(report.columns(lines, names)), encoding="utf-8")
+            report.draw(lines, names, picture)
+            page.write_text(report.page(lines, names, Path(args.test).name), encoding="utf-8")
     print(report.table(lines, names))
     print(f"\n{folder}/compare.md, compare.csv, compare.png", file=sys.stderr)
     return 0

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.errors import InputError
 from soilml.needs import need
+from soilml.saving import named, replacing_all
 
 HELP = "fit regressors to data and export one ONNX file"
 DESCRIPTION = """\
@@ -39,11 +39,15 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT.onnx")
 
 
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".onnx", ".md", ".png")
+
+
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
     from datagen.progress import stages
-    from soilml.saving import save_text
     from soilml.writing import aligned
     from training.card import card
     from training.curves import draw_curves
@@ -53,20 +57,17 @@ def run(args: argparse.Namespace) -> int:
     from training.train import train
 
     out = Path(args.out)
-    if out.suffix != ".onnx":
-        raise InputError(f"{out}: the output is an ONNX file, name it ....onnx")
-    if not out.parent.is_dir():
-        raise InputError(f"{out}: there is no folder {out.parent}; create it first")
     spec = read_spec(args.spec)
     data = read_dataset(args.data, spec.features, spec.targets)
     with stages() as progress:
         trained = train(spec, data, progress)
         progress("exporting", 0, 2)
-        metadata = export(trained, out, args.data)
-        progress("exporting", 1, 2)
-        draw_curves(trained, out.with_suffix(".png"))
+        with replacing_all(outputs(args)) as (model, page, picture):
+            metadata = export(trained, model, args.data)
+            progress("exporting", 1, 2)
+            draw_curves(trained, picture)
+            page.write_text(card(trained, metadata, out.stem), encoding="utf-8")
         progress("exporting", 2, 2)
-    save_text(out.with_suffix(".md"), card(trained, metadata, out.stem))
     rows = [
         (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])
         for name, s in trained.scores.items()

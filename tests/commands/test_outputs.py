@@ -1,0 +1,152 @@
+"""Where commands write: not over what they read, all files or none, nothing left when stopped."""
+
+import io
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from conftest import MODEL, RECIPE
+
+from soilml.cli import main
+
+RUNS = "run,slip,load_N,torque_Nm\nä,0.1,60,1.5\nä,0.3,80,3.0\nä,0.5,90,5.0\n"
+SIMULATE = ["simulate", "model.toml", "--slip", "0.1", "--load", "60"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=300, seed=1))
+    (tmp_path / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
+    (tmp_path / "runs.csv").write_text(RUNS)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(command, capsys, said):
+    assert main(command) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1 and said in captured.err
+    assert captured.out == ""
+
+
+def test_no_command_writes_over_what_it_reads(folder, capsys, small_model, small_data):
+    (folder / "m.csv").write_text(MODEL)
+    (folder / "r.json").write_text(RUNS)
+    (folder / "link.csv").symlink_to("runs.csv")
+    (folder / "o.md").write_bytes(small_data.read_bytes())
+    (folder / "compare.csv").write_bytes(small_data.read_bytes())
+    before = {p: p.read_bytes() for p in folder.iterdir()}
+    model, data = str(small_model), str(small_data)
+    for command in (
+        ["estimate", model, "runs.csv", "--out", "runs.csv"],
+        ["estimate", model, "runs.csv", "--out", "./link.csv"],
+        ["identify", "model.toml", "r.json", "--out", "r.json"],
+        ["simulate", "m.csv", "--slip", "0.1", "--load", "60", "--out", "m.csv"],
+        ["train", "spec.toml", "o.md", "o.onnx"],
+        ["compare", "model.toml", "compare.csv", model, "--out", "."],
+    ):
+        refused(command, capsys, "is read and would be written over")
+    refused(["identify", "model.toml", "runs.csv", "--out", "model.toml"], capsys, "....json")
+    refused(["generate", "recipe.toml", "recipe.toml"], capsys, "....parquet")
+    refused(["compare", "model.toml", data, model, "--out", "m.csv"], capsys, "cannot be made")
+    assert {p: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_a_target_in_the_way_is_found_before_any_work_and_nothing_is_replaced(
+    folder, capsys, small_data
+):
+    (folder / "o.png").mkdir()
+    (folder / "o.onnx").write_text("good")
+    refused(["train", "spec.toml", str(small_data), "o.onnx"], capsys, "o.png is a folder")
+    assert (folder / "o.onnx").read_text() == "good"
+    os.mkfifo(folder / "o.csv")
+    refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv is no file but a device, pipe")
+
+
+def run_soilml(folder, *words, **options):
+    options.setdefault("stderr", subprocess.PIPE)
+    command = [sys.executable, "-c", "import sys; from soilml.cli import main; sys.exit(main())"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | options.pop("env", {})
+    return subprocess.Popen([*command, *words], cwd=folder, env=environment, text=True, **options)
+
+
+def one_line(process, status, said):
+    error = process.communicate(timeout=120)[1]
+    assert process.returncode == status, error
+    assert error.count("\n") == 1 and said in error, error
+
+
+@pytest.mark.parametrize(("name", "status"), [("SIGTERM", 143), ("SIGHUP", 129)])
+def test_a_signal_to_stop_leaves_nothing_half_written(folder, name, status):
+    process = run_soilml(folder, "generate", "recipe.toml", "o.parquet", "--rows", "9000000")
+    for _ in range(600):
+        if any(p.suffix == ".part" for p in folder.iterdir()):
+            break
+        time.sleep(0.1)
+    process.send_signal(getattr(signal, name))
+    one_line(process, status, "interrupted")
+    assert not any("o.parquet" in p.name for p in folder.iterdir())
+
+
+def test_a_command_leaves_the_handling_of_signals_as_it_was(folder, capsys):
+    assert main(SIMULATE) == 0
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_a_closed_standard_output_is_one_line(folder):
+    def close():
+        os.close(1)
+
+    one_line(run_soilml(folder, *SIMULATE, preexec_fn=close), 2, "standard output is closed")
+    process = run_soilml(folder, *SIMULATE, "--out", "o.csv", preexec_fn=close)
+    one_line(process, 0, "1 row written")
+    assert (folder / "o.csv").read_text().startswith("slip,")
+
+
+def test_what_is_said_to_a_closed_standard_error_does_not_get_into_the_answer(folder):
+    process = run_soilml(
+        folder, *SIMULATE[:-1], "60,1e6", stdout=subprocess.PIPE, preexec_fn=lambda: os.close(2)
+    )
+    assert process.communicate(timeout=120)[0].splitlines()[-1].startswith("0.1,1000000,,")
+    assert process.returncode == 0
+
+
+def test_a_full_standard_output_is_one_line(folder):
+    def full():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+
+    with (folder / "full").open("w") as out:
+        process = run_soilml(folder, *SIMULATE, stdout=out, preexec_fn=full)
+        one_line(process, 2, "standard output cannot be read or written: File too large")
+
+
+def test_a_name_that_the_output_cannot_hold_is_one_line(folder, monkeypatch, capsys):
+    narrow = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    with monkeypatch.context() as patched:
+        patched.setattr(sys, "stdout", narrow)
+        assert main([*SIMULATE, "--run", "ä"]) == 2
+    assert "PYTHONIOENCODING" in capsys.readouterr().err
+    assert narrow.buffer.getvalue() == b""
+
+
+def test_a_folder_that_may_not_be_searched_is_one_line(folder, monkeypatch, capsys):
+    from pathlib import Path
+
+    def locked(path, *args, **kwargs):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "stat", locked)
+    refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv cannot be written: Permission denied")
+
+
+@pytest.mark.parametrize("slip", ["0:0.6:1000000000", "0:0.6:20000", "0:0.6:" + "9" * 5000])
+def test_more_rows_than_memory_holds_are_refused(folder, capsys, slip):
+    command = ["simulate", "model.toml", "--slip", slip, "--load", "1:100:20000"]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and len(error) < 400
