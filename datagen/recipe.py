@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -87,12 +86,12 @@ def read_recipe(path: str | os.PathLike[str]) -> Recipe:
     """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
     file = located(path, "datagen", "recipes")
     settings = read_settings(file)
-    recipe = _take_recipe(settings, tomllib.loads(file.read_text(encoding="utf-8")))
+    recipe = _take_recipe(settings)
     settings.finish()
     return recipe
 
 
-def _take_recipe(settings: Settings, content: dict[str, Any]) -> Recipe:
+def _take_recipe(settings: Settings) -> Recipe:
     case = take_case(settings)
     if not case.prior:
         settings.fail("nothing varies: give ranges in [soil.prior]")
@@ -117,7 +116,7 @@ def _take_recipe(settings: Settings, content: dict[str, Any]) -> Recipe:
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),
         seed=int(settings.take("seed", int, "a whole number, 0 or more")),
-        content=content,
+        content=settings.content,
     )
 
 

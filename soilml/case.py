@@ -85,7 +85,10 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         if name not in effects:
             entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
         priors = entry.table("prior")
-        model = model + _filled(effects[name], entry)
+        try:
+            model = model + _filled(effects[name], entry)
+        except InputError as error:
+            entry.fail(str(error).removeprefix(f"{entry.where}: "))
         entry.finish()
         prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, effects[name]).items()}
     noise = {}

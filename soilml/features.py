@@ -28,8 +28,8 @@ READABLE: dict[str, tuple[float, float]] = {
 
 def parts(feature: str) -> tuple[str, str | None]:
     """(numerator, denominator) of `torque/load`; no denominator for `slip`."""
-    top, _, bottom = feature.partition("/")
-    for name in (top, bottom or top):
+    top, slash, bottom = feature.partition("/")
+    for name in (top, bottom if slash else top):
         if name not in READABLE:
             raise InputError(f"feature {feature!r}: {name!r} is none of {', '.join(READABLE)}")
     return top, bottom or None

@@ -59,8 +59,6 @@ class Estimator:
         run: that tests the runtime of this machine as well.
         """
         file = Path(path)
-        if not file.is_file():
-            raise ModelFileError(f"{file}: there is no such file")
         content = _content(file)
         session, metadata = _session(file, content)
         if "soilml_format" not in metadata:
@@ -76,6 +74,7 @@ class Estimator:
             outputs = json.loads(metadata["outputs"])
             together = json.loads(metadata["together"])
             probe = json.loads(metadata["probe"])
+            _check_origin(metadata)
             estimator = Estimator(
                 path=str(file),
                 inputs=tuple(entry["name"] for entry in inputs),
@@ -105,7 +104,8 @@ class Estimator:
         Raises `InputError` for a reading that is missing, not finite or impossible.
         """
         flat, shape = readings(self.inputs, measured)
-        feed = {n: a.astype(np.float32) for n, a in zip(self.inputs, flat, strict=True)}
+        with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
+            feed = {n: a.astype(np.float32) for n, a in zip(self.inputs, flat, strict=True)}
         mean, std, covariance, in_range = self.session.run(
             ("mean", "std", "covariance", "in_range"), feed
         )
@@ -189,15 +189,26 @@ def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
     The graph stands in front of the metadata in the file, in as many bytes as the metadata says.
     """
     size = metadata.get("graph_bytes", "0")
-    graph = content[: int(size) if size.isdecimal() else 0]
+    graph = content[: int(size) if size.isdecimal() and len(size) < 16 else 0]
     return hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256") and checksum(
         metadata
     ) == metadata.get("metadata_sha256")
 
 
+def _check_origin(metadata: Mapping[str, str]) -> None:
+    """Raise where gear and recipe, which commands look into, are not as they are written."""
+    gear, recipe = json.loads(metadata["gear"]), json.loads(metadata["recipe"])
+    sizes = [float(gear[name]) for name in ("radius", "width") if name in gear]
+    names = [str(effect["name"]) for effect in recipe.get("effect", [])]
+    if not (isinstance(gear, dict) and all(size > 0.0 for size in sizes) and all(names)):
+        raise ValueError("gear or recipe")
+
+
 def _content(file: Path) -> bytes:
     try:
         return file.read_bytes()
+    except FileNotFoundError:
+        raise ModelFileError(f"{file}: there is no such file") from None
     except OSError as error:
         raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
 

@@ -16,6 +16,7 @@ class Settings:
     """One table of a TOML file; each key is taken once, and `finish` names those nobody took."""
 
     def __init__(self, content: dict[str, Any], where: str, folder: Path) -> None:
+        self.content = content
         self._left = dict(content)
         self._all = tuple(content)
         self.where = where
@@ -91,11 +92,30 @@ def read_settings(path: str | os.PathLike[str]) -> Settings:
     """The TOML file at `path`; raises `InputError` where it is missing or no TOML."""
     file = Path(path)
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
         raise InputError(f"{file} cannot be read: {error}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file} is not valid TOML: {error}") from None
+    except ValueError:  # more digits than Python turns into a number
+        raise InputError(f"{file} is not valid TOML: a number has thousands of digits") from None
+    except RecursionError:
+        raise InputError(f"{file} is not valid TOML: tables or lists nest too deep") from None
+    _check_whole_numbers(content, str(file))
     return Settings(content, str(file), file.parent)
+
+
+def _check_whole_numbers(content: Any, where: str) -> None:
+    """Raise `InputError` for a whole number of more than the 64 bits that TOML allows."""
+    if isinstance(content, dict):
+        for name, value in content.items():
+            _check_whole_numbers(value, f"{where} {name}")
+    elif isinstance(content, list):
+        for value in content:
+            _check_whole_numbers(value, where)
+    elif isinstance(content, int) and not -(2**63) <= content < 2**63:
+        raise InputError(f"{where}: the whole number has more than the 64 bits of TOML")

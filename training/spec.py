@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from dataclasses import dataclass
 from typing import Any
 
 from datagen.recipe import located
 from soilml.features import inputs_of
 from soilml.fusion import RULES
-from soilml.quantities import QUANTITIES, SHEAR
+from soilml.parameters import declared
+from soilml.quantities import SHEAR
 from soilml.settings import Settings, read_settings
+from soilml.soils import Soil
 from training.fixed_size import FixedSizeLSSVM
 from training.linear import LinearGaussian
 from training.lssvm import LSSVM
@@ -28,6 +29,9 @@ REGRESSORS: dict[str, type] = {
         LinearGaussian,
     )
 }
+
+#: What a seed must be, for the generators of all libraries.
+MOST_SEED = "a whole number from 0 to 2^32 - 1"
 
 
 @dataclass(frozen=True)
@@ -51,9 +55,11 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     inputs_of(features)  # names the first that cannot be read
     targets = _words(settings, "targets", list(SHEAR))
     for name in targets:
-        if name not in QUANTITIES:
-            settings.fail(f"targets: {name!r} is no quantity")
-    seed = int(settings.take("seed", int, "a whole number, 0 or more", 0))
+        if name not in declared(Soil):
+            settings.fail(f"targets: {name!r} is no soil parameter: {', '.join(declared(Soil))}")
+    seed = int(settings.take("seed", int, MOST_SEED, 0))
+    if not 0 <= seed < 2**32:
+        settings.fail(f"seed is {seed}; needed is {MOST_SEED}")
     rule = settings.text("rule", "best-linear")
     if rule not in RULES:
         settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
@@ -61,7 +67,7 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     if not regressors:
         settings.fail("[[regressor]] is missing; give one or more")
     settings.finish()
-    text = json.dumps(tomllib.loads(file.read_text(encoding="utf-8")), sort_keys=True)
+    text = json.dumps(settings.content, sort_keys=True)
     return Spec(file.stem, seed, tuple(features), tuple(targets), regressors, rule, text)
 
 
@@ -69,6 +75,8 @@ def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
     words = settings.take(key, list, "a list of names", default)
     if not words or not all(isinstance(word, str) for word in words):
         settings.fail(f"{key} is {words!r}; needed is a list of names")
+    if len(set(words)) < len(words):
+        settings.fail(f"{key} is {words!r}; a name stands twice")
     return [str(word) for word in words]
 
 
@@ -85,14 +93,14 @@ def _regressor(settings: Settings, seed: int) -> Any:
             continue
         if isinstance(default, tuple | list):
             given[key] = tuple(settings.take(key, list, "a list of whole numbers"))
-            if not all(isinstance(v, int) and 1 <= v <= 4096 for v in given[key]):
+            if not all(type(v) is int and 1 <= v <= 4096 for v in given[key]):
                 settings.fail(f"{key} is {list(given[key])}; needed are whole numbers above zero")
         elif isinstance(default, int):
             given[key] = settings.count(key)
         else:
             given[key] = settings.number(key)
-            if not given[key] > 0.0:
-                settings.fail(f"{key} is {given[key]:g}; needed is a number above zero")
+            if not 1e-12 <= given[key] <= 1e12:
+                settings.fail(f"{key} is {given[key]:g}; needed is a number from 1e-12 to 1e12")
     settings.finish()
     if "random_state" in allowed and "random_state" not in given:
         given["random_state"] = seed

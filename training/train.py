@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import InputError
 from soilml.estimate import Known, Together, joined
 from soilml.fusion import RULES
 from training.calibrate import (
@@ -120,6 +121,8 @@ def _fit(regressor: Any, parts: Split, progress: Callable[[int, int], None]) -> 
         )
     else:
         regressor.fit(parts.train.features, parts.train.targets)
+    if not np.isfinite(regressor.predict(parts.choose.features)).all():
+        raise InputError(f"{regressor.kind} did not converge: change its settings in the spec")
     progress(1, 1)
 
 

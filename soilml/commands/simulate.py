@@ -90,7 +90,8 @@ def numbers(option: str, text: str) -> NDArray[np.float64]:
             start, stop, count = text.split(":")
             if int(count) > MOST_ROWS:
                 raise InputError(f"{option} is {text!r}; at most {MOST_ROWS} values are taken")
-            found = np.linspace(float(start), float(stop), int(count)).round(12)
+            with np.errstate(all="ignore"):
+                found = np.linspace(float(start), float(stop), int(count)).round(12)
         else:
             found = np.asarray([float(part) for part in text.split(",")])
     except InputError:

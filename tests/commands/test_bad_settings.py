@@ -1,0 +1,99 @@
+"""Bad model files, recipes and specs: one line that names the place, and nothing left behind."""
+
+import onnx
+import pytest
+from conftest import MODEL, RECIPE
+
+from soilml.cli import main
+from soilml.onboard import checksum
+
+SPEC = '[[regressor]]\ntype = "linear"\n'
+EFFECT = '[[effect]]\nname = "slip-sinkage"\nn1 = 0.1\n'
+MODELS = {
+    "400 digits": (MODEL.replace("0.15", "9" * 400), "gear radius: the whole number has more"),
+    "digits of noise": (MODEL.replace('"2 %"', "9" * 400), "noise torque_Nm: the whole number"),
+    "digits of a prior": (MODEL.replace("0.005", "9" * 400), "soil prior shear_modulus: the whole"),
+    "5000 digits": (MODEL.replace("0.15", "9" * 5000), "a number has thousands of digits"),
+    "nested": ("x = " + "[" * 20_000, "nest too deep"),
+    "effect twice": (MODEL + EFFECT + EFFECT, "bad.toml [[effect]] number 2: the model has"),
+    "folder": (None, "Is a directory"),
+}
+SPECS = {
+    "seed": ("seed = -1\n" + SPEC, "seed is -1"),
+    "text as target": ('targets = ["run"]\n' + SPEC, "'run' is no soil parameter"),
+    "status as target": ('targets = ["status"]\n' + SPEC, "'status' is no soil parameter"),
+    "reading as target": ('targets = ["torque"]\n' + SPEC, "'torque' is no soil parameter"),
+    "target twice": ('targets = ["cohesion", "cohesion"]\n' + SPEC, "a name stands twice"),
+    "half a ratio": ('features = ["torque/"]\n' + SPEC, "feature 'torque/'"),
+    "truth as a width": ('[[regressor]]\ntype = "mlp"\nhidden = [true]\n', "hidden is [True]"),
+    "nothing as a width": ('[[regressor]]\ntype = "lssvm"\nwidth = 1e-300\n', "width is 1e-300"),
+    "an unbridled step": (
+        '[[regressor]]\ntype = "mlp"\nhidden = [4]\nepochs = 3\nlearning_rate = 1e12\n',
+        "mlp did not converge",
+    ),
+}
+
+
+def refused(command, capsys, said):
+    assert main(command) == 2
+    captured = capsys.readouterr()
+    lines = [line for line in captured.err.splitlines() if not line.endswith(" ...")]
+    assert len(lines) == 1 and said in lines[0], captured.err
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("what", MODELS)
+def test_model_files(tmp_path, capsys, what):
+    text, said = MODELS[what]
+    path = tmp_path / "bad.toml"
+    path.mkdir() if text is None else path.write_text(text)
+    refused(["simulate", str(path), "--slip", "0.1", "--load", "60"], capsys, said)
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path, capsys):
+    (tmp_path / "m.toml").write_text("\ufeff" + MODEL, encoding="utf-8")
+    assert main(["simulate", str(tmp_path / "m.toml"), "--slip", "0.1", "--load", "60"]) == 0
+    (tmp_path / "r.toml").write_text("\ufeff" + RECIPE.format(rows=9, seed=1), encoding="utf-8")
+    assert main(["generate", str(tmp_path / "r.toml"), str(tmp_path / "o.parquet")]) == 0
+
+
+@pytest.mark.parametrize("what", SPECS)
+@pytest.mark.filterwarnings("error")
+def test_specs(tmp_path, capsys, small_data, what):
+    text, said = SPECS[what]
+    (tmp_path / "spec.toml").write_text(text)
+    out = tmp_path / "o.onnx"
+    refused(["train", str(tmp_path / "spec.toml"), str(small_data), str(out)], capsys, said)
+    assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("gear", "[]"),
+        ("gear", '{"radius": "wide"}'),
+        ("gear", "[" * 100_000),
+        ("recipe", "3"),
+        ("recipe", '{"effect": [1]}'),
+        ("graph_bytes", "9" * 5000),
+    ],
+)
+def test_model_files_signed_again(tmp_path, capsys, small_model, key, value):
+    model = onnx.load(small_model)
+    metadata = {e.key: e.value for e in model.metadata_props} | {key: value}
+    metadata["metadata_sha256"] = checksum(metadata)
+    for entry in model.metadata_props:
+        entry.value = metadata[entry.key]
+    (tmp_path / "m.onnx").write_bytes(model.SerializeToString(deterministic=True))
+    (tmp_path / "runs.csv").write_text(
+        "run,slip,load_N,torque_Nm,wheel_radius_m\na,0.1,60,1.5,0.15\n"
+    )
+    command = ["estimate", str(tmp_path / "m.onnx"), str(tmp_path / "runs.csv")]
+    refused(command, capsys, "m.onnx")
+
+
+@pytest.mark.filterwarnings("error")
+def test_readings_beyond_single_precision_are_out_of_range(tmp_path, capsys, small_model):
+    (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1e308\n")
+    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv")]) == 0
+    assert capsys.readouterr().out.splitlines()[1].endswith(",0")
