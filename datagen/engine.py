@@ -44,7 +44,8 @@ def generate(
     """
     schema = _schema(recipe)
     total = failed = 0
-    with replacing(path) as part, pq.ParquetWriter(part, schema, compression="zstd") as writer:
+    settings = {"compression": "zstd", "write_page_checksum": True}
+    with replacing(path) as part, pq.ParquetWriter(part, schema, **settings) as writer:
         for columns in pieces(recipe):
             bad = int(np.count_nonzero(columns["status"] != Status.OK.reason))
             total, failed = total + len(columns["status"]), failed + bad

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
+from soilml.parquet import own_columns, plain_column, read_parquet
 from soilml.quantities import COLUMNS
 from soilml.table import TEXT, Column, Table
 
@@ -44,9 +45,13 @@ def read_table(
     dropped in silence.
     """
     file = Path(path)
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file")
-    table = _read_parquet(file) if file.suffix == ".parquet" else _read_csv(file, ignore_extra)
+    read = _read_parquet if file.suffix == ".parquet" else _read_csv
+    try:
+        table = read(file, ignore_extra)
+    except FileNotFoundError:
+        raise TableError(f"{file}: there is no such file") from None
+    except OSError as error:
+        raise TableError(f"{file} cannot be read: {error.strerror or error}") from None
     for name in need:
         if name not in table:
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
@@ -59,7 +64,7 @@ def read_table(
 def _read_csv(file: Path, ignore_extra: bool) -> Table:
     try:
         text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise TableError(f"{file} cannot be read as text: {error}") from None
     if "\0" in text:
         raise TableError(f"{file} is not a CSV file: it holds binary data")
@@ -89,13 +94,15 @@ def _read_csv(file: Path, ignore_extra: bool) -> Table:
     return Table(columns, str(file), np.asarray(lines, dtype=np.int64))
 
 
-def _known_columns(file: Path, header: list[str], ignore_extra: bool) -> list[str]:
+def _known_columns(
+    file: Path, header: list[str], ignore_extra: bool, own: Sequence[str] = ()
+) -> list[str]:
     kept = []
     for name in header:
         if header.count(name) > 1:
             raise TableError(f"{file}: column {name} stands twice")
         base = name.removesuffix("_std")
-        if base in COLUMNS and (base == name or base not in TEXT):
+        if name in own or (base in COLUMNS and (base == name or base not in TEXT)):
             kept.append(name)
         elif hint := _misnamed(name):
             raise TableError(f"{file}: column {name!r}: {hint}")
@@ -171,31 +178,9 @@ def _instead(name: str, table: Table) -> str:
     return f" found: {', '.join(table.columns) or 'no column'}"
 
 
-def _read_parquet(file: Path) -> Table:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise MissingLibraryError(
-            f"{file}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
-        ) from None
-    try:
-        arrow = pq.read_table(file)
-    except (pa.ArrowException, OSError) as error:
-        first = str(error).splitlines()[0]
-        raise TableError(f"{file} is not a whole Parquet file: {first}") from None
-    columns: dict[str, Column] = {}
-    for name in arrow.column_names:
-        column = arrow.column(name)
-        if name in TEXT:
-            columns[name] = np.asarray(column.to_pylist(), dtype=np.str_)
-            continue
-        try:
-            columns[name] = column.to_numpy().astype(np.float64)
-        except (TypeError, ValueError):
-            raise TableError(f"{file}, column {name}: holds {column.type}, not numbers") from None
-    metadata = {
-        key.decode(): value.decode(errors="replace")
-        for key, value in (arrow.schema.metadata or {}).items()
-    }
-    return Table(columns, str(file), np.arange(1, len(arrow) + 1), metadata)
+def _read_parquet(file: Path, ignore_extra: bool) -> Table:
+    found, metadata = read_parquet(file)
+    kept = _known_columns(file, list(found), ignore_extra, own_columns(metadata))
+    columns = {name: plain_column(file, name, found[name]) for name in kept}
+    rows = len(next(iter(found.values()))) if found else 0
+    return Table(columns, str(file), np.arange(1, rows + 1), metadata)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.status import Status
 
 Column = NDArray[Any]
 
@@ -40,6 +41,13 @@ class Table:
     def _found(self) -> str:
         return ", ".join(self.columns) or "no column"
 
+    @property
+    def answered(self) -> NDArray[np.bool_]:
+        """Rows whose status, where there is one, is not that they have no answer."""
+        if "status" not in self:
+            return np.ones(len(self), dtype=bool)
+        return np.isin(self["status"], ("", Status.OK.reason))
+
     def rows(self, index: Column) -> Table:
         """The rows of a boolean mask or of indices, in that order."""
         return Table(
@@ -67,8 +75,15 @@ class Table:
         return self.rows(mask)
 
     def groups(self, name: str = "run") -> Iterator[tuple[str, Table]]:
-        """(value, rows) for each value of a column, in order of first appearance."""
+        """(value, rows) for each value of a column, in order of first appearance.
+
+        Raises `TableError` for a blank cell: its row belongs to no group.
+        """
         column = self[name]
+        blank = column == "" if name in TEXT else np.isnan(column)
+        if blank.any():
+            place = self.place(int(np.argmax(blank)))
+            raise TableError(f"{place}, column {name}: is blank; rows cannot be grouped by it")
         values, first, code = np.unique(column, return_index=True, return_inverse=True)
         order = np.argsort(code, kind="stable")
         ends = np.cumsum(np.bincount(code))

@@ -17,7 +17,7 @@ BOARD = {"numpy", "onnxruntime"}
 ALLOWED_OUTSIDE_BOARD = {
     # where soilml itself may reach for more than the board has, always inside a function
     "soilml/arrays.py": {"torch", "array_api_compat"},
-    "soilml/reading.py": {"pyarrow"},
+    "soilml/parquet.py": {"pyarrow"},
     "soilml/identification/nonlinear.py": {"scipy"},
 }
 

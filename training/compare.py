@@ -16,7 +16,6 @@ from soilml.identification import METHODS, identify
 from soilml.onboard import Estimator
 from soilml.prior import Prior
 from soilml.quantities import CHANNELS, column
-from soilml.status import Status
 from soilml.table import Table
 from training.score import HALF, NINETY
 
@@ -122,10 +121,7 @@ def _usable(table: Table, names: Sequence[str]) -> Table:
             raise InputError(
                 f"{table.source}: column {column(name)} is missing: no truth to compare"
             )
-    good = np.isfinite(table["torque_Nm"])
-    if "status" in table:
-        good &= table["status"] == Status.OK.reason
-    return table.rows(good)
+    return table.rows(np.isfinite(table["torque_Nm"]) & table.answered)
 
 
 def _sets(table: Table) -> dict[int, list[Table]]:

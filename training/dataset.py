@@ -14,7 +14,6 @@ from soilml.errors import InputError, TableError
 from soilml.features import computed, inputs_of
 from soilml.quantities import QUANTITIES, column
 from soilml.reading import read_table
-from soilml.status import Status
 
 Floats = NDArray[np.float64]
 
@@ -86,9 +85,7 @@ def read_dataset(
                 f"{path}: column {name} is missing; the spec's features and targets must be in the "
                 f"data, which hold: {', '.join(table.columns)}"
             )
-    good = np.ones(len(table), dtype=bool)
-    if "status" in table:
-        good &= table["status"] == Status.OK.reason
+    good = table.answered.copy()
     for name in needed[1:]:
         good &= np.isfinite(table[name])
     if good.sum() < LEAST_ROWS:
