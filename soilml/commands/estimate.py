@@ -37,7 +37,7 @@ in_range: 0 where the readings are unlike anything that the model was trained on
 the prior. One row brings one equation for three unknowns, so its estimate is mostly the prior; with
 --by run, all rows of a run are joined, which can say far more; rows that contradict each other, or
 of which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
-estimate. Needs numpy and onnxruntime alone.
+estimate, and so does one whose status is not ok. Needs numpy and onnxruntime alone.
 """
 
 
@@ -61,20 +61,29 @@ def run(args: argparse.Namespace) -> int:
     estimator = Estimator.load(args.model)
     table = chosen_rows(args, RUNS)
     _same_wheel(estimator, table)
-    whole = np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0)
+    measured = np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0)
+    whole = measured & table.answered
     if not whole.any():
         needed = ", ".join(column(n) for n in estimator.inputs)
         raise TableError(f"{table.source}: no row has all that this model reads: {needed}")
     if args.by is None:
         columns, said = _row_by_row(estimator, table, whole)
     else:
-        columns, said = _by(estimator, table.rows(whole), args.by)
+        columns, said = _by(estimator, table, whole, args.by)
     deliver(columns, args.out)
-    if not whole.all():
-        blank = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(~whole)[:3])
-        said.append(f"{int((~whole).sum())} rows lack a reading and get no estimate: {blank}, ...")
+    said += _left_out(table, ~measured, "lack a reading")
+    said += _left_out(table, measured & ~table.answered, "have a status that is not ok")
     print("\n".join(said), file=sys.stderr)
     return 0
+
+
+def _left_out(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
+    """How many rows get no estimate, why, and where the first of them stand."""
+    if not rows.any():
+        return []
+    some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
+    more = ", ..." if rows.sum() > 3 else ""
+    return [f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}"]
 
 
 def _row_by_row(
@@ -97,19 +106,27 @@ def _row_by_row(
     return columns, said
 
 
-def _by(estimator: Estimator, table: Table, by: str) -> tuple[dict[str, Any], list[str]]:
-    """A line for every value of a column, from all its rows together."""
-    groups = list(table.groups(by))
+def _by(
+    estimator: Estimator, table: Table, whole: NDArray[np.bool_], by: str
+) -> tuple[dict[str, Any], list[str]]:
+    """A line for every value of a column, from all its rows together; blank where none is whole."""
+    order = [name for name, _ in table.groups(by)]
+    groups = list(table.rows(whole).groups(by))
     estimates = [estimator.run(**_readings(estimator, rows)) for _, rows in groups]
     sound = [int(estimator(**_readings(estimator, rows)).in_range.sum()) for _, rows in groups]
     estimate = _stacked(estimates)
+    place = {name: i for i, (name, _) in enumerate(groups)}
+    there = np.asarray([name in place for name in order])
+    index = np.asarray([place.get(name, 0) for name in order])
+    counts = np.asarray([len(rows) for _, rows in groups])
     columns: dict[str, Any] = {
-        by: np.asarray([name for name, _ in groups]),
-        "rows": np.asarray([len(rows) for _, rows in groups]),
-        "rows_in_range": np.asarray(sound),
+        by: np.asarray(order),
+        "rows": np.where(there, counts[index], 0),
+        "rows_in_range": np.where(there, np.asarray(sound)[index], 0),
     }
-    columns |= _answers(estimate)
-    columns["in_range"] = estimate.in_range
+    for key, values in _answers(estimate).items():
+        columns[key] = np.where(there, values[index], np.nan)
+    columns["in_range"] = there & estimate.in_range[index]
     said = _worth(estimate, f"all rows of a {by}", "drive other loads and slips")
     for (name, rows), good, one in zip(groups, sound, estimates, strict=True):
         if not one.in_range:

@@ -5,14 +5,17 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 from soilml.case import read_case
+from soilml.commands.output import put, watched
+from soilml.errors import FitError, InputError
 from soilml.identification.fit import Fit
 from soilml.needs import need
 from soilml.reading import RUNS, read_table
 from soilml.saving import named, save_text
+from soilml.table import Table
 from soilml.writing import aligned
 
 HELP = "soil parameters from measured rows, by least squares on a model"
@@ -24,8 +27,9 @@ Find soil parameters with which MODEL.toml explains the rows of RUNS.csv.
   soilml identify MODEL.toml RUNS.csv --method linear --where run=sand_3
 
 RUNS.csv needs the columns run, slip, load_N, torque_Nm (blank where not measured) and may have
-drawbar_pull_N, sinkage_m, and <column>_std. All rows are taken for one soil; --by run identifies
-each run on its own. What has a prior is found, unless --free names other parameters. Methods:
+drawbar_pull_N, sinkage_m, and <column>_std, of slip and load too. Rows whose status is not ok are
+left out. All rows are taken for one soil; --by run identifies each run on its own, and says which
+have no answer. What has a prior is found, unless --free names other parameters. Methods:
 nonlinear (least squares on the full integrals, bounded, several starts), linear (c and phi from
 sinkage, K given), newton (phi, K and kphi on the closed form, c given). A channel takes part where
 its noise is declared. The answer is JSON: into --out, or into a pipe; a terminal shows a table.
@@ -65,28 +69,47 @@ def run(args: argparse.Namespace) -> int:
     case = read_case(args.model)
     table = chosen_rows(args, RUNS)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
+    failed: dict[str, str] = {}
     if args.by is None:
         found = {"": identify(case, table, free, args.method)}
         content = found[""].as_json()
     else:
-        groups = table.groups(args.by)
-        found = {name: identify(case, rows, free, args.method) for name, rows in groups}
-        content = {"by": args.by, "runs": {name: fit.as_json() for name, fit in found.items()}}
+        found, failed = _by(
+            table.groups(args.by), lambda rows: identify(case, rows, free, args.method)
+        )
+        if not found:
+            name, why = next(iter(failed.items()))
+            raise FitError(f"no {args.by} can be identified; {args.by} {name}: {why}")
+        runs = {name: fit.as_json() for name, fit in found.items()}
+        content = {"by": args.by, "runs": runs, "failed": failed}
     text = json.dumps(content, indent=2) + "\n"
     if args.out is not None:
         save_text(args.out, text)
-    if args.out is not None or sys.stdout.isatty():
+    if args.out is not None or watched():
         heads = {name: f"{args.by} {name}: " if name else "" for name in found}
         print("\n\n".join(heads[name] + _for_people(fit) for name, fit in found.items()))
     else:
-        sys.stdout.write(text)
+        put(text)
+    for name, why in failed.items():
+        print(f"{args.by} {name} has no answer: {why}", file=sys.stderr)
     return 0
 
 
-def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Any:
-    """The rows of the table that `--where` leaves."""
-    from soilml.errors import InputError
+def _by(
+    groups: Iterable[tuple[str, Table]], solve: Callable[[Table], Fit]
+) -> tuple[dict[str, Fit], dict[str, str]]:
+    """The answer for each group, and why others have none."""
+    found, failed = {}, {}
+    for name, rows in groups:
+        try:
+            found[name] = solve(rows)
+        except FitError as error:
+            failed[name] = str(error)
+    return found, failed
 
+
+def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Table:
+    """The rows of the table that `--where` leaves."""
     table = read_table(args.runs, need_columns, ignore_extra=args.ignore_extra)
     if args.where is None:
         return table

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from soilml.case import Case
 from soilml.errors import InputError
 from soilml.identification.fit import Fit
@@ -42,7 +44,20 @@ def identify(
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     data = measured_rows(case, table)
     fit = METHODS[method](case, data, chosen(case, free))
-    return replace(fit, warnings=(*fit.warnings, *data.notes))
+    return replace(fit, warnings=(*fit.warnings, *_not_followed(fit, data, free), *data.notes))
+
+
+def _not_followed(fit: Fit, data: Measured, free: Sequence[str] | None) -> list[str]:
+    """What was asked for and a method of fixed unknowns did not do."""
+    said = []
+    if free is not None and (others := [name for name in fit.names if name not in free]):
+        said.append(
+            f"{', '.join(others)} found too, though not asked for: the {fit.method} method finds "
+            f"{', '.join(fit.names)} together"
+        )
+    if fit.method in ("linear", "newton") and (np.any(data.slip_std) or np.any(data.load_std)):
+        said.append(f"the {fit.method} method does not carry noise of slip and load into std")
+    return said
 
 
 __all__ = ["METHODS", "Fit", "Free", "Measured", "identify"]

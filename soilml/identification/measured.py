@@ -14,6 +14,9 @@ from soilml.table import Table
 
 Floats = NDArray[np.float64]
 
+#: Share of a channel's largest reading below which a standard deviation is not believed.
+LEAST_STD = 1e-6
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -47,22 +50,25 @@ def measured_rows(case: Case, table: Table) -> Measured:
     """What a table holds for a case; raises `TableError` for a wheel that is not the case's.
 
     Noise comes from `<column>_std`, else from [noise]. A channel for which neither speaks is left
-    out if another is declared; if none is, all are used and their noise is estimated.
+    out if another is declared; if none is, all are used and their noise is estimated. Rows that
+    have no answer by their status are left out. Raises `FitError` where nothing is left.
     """
+    dropped = int(np.count_nonzero(~table.answered))
+    if dropped == len(table):
+        raise FitError(f"{table.source}: no row has the status ok")
+    table = table.rows(table.answered)
     same_wheel(case, table)
+    notes = _notes(case, table)
+    if dropped:
+        notes.append(f"{dropped} rows are left out: their status is not ok")
     found = []
     for name in CHANNELS:
         key = column(name)
-        if key not in table or not np.isfinite(table[key]).any():
-            continue
-        reading = table[key]
-        std = np.full_like(reading, np.nan)
-        if f"{key}_std" in table:
-            std = table[f"{key}_std"].copy()
-        if key in case.noise:
-            std = np.where(np.isfinite(std), std, case.noise[key].std(reading))
-        declared = bool(np.all(std[np.isfinite(reading)] > 0))
-        found.append(Channel(name, reading, std, declared))
+        if key in table and np.isfinite(table[key]).any():
+            std, note = _believed(table, key, _declared(case, table, key))
+            declared = bool(np.isfinite(std[np.isfinite(table[key])]).all())
+            found.append(Channel(name, table[key], std, declared))
+            notes += note
     if not found:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
     used = [c for c in found if c.declared] or found
@@ -70,11 +76,11 @@ def measured_rows(case: Case, table: Table) -> Measured:
     return Measured(
         slip=table["slip"],
         load=table["load_N"],
-        slip_std=_input_noise(case, "slip", table["slip"]),
-        load_std=_input_noise(case, "load_N", table["load_N"]),
+        slip_std=np.nan_to_num(_declared(case, table, "slip")),
+        load_std=np.nan_to_num(_declared(case, table, "load_N")),
         channels=tuple(used),
         left_out=tuple(left_out),
-        notes=tuple(_notes(case, table)),
+        notes=tuple(notes),
     )
 
 
@@ -92,10 +98,37 @@ def _notes(case: Case, table: Table) -> list[str]:
     return said
 
 
-def _input_noise(case: Case, key: str, reading: Floats) -> Floats:
-    if key not in case.noise:
-        return np.zeros_like(reading)
-    return np.asarray(case.noise[key].std(reading) + 0.0 * reading)
+def _declared(case: Case, table: Table, key: str) -> Floats:
+    """Standard deviation of each reading of a column; NaN where nobody says."""
+    std = np.full(len(table), np.nan)
+    if key in case.noise:
+        std = np.broadcast_to(case.noise[key].std(table[key]), std.shape)
+    if f"{key}_std" in table:
+        own = table[f"{key}_std"]
+        std = np.where(np.isfinite(own), own, std)
+    return np.asarray(std)
+
+
+def _believed(table: Table, key: str, std: Floats) -> tuple[Floats, list[str]]:
+    """Standard deviations that may be divided by, and what was said to replace some.
+
+    A share of a reading of zero is zero, and one row would decide everything: the median of the
+    column's others is taken there. Raises `FitError` where there are no others.
+    """
+    measured = np.isfinite(table[key])
+    least = LEAST_STD * float(np.abs(table[key][measured]).max())
+    tiny = measured & (std <= least)
+    if not tiny.any():
+        return std, []
+    row = int(np.argmax(tiny))
+    given = f"{table.place(row)}, column {key}: a standard deviation of {std[row]:.3g}"
+    others = std[measured & (std > least)]
+    if others.size == 0:
+        raise FitError(f"{given}, and no row has a larger one; give one such as '2 % + 0.05'")
+    median = float(np.median(others))
+    more = int(tiny.sum()) - 1
+    said = f"{given} is not believed{f', nor {more} more' if more else ''}: "
+    return np.where(tiny, median, std), [f"{said}{median:.3g}, the median of the others, is taken"]
 
 
 def same_wheel(case: Case, table: Table) -> None:

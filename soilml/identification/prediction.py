@@ -89,6 +89,7 @@ def input_noise(case: Case, data: Measured, free: Sequence[Free], u: Floats) -> 
         for sign in (-1.0, 1.0):
             moved = points | {name: points[name] + sign * 0.5 * std}
             moved["slip"] = np.clip(moved["slip"], -0.999, 0.999)
+            moved["load"] = np.clip(moved["load"], 1e-3 * data.load, 2.0 * data.load)
             y.append(stacked(data, predicted(case, free, u[None, :], **moved))[0])
         total = np.hypot(total, np.nan_to_num(y[1] - y[0]))
     return np.asarray(total)

@@ -1,0 +1,72 @@
+"""One answer for each run: runs that can have none, and rows that have no answer themselves."""
+
+import csv
+import io
+import json
+
+import pytest
+from conftest import MODEL
+
+from soilml.cli import main
+
+RUNS = """\
+run,slip,load_N,torque_Nm,status
+a,0.1,60,1.19,ok
+a,0.3,80,3.54,ok
+a,0.5,100,6.42,
+b,0.2,60,,ok
+c,0.1,60,1.19,ok
+c,0.3,80,3.54,no equilibrium
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "runs.csv").write_text(RUNS)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(folder, capsys):
+    command = ["identify", "model.toml", "runs.csv", "--by", "run", "--out", "o.json"]
+    assert main(command) == 0
+    content = json.loads((folder / "o.json").read_text())
+    assert set(content["runs"]) == {"a", "c"} and set(content["failed"]) == {"b"}
+    assert content["runs"]["c"]["rows_used"] == 1
+    assert "run b has no answer" in capsys.readouterr().err
+    (folder / "none.csv").write_text("run,slip,load_N,torque_Nm\nx,0.1,60,\ny,0.1,60,\n")
+    assert main(["identify", "model.toml", "none.csv", "--by", "run", "--out", "n.json"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "run x: none.csv: no reading" in error
+    assert not (folder / "n.json").exists()
+
+
+def test_estimate_has_a_line_for_a_run_without_readings(folder, capsys, small_model):
+    assert main(["estimate", str(small_model), "runs.csv", "--by", "run"]) == 0
+    captured = capsys.readouterr()
+    a, b, c = rows_of(captured.out)
+    assert [a["run"], b["run"], c["run"]] == ["a", "b", "c"]
+    assert [a["rows"], b["rows"], c["rows"]] == ["3", "0", "1"]
+    assert b["cohesion_Pa"] == b["cohesion_Pa_p95"] == "" and b["in_range"] == "0"
+    assert (
+        "1 rows have a status that is not ok and get no estimate: runs.csv line 7" in captured.err
+    )
+    assert main(["estimate", str(small_model), "runs.csv"]) == 0
+    rows = rows_of(capsys.readouterr().out)
+    assert [bool(r["cohesion_Pa"]) for r in rows] == [True, True, True, False, True, False]
+
+
+def test_a_blank_cell_is_no_group(folder, capsys, small_model):
+    (folder / "timed.csv").write_text(
+        "run,slip,load_N,torque_Nm,time_s\na,0.1,60,1.2,1\na,0.3,80,3.5,\n"
+    )
+    for command in (["identify", "model.toml"], ["estimate", str(small_model)]):
+        assert main([*command, "timed.csv", "--by", "time_s"]) == 2
+        captured = capsys.readouterr()
+        assert captured.err.count("\n") == 1 and captured.out == ""
+        assert "timed.csv line 3, column time_s: is blank" in captured.err
