@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -93,21 +92,6 @@ def compare(
             if inputs:
                 lines.append(_line(size, f"{ANALYTIC}{method}", inputs, some, answers, prior))
     return lines
-
-
-def same_wheel(case: Case, table: Table, estimators: dict[str, Estimator]) -> None:
-    """Raise `InputError` where model file, test data and model files are of different wheels."""
-    sizes = {p: float(v) for p, (_, v) in case.parameters().items() if p.startswith("gear.")}
-    others = {table.source: json.loads(table.metadata.get("soilml_recipe", "{}")).get("gear", {})}
-    others |= {name: json.loads(e.metadata["gear"]) for name, e in estimators.items()}
-    for name, gear in others.items():
-        for path, size in sizes.items():
-            other = gear.get(path.removeprefix("gear."), size)
-            if abs(other / size - 1.0) > 0.005:
-                raise InputError(
-                    f"{name} is of a wheel with {path.removeprefix('gear.')} {other:g}, the model "
-                    f"file has {size:g}: compare what belongs to one wheel"
-                )
 
 
 def _ranges(estimator: Estimator) -> list[tuple[str, float, float]]:

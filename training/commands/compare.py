@@ -21,7 +21,8 @@ Score model files and analytic identification on measured sets whose soil is kno
 
 TEST.parquet comes from soilml generate with a seed that was not trained on; its runs are the sets:
 single rows, and rows of one soil together. MODEL.toml gives the analytic methods their wheel, soil,
-priors and noise. Into the folder go compare.md, compare.csv and compare.png.
+priors and noise; its wheel, soil, effects and priors must be those of the test data. Into the
+folder go compare.md, compare.csv and compare.png.
 """
 
 
@@ -61,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.reading import read_table
     from soilml.writing import csv_text
     from training import comparison_report as report
-    from training.compare import compare, same_wheel
+    from training.alike import check_alike
+    from training.compare import compare
 
     case = read_case(args.model)
     table = read_table(args.test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
@@ -69,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
     if len(estimators) != len(args.files):
         raise InputError("two model files have the same name: rename one, names label the lines")
     names = next(iter(estimators.values())).names
-    same_wheel(case, table, estimators)
+    for note in check_alike(case, table, estimators, names):
+        print(note, file=sys.stderr)
     with made_folder(args.out) as folder:
         with stages() as progress:
             lines = compare(case, table, estimators, progress, args.analytic_sets)
