@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import re
 import signal
@@ -107,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _said(f"{what} cannot be read or written: {error.strerror or error}", 2)
     except UnicodeEncodeError as error:
         odd = error.object[error.start : error.end]
-        hint = "set PYTHONIOENCODING=utf-8, or give --out"
+        hint = "set PYTHONIOENCODING=utf-8, or rename it"
         return _said(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
     except MemoryError:
         return _said("the memory of this machine is too small for it: ask for fewer rows", 2)
@@ -121,11 +122,12 @@ def _said(text: str, status: int) -> int:
 
 def _hold_descriptors() -> None:
     """Take the numbers of closed standard streams, so that no file gets what is said to them."""
-    while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
-        pass
-    os.close(descriptor)
+    with suppress(OSError):
+        while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
+            pass
+        os.close(descriptor)
     if sys.stderr is None:
-        sys.stderr = os.fdopen(2, "w", closefd=False)  # print(file=None) would go to the output
+        sys.stderr = io.StringIO()  # print(file=None) would go to the output
 
 
 def _silence_output() -> None:

@@ -31,7 +31,7 @@ REGRESSORS: dict[str, type] = {
 }
 
 #: What a seed must be, for the generators of all libraries.
-MOST_SEED = "a whole number from 0 to 2^32 - 1"
+SEED = "a whole number from 0 to 2^32 - 1"
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     for name in targets:
         if name not in declared(Soil):
             settings.fail(f"targets: {name!r} is no soil parameter: {', '.join(declared(Soil))}")
-    seed = int(settings.take("seed", int, MOST_SEED, 0))
+    seed = int(settings.take("seed", int, SEED, 0))
     if not 0 <= seed < 2**32:
-        settings.fail(f"seed is {seed}; needed is {MOST_SEED}")
+        settings.fail(f"seed is {seed}; needed is {SEED}")
     rule = settings.text("rule", "best-linear")
     if rule not in RULES:
         settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
@@ -100,7 +100,9 @@ def _regressor(settings: Settings, seed: int) -> Any:
         else:
             given[key] = settings.number(key)
             if not 1e-12 <= given[key] <= 1e12:
-                settings.fail(f"{key} is {given[key]:g}; needed is a number from 1e-12 to 1e12")
+                settings.fail(
+                    f"{key} is {given[key]:g}; needed is a number above zero, 1e-12 to 1e12"
+                )
     settings.finish()
     if "random_state" in allowed and "random_state" not in given:
         given["random_state"] = seed

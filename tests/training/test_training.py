@@ -136,7 +136,7 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
         ('[[regressor]]\ntype = "lssvm"\ngamma = -1.0\n', "above zero"),
         ('rule = "average"\n[[regressor]]\ntype = "mlp"\n', "rule is 'average'"),
         ('features = ["slip", "colour"]\n[[regressor]]\ntype = "mlp"\n', "'colour' is none of"),
-        ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' is no quantity"),
+        ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' is no soil parameter"),
     ],
 )
 def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
