@@ -12,9 +12,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
-from datagen.hidden.plans import matrix
 from gap_case import judged
 
+from datagen.hidden.plans import matrix
 from datagen.progress import bar
 from soilml.saving import save_text
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import gap_baselines
 import numpy as np
+
 from datagen.hidden.plans import Plan
 from datagen.hidden.sets import draw
-
 from soilml.case import Case, read_case
 from soilml.effects import EFFECTS
 from soilml.gap import GapReport, gap

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from pathlib import Path
 
 from soilml.case import read_case
 from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.gap import Audit, audit
 from soilml.reading import read_table
-from soilml.saving import save_text
+from soilml.saving import named, save_text
 from soilml.writing import aligned
 
 HELP = "what these runs could name, before they are driven"
@@ -37,6 +38,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE.json", help="where to write the audit")
     parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
     add_effects_option(parser)
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -14,8 +14,11 @@ from soilml.effects.base import Effect
 from soilml.errors import InputError
 from soilml.needs import need
 from soilml.reading import RUNS, read_table
-from soilml.saving import save_text
+from soilml.saving import made_folder, replacing_all
 from soilml.writing import aligned, csv_text
+
+#: What the folder gets.
+FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
 
 HELP = "find where a model and measured runs disagree, and name what is missing"
 DESCRIPTION = """\
@@ -53,9 +56,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_effects_option(parser)
 
 
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes, where their folder is there already."""
+    folder = Path(args.out)
+    return [folder / name for name in FILES] if folder.is_dir() else []
+
+
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    need("scipy", "gap")
+    for library in ("scipy", "jinja2", "matplotlib"):
+        need(library, "gap")
     from soilml.gap import gap
     from soilml.gap.grow import model_text
 
@@ -64,7 +74,6 @@ def run(args: argparse.Namespace) -> int:
     effects = chosen_effects(args)
     case = read_case(args.model, effects)
     table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
-    folder = _folder(args.out)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
     report = gap(
         case,
@@ -77,23 +86,20 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.gap.page import page
 
-    folder.mkdir(exist_ok=True)
-    save_text(folder / "next_runs.csv", csv_text(_next_runs(report)))
-    save_text(folder / "model.toml", model_text(report.model, [report.sentence]))
-    save_text(folder / "gap.json", json.dumps(_finite(report.as_json()), indent=2) + "\n")
-    save_text(folder / "report.html", page(report, str(args.model), str(args.runs)))
+    texts = (
+        page(report, str(args.model), str(args.runs)),
+        json.dumps(_finite(report.as_json()), indent=2) + "\n",
+        model_text(report.model, [report.sentence]),
+        csv_text(_next_runs(report)),
+    )
+    with made_folder(args.out) as folder:
+        names = [folder / name for name in FILES]
+        with replacing_all(names) as parts:
+            for part, text in zip(parts, texts, strict=True):
+                part.write_text(text, encoding="utf-8")
     print(_for_people(report))
-    print(f"\n{folder}/report.html, gap.json, model.toml, next_runs.csv", file=sys.stderr)
+    print(f"\n{', '.join(str(name) for name in names)}", file=sys.stderr)
     return 0
-
-
-def _folder(out: str) -> Path:
-    folder = Path(out)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {out} is a file; needed is a folder")
-    if not folder.parent.is_dir():
-        raise InputError(f"--out {out}: there is no folder {folder.parent}; create it first")
-    return folder
 
 
 def _checked(given: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:

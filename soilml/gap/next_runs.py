@@ -52,12 +52,17 @@ def next_runs(bench: Bench, rivals: Sequence[Candidate]) -> list[NextRun]:
 
 
 def _apart(bench: Bench, one: GapFit, other: GapFit, cells: Cells) -> float:
-    """Sigma between two explanations once the run is driven, the other one adapting itself."""
+    """Sigma that a run adds between two explanations, the other one adapting itself to all rows."""
+    known = (bench.cells, bench.covariance.whiten)
+    new = (cells, spread(bench, one, cells).whiten)
+    after, before = _distance(one, other, [known, new]), _distance(one, other, [known])
+    return float(np.sqrt(max(after**2 - before**2, 0.0)))
+
+
+def _distance(one: GapFit, other: GapFit, parts: Sequence[tuple[Cells, Floats]]) -> float:
+    """Sigma between what one explanation predicts of some cells and the best that another can."""
     white, slopes = [], []
-    for part, whiten in (
-        (bench.cells, bench.covariance.whiten),
-        (cells, spread(bench, one, cells).whiten),
-    ):
+    for part, whiten in parts:
         mine = predicted(one.case, one.axes, one.x[None, :], part)[0]
         theirs, slope = linearised(other.case, other.axes, other.x, part)
         white.append(whiten @ (mine - theirs))

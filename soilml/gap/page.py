@@ -7,8 +7,6 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from soilml.effects import EFFECTS
 from soilml.gap import plain
 from soilml.gap.report import STATUSES, Curves, GapReport, Value
@@ -74,7 +72,7 @@ def page(report: GapReport, model: str, runs: str) -> str:
         curves=None if report.curves is None else _curves(report, report.curves, changed),
         soil=_soil(report),
         scatter=[plain.scattered(k, v) for k, v in report.scatter.items()],
-        reasons=report.sentence.split("; "),
+        reasons=report.reasons or (report.sentence,),
         finite=math.isfinite,
     )
 
@@ -165,14 +163,14 @@ def _maps(report: GapReport) -> list[dict[str, Any]]:
             cells = []
             for slip in slips:
                 w = places.get((name, slip, load))
-                cells.append(None if w is None else _shade(w.z, w.p, _side(report.curves, name, w)))
+                cells.append(None if w is None else _shade(w.z, w.p))
             rows.append((plain.between(*load), cells))
         grids.append({"channel": plain.channel(name), "rows": rows})
     heads = [plain.between(*slip, digits=2) for slip in slips]
     return [grid | {"slips": heads} for grid in grids]
 
 
-def _shade(z: float, p: float, side: str) -> dict[str, Any]:
+def _shade(z: float, p: float) -> dict[str, Any]:
     """One place of the map: its number, its colour and the colour of its text."""
     share = math.log(max(abs(z), _LEAST) / _LEAST) / math.log(_MOST / _LEAST)
     share = min(1.0, share) if math.isfinite(share) else 0.0
@@ -180,19 +178,14 @@ def _shade(z: float, p: float, side: str) -> dict[str, Any]:
     colour = "#" + "".join(f"{part:02x}" for part in shade)
     light = sum(w * (v / 255) ** 2.2 for w, v in zip((0.2126, 0.7152, 0.0722), shade, strict=True))
     text = "#000000" if light > 0.18 else "#ffffff"  # where both contrasts are equal
-    return {"z": z, "p": p, "sure": p < 0.05, "side": side, "colour": colour, "text": text}
-
-
-def _side(curves: Curves | None, name: str, w: Any) -> str:
-    """Whether the readings of a place stand above or below the model without the effect."""
-    if curves is None or name not in curves.channels:
-        return ""
-    here = curves.channel == curves.channels.index(name)
-    here &= (curves.slip >= w.slip[0]) & (curves.slip <= w.slip[1])
-    here &= (curves.load >= w.load_N[0]) & (curves.load <= w.load_N[1])
-    left = ((curves.reading - curves.before) / curves.std)[here]
-    left = left[np.isfinite(left)]
-    return "" if left.size == 0 else "above" if float(left.mean()) > 0.0 else "below"
+    return {
+        "z": abs(z),
+        "p": p,
+        "sure": p < 0.05,
+        "side": "above" if z > 0.0 else "below",
+        "colour": colour,
+        "text": text,
+    }
 
 
 def _curves(report: GapReport, curves: Curves, changed: bool) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +70,11 @@ class Shrink:
     cells: int
     what: str
 
+    def unchanged(self) -> Shrink:
+        """The figures of a model to which nothing was added."""
+        same = {name: (before, before) for name, (before, _) in self.channels.items()}
+        return replace(self, after=self.before, channels=same)
+
     def as_json(self) -> dict[str, Any]:
         """As it stands in gap.json."""
         return {
@@ -128,6 +133,9 @@ class GapReport:
     model: Case
     effects: tuple[NamedEffect, ...] = ()
     cause_set: tuple[tuple[str, ...], ...] = ()
+    #: what fits best where nothing is claimed; it is not in `model`
+    stand_in: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
     where: tuple[Where, ...] = ()
     gap: dict[str, Shrink] = field(default_factory=dict)
     soil_before: dict[str, Value] = field(default_factory=dict)
@@ -163,6 +171,8 @@ class GapReport:
                 for e in self.effects
             ],
             "cause_set": [list(names) for names in self.cause_set],
+            "fits_best_but_not_claimed": list(self.stand_in),
+            "reasons": list(self.reasons),
             "where": [
                 {
                     "channel": w.channel,

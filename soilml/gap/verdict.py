@@ -22,8 +22,6 @@ Floats = NDArray[np.float64]
 STRAINED = 6.0
 #: Share of the gap that may be left on runs that an explanation was not fitted to.
 CARRIES = 0.5
-#: Places on the map that are listed.
-LISTED = 12
 
 
 def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> str:
@@ -55,7 +53,7 @@ def values_of(fit: GapFit, *, soil: bool) -> dict[str, Value]:
     }
 
 
-def named(bench: Bench, soil: GapFit, causes: Sequence[Candidate]) -> list[NamedEffect]:
+def named(bench: Bench, causes: Sequence[Candidate]) -> list[NamedEffect]:
     """The effects of the best candidate, with what explains the data as well."""
     if not causes:
         return []
@@ -127,7 +125,10 @@ def mimicry(bench: Bench, found: Found) -> float:
 
 
 def map_of(bench: Bench, fit: GapFit, seed: int) -> list[Where]:
-    """Where the soil alone disagrees with the data, the worst corner first."""
+    """Where the soil alone disagrees with the data, the worst corner first.
+
+    The score is above zero where readings lie above the prediction.
+    """
     corners = list(places(bench.cells))
     if not corners:
         return []
@@ -142,7 +143,15 @@ def map_of(bench: Bench, fit: GapFit, seed: int) -> list[Where]:
         seed,
     )
     order = np.argsort(-found.z)
+    off = bench.cells.reading - fit.prediction
+    side = [float(np.mean(off[c.cells] / std[c.cells])) for c in corners]
     return [
-        Where(column(c.channel), c.slip, c.load, float(found.z[i]), found.p(float(found.z[i])))
-        for i, c in ((i, corners[i]) for i in order[:LISTED])
+        Where(
+            column(c.channel),
+            c.slip,
+            c.load,
+            float(np.copysign(found.z[i], side[i])),
+            found.p(float(found.z[i])),
+        )
+        for i, c in ((i, corners[i]) for i in order)
     ]

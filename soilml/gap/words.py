@@ -7,11 +7,18 @@ from collections.abc import Sequence
 from soilml.gap.report import GapReport
 
 
+def figure(value: float) -> str:
+    """Three digits, without powers of ten."""
+    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+
+
 def sentence(report: GapReport, unnameable: Sequence[str]) -> str:
     """The verdict in one sentence."""
     names = " + ".join(e.name for e in report.effects)
     train = report.gap["train"]
-    closed = f"mean squared residual {train.before:.3g} -> {train.after:.3g} (1 is the noise)"
+    closed = (
+        f"mean squared residual {figure(train.before)} -> {figure(train.after)} (1 is the noise)"
+    )
     if report.status == "no-gap":
         return (
             "Model and measurements agree within their noise: "
@@ -22,8 +29,8 @@ def sentence(report: GapReport, unnameable: Sequence[str]) -> str:
         return f"There is a gap, but these runs cannot name its cause: {why}."
     if report.status == "unknown":
         return (
-            "There is a gap, and nothing in the catalogue explains it: what the best candidate "
-            f"leaves is no noise (p = {report.p_left:.2g})."
+            "There is a gap, and nothing in the catalogue explains it: the best candidate leaves "
+            "more than noise, needs a law far from any known, or fails on runs it has not seen."
         )
     if report.status == "class":
         sets = ", or ".join(" + ".join(names) for names in report.cause_set)

@@ -62,14 +62,20 @@ def gap(
     cells = cells.with_noise(noise)
     gate = examined(cells, seen, repeats, len(soil))
     if gate.refused:
-        reasons = (*gate.refused, *gate.unnameable)
-        return GapReport("bad-data", "; ".join(reasons), case, notes=gate.notes, seed=seed)
+        return _refused(case, (*gate.refused, *gate.unnameable), gate.notes, seed)
     gate = replace(gate, notes=(*notes, *gate.notes))
     found = analysed(case, soil, cells, effects, calibration or {}, seed)
     if found.refused:
-        return GapReport("bad-data", found.refused, case, notes=gate.notes, seed=seed)
+        return _refused(case, (found.refused,), gate.notes, seed)
     beyond = None if kept_back is None else cells_of(case, kept_back).with_noise(noise)
     return _reported(case, found, gate, soil, beyond, what, seed)
+
+
+def _refused(case: Case, reasons: Sequence[str], notes: tuple[str, ...], seed: int) -> GapReport:
+    """The report on data that cannot be analysed."""
+    return GapReport(
+        "bad-data", "; ".join(reasons), case, reasons=tuple(reasons), notes=notes, seed=seed
+    )
 
 
 def _split(table: Table, holdout: str | None, seed: int) -> tuple[Table, Table | None, str]:
@@ -117,15 +123,20 @@ def _reported(
     after = found.causes[0].fit if found.causes else found.soil
     gaps = _gaps(analysis, after, beyond, what, seed)
     status = status_of(found, gate.unnameable, gaps.get("held_out_runs"))
-    named_effects = named(bench, found.soil, found.causes) if status != "unknown" else []
+    claimed = status in ("named", "form-open", "class")
+    if not claimed:  # the figures are those of the model that is handed over
+        after, gaps = found.soil, {name: s.unchanged() for name, s in gaps.items()}
+    named_effects = named(bench, found.causes) if claimed else []
     _, cannot = signatures(found.soil.fitted(), bench.cells, bench.effects)
     rivals = _rivals(found.causes, found.tried)
     report = GapReport(
         status=status,
         sentence="",
-        model=grown_case(after if status != "unknown" else found.soil),
+        model=grown_case(after),
         effects=tuple(named_effects),
-        cause_set=tuple(c.names for c in found.causes) if status != "unknown" else (),
+        cause_set=tuple(c.names for c in found.causes) if claimed else (),
+        stand_in=() if claimed or not found.causes else found.causes[0].names,
+        reasons=gate.unnameable if status == "not-testable" else (),
         where=tuple(map_of(bench, found.soil, seed)) if found.gap else (),
         gap=gaps,
         soil_before=values_of(found.soil, soil=True),
