@@ -84,9 +84,8 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
     readings = reported(recipe, block, np.arange(first, last), rows.run, truth)
     reasons = np.asarray([status.reason for status in Status])
     names = {path: QUANTITIES[path].column if path in QUANTITIES else path for path in rows.soil}
-    length = recipe.blocks[block].rows
     return {
-        "run": np.asarray([f"{length}x{number}" for number in rows.run]),
+        "run": np.asarray([f"{recipe.blocks[block].label}{number}" for number in rows.run]),
         **readings,
         **{names[path]: values for path, values in rows.soil.items()},
         "status": reasons[force.status],

@@ -18,16 +18,27 @@ from soilml.prior import Prior, take_prior
 from soilml.quantities import COLUMNS
 from soilml.settings import Settings, read_settings
 
+#: Columns of [operating], in the order in which they are drawn.
+DRIVEN = ("slip", "load_N")
 #: Columns that a sensor of the rover fills, and that may have noise and bias.
 SENSED = ("slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 
 
 @dataclass(frozen=True)
 class Block:
-    """Runs of one length: `share` of all rows are in runs of `rows` rows on one soil each."""
+    """Runs of one length: `share` of all rows are in runs of `rows` rows on one soil each.
+
+    Within a run, the columns `steady` of [operating] keep one value.
+    """
 
     rows: int
     share: float
+    steady: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What the names of its runs begin with."""
+        return f"{self.rows}x" + "".join(f"{name}-" for name in self.steady)
 
 
 @dataclass(frozen=True)
@@ -121,14 +132,27 @@ def _take_recipe(settings: Settings) -> Recipe:
 
 
 def _take_blocks(settings: Settings) -> tuple[Block, ...]:
-    blocks = []
+    blocks: list[Block] = []
     for entry in settings.tables("runs"):
-        blocks.append(Block(entry.count("rows", 1), entry.number("share", 1.0)))
-        if not 0.0 < blocks[-1].share <= 1.0:
-            entry.fail(f"share is {blocks[-1].share:g}; needed is a number above 0, up to 1")
+        block = Block(entry.count("rows", 1), entry.number("share", 1.0), _take_steady(entry))
+        if not 0.0 < block.share <= 1.0:
+            entry.fail(f"share is {block.share:g}; needed is a number above 0, up to 1")
+        if block.steady and block.rows == 1:
+            entry.fail("steady is for runs of 2 rows or more")
+        if block.label in {other.label for other in blocks}:
+            entry.fail("another [[runs]] has the same rows and steady; make them one")
         entry.finish()
+        blocks.append(block)
     if not blocks:
         return (Block(1, 1.0),)
     if abs(sum(b.share for b in blocks) - 1.0) > 1e-9:
         settings.fail("the shares of [[runs]] must sum to 1")
     return tuple(blocks)
+
+
+def _take_steady(entry: Settings) -> tuple[str, ...]:
+    needed = f"a list of {', '.join(DRIVEN)}"
+    given = entry.take("steady", list, needed, [])
+    if any(given.count(name) != 1 or name not in DRIVEN for name in given):
+        entry.fail(f"steady is {given!r}; needed is {needed}")
+    return tuple(name for name in DRIVEN if name in given)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from datagen.recipe import Block, Recipe
+from datagen.recipe import DRIVEN, Block, Recipe
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
     """Rows `first` to `last` (excluded) of a block; the same whatever pieces it is drawn in.
 
     Runs of one row vary soil and operating point in one scrambled Sobol sequence; longer runs draw
-    soils and operating points from two.
+    soils and operating points from two, and what is steady within a run with the soils.
     """
     shape: Block = recipe.blocks[block]
     priors = list(recipe.case.prior.items())
@@ -38,9 +38,12 @@ def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
         both = _sobol(len(priors) + 2, (recipe.seed, block, 0), first, last - first)
         soil, operating = both[:, :-2], both[:, -2:]
     else:
-        runs = _sobol(len(priors), (recipe.seed, block, 1), run[0], run[-1] - run[0] + 1)
+        dimensions = len(priors) + len(shape.steady)
+        runs = _sobol(dimensions, (recipe.seed, block, 1), run[0], run[-1] - run[0] + 1)
         soil = runs[run - run[0]]
-        operating = _sobol(2, (recipe.seed, block, 2), first, last - first)
+        operating = _sobol(len(DRIVEN), (recipe.seed, block, 2), first, last - first)
+        for i, name in enumerate(shape.steady, len(priors)):
+            operating[:, DRIVEN.index(name)] = soil[:, i]
     return Drawn(
         run=run,
         soil={path: prior.at(soil[:, i]) for i, (path, prior) in enumerate(priors)},

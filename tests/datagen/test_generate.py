@@ -105,6 +105,27 @@ def test_runs_share_soil_and_bias(tmp_path):
     assert np.std(bias[:, 0]) == pytest.approx(0.5, rel=0.2)
 
 
+def test_what_is_steady_keeps_one_value_in_a_run_and_differs_between_runs(tmp_path):
+    blocks = "".join(
+        f"[[runs]]\nrows = 8\nshare = 0.5\nsteady = {steady}\n"
+        for steady in ('["load_N"]', '["slip", "load_N"]')
+    )
+    made = recipe(tmp_path, blocks, rows=1600)
+    one_load, one_point = pieces(made)
+    assert not set(one_load["run"]) & set(one_point["run"])
+    spread = {
+        (block, name): np.ptp(columns[name].reshape(-1, 8), axis=1)
+        for block, columns in enumerate((one_load, one_point))
+        for name in ("slip", "load_N")
+    }
+    assert (spread[0, "slip"] > 0.05).all()
+    for steady in ((0, "load_N"), (1, "slip"), (1, "load_N")):
+        assert (spread[steady] == 0.0).all()
+    assert np.std(one_load["load_N"]) == pytest.approx(90.0 / np.sqrt(12.0), rel=0.05)
+    part = piece(made, 1, 13, 30)
+    assert (part["load_N"] == one_point["load_N"][13:30]).all()
+
+
 def test_rows_requested_are_rows_made(tmp_path):
     blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
     for rows in (1, 64, 1000):
@@ -160,6 +181,9 @@ def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
         ("seed = {seed}", "", "seed is missing"),
         ("[operating]", "[[runs]]\nrows = 2\nshare = 0.4\n[operating]", "must sum to 1"),
         ("slip = [0.05, 0.6]", "slip = [0.05, 0.6]\nload = [1, 2]", "unknown key 'load'"),
+        ("[operating]", '[[runs]]\nsteady = ["load"]\n[operating]', "list of slip, load_N"),
+        ("[operating]", '[[runs]]\nsteady = ["slip"]\n[operating]', "2 rows or more"),
+        ("[operating]", "[[runs]]\nshare = 0.5\n" * 2 + "[operating]", "make them one"),
     ],
 )
 def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
