@@ -13,6 +13,8 @@ from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
 
+#: Readings that the driver chooses.
+DRIVEN = ("slip", "load")
 #: Numbers of rows at which joining is measured; how many groups that takes, and may come of a run.
 LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 LEAST_GROUPS = 50

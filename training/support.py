@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from training.calibrate import DRIVEN
+from training.envelope import Envelope
 from training.graph import Graph
 from training.scaling import Scaling
 
@@ -18,9 +21,10 @@ POOL = 6000
 
 @dataclass(frozen=True)
 class Support:
-    """A box around the rows' features, and balls around some of them that hold all of them.
+    """A box around the rows' features, bounds within it, and balls that hold all of the rows.
 
-    The box alone would call a torque that no soil gives at this slip in range.
+    The bounds of what is measured follow slip and load; the box alone would call a torque that no
+    soil gives at this slip in range. The balls do the same, coarsely, between measured features.
     """
 
     lower: Floats  # (d,)
@@ -28,10 +32,15 @@ class Support:
     scaling: Scaling
     covers: Floats  # (k, d) standardised
     radius: float
+    envelopes: tuple[Envelope, ...]
 
     @staticmethod
-    def of(features: Floats, seed: int = 0) -> Support:
+    def of(features: Floats, names: Sequence[str], seed: int = 0) -> Support:
         """Balls by farthest-point selection; the radius is the least that holds every row."""
+        driven = tuple(
+            i for i, n in enumerate(names) if n in DRIVEN and np.ptp(features[:, i]) > 0.0
+        )
+        measured = set(range(len(names))) - set(driven) if driven else ()
         scaling = Scaling.of(features)
         z = scaling.apply(features)
         pool = z[np.random.default_rng(seed).permutation(len(z))[:POOL]]
@@ -44,13 +53,21 @@ class Support:
         radius = max(
             float(np.sqrt(_least(z[i : i + 4096], covers).max())) for i in range(0, len(z), 4096)
         )
-        return Support(features.min(axis=0), features.max(axis=0), scaling, covers, radius)
+        return Support(
+            lower=features.min(axis=0),
+            upper=features.max(axis=0),
+            scaling=scaling,
+            covers=covers,
+            radius=radius,
+            envelopes=tuple(Envelope.of(features, k, driven) for k in sorted(measured)),
+        )
 
     def holds(self, features: Floats) -> NDArray[np.bool_]:
         """Whether rows (n, d) lie where the training rows lie, (n,)."""
         boxed = ((features >= self.lower) & (features <= self.upper)).all(axis=1)
         near = _least(self.scaling.apply(features), self.covers) <= self.radius**2
-        return np.asarray(boxed & near)
+        bound = [envelope.holds(features) for envelope in self.envelopes]
+        return np.asarray(np.logical_and.reduce([boxed, near, *bound]))
 
     def draw(self, graph: Graph, features: str) -> str:
         """The flag (n,) as a node of an ONNX graph."""
@@ -63,9 +80,10 @@ class Support:
         x = graph.scaled(features, self.scaling.mean, self.scaling.scale)
         apart = graph.reduced("ReduceMin", graph.squared_distances(x, self.covers), 1)
         far = graph.op("Greater", apart, graph.constant(self.radius**2))
-        return graph.op(
-            "Not", graph.op("Or", graph.op("Greater", beyond, graph.constant(0.5)), far)
-        )
+        out = graph.op("Or", graph.op("Greater", beyond, graph.constant(0.5)), far)
+        for envelope in self.envelopes:
+            out = graph.op("Or", out, envelope.draw(graph, features))
+        return graph.op("Not", out)
 
 
 def _least(z: Floats, covers: Floats) -> Floats:

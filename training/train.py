@@ -98,7 +98,7 @@ def train(
     return Trained(
         spec=spec,
         estimator=estimator,
-        support=Support.of(parts.train.features, spec.seed),
+        support=Support.of(parts.train.features, spec.features, spec.seed),
         together=joint,
         prior=prior,
         data=data,
