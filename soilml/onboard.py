@@ -15,15 +15,16 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
-from soilml.estimate import Estimate, Known, Together, joined
+from soilml.estimate import Driven, Estimate, Kind, Known, Together, answered
 from soilml.features import readings
 
 Floats = NDArray[np.float64]
 
 #: Version of the file's contract: input and output names, metadata keys.
-FORMAT = "1"
-#: Keys of what the metadata says of joining rows.
-TOGETHER = ("rows", "worth", "widening", "reach", "doubt")
+FORMAT = "2"
+#: Keys of what the metadata says of what is driven, and of joining rows in each kind of run.
+DRIVEN = ("lower", "upper", "std")
+KIND = ("rows", "worth", "widening", "reach")
 #: Half-width of the 90 % interval of an answer that is the prior, in its standard deviations.
 GAUSSIAN_90 = 1.645
 #: A run of which less than this share is in range is not estimated.
@@ -72,7 +73,6 @@ class Estimator:
         try:
             inputs = json.loads(metadata["inputs"])
             outputs = json.loads(metadata["outputs"])
-            together = json.loads(metadata["together"])
             probe = json.loads(metadata["probe"])
             _check_origin(metadata)
             estimator = Estimator(
@@ -84,17 +84,18 @@ class Estimator:
                 prior=Known(
                     *(_column(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper"))
                 ),
-                together=Together(*(np.asarray(together[k], float) for k in TOGETHER)),
+                together=_together(json.loads(metadata["together"])),
                 session=session,
             )
             answer = estimator(**probe["readings"])
             off = np.abs(answer.mean - np.asarray(probe["mean"])) / estimator.prior.std
             off = np.maximum(off, np.abs(answer.std - np.asarray(probe["std"])) / answer.prior_std)
+            same = np.array_equal(answer.in_range, probe["in_range"])
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
             raise ModelFileError(f"{file} cannot be run: {error}") from None
-        if not bool(np.all(off < PROBE_TOLERANCE)):
+        if not (same and bool(np.all(off < PROBE_TOLERANCE))):
             raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator
 
@@ -115,45 +116,39 @@ class Estimator:
             covariance.astype(np.float64).reshape(*shape, q, q),
             std.astype(np.float64).reshape(*shape, q),
             in_range.reshape(shape),
-            self.together.at(1)[2],
+            self.together.alone,
         )
 
     def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings together: rows driven on one soil, arrays (rows,).
 
-        Rows out of range are left out, up to a tenth of them. Where there are more, or where the
-        rows contradict each other as rows of one soil hardly ever do, `in_range` is false and the
-        answer is the prior. Raises `InputError` as a call does, and where there is no row.
+        Rows of nearly the same slip and load count as one. Rows out of range are left out, up to a
+        tenth of them. Where there are more, or where the rows contradict each other as rows of one
+        soil hardly ever do, `in_range` is false and the answer is the prior. Raises `InputError` as
+        a call does, and where there is no row.
         """
         flat, _ = readings(self.inputs, measured)
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        single = self(**dict(zip(self.inputs, flat, strict=True)))
+        measured = dict(zip(self.inputs, flat, strict=True))
+        single = self(**measured)
         sound = single.in_range
-        if flat[0].size == 1:
+        if sound.size == 1:
             parts = (single.mean[0], single.covariance[0], single.std[0], sound[0])
-            return self._estimate(*parts, self.together.at(1)[2])
-        count = int(sound.sum())
-        worth, widening, reach, doubt = self.together.at(max(count, 1))
-        if count < LEAST_SOUND * sound.size:
-            return self._unknown(reach)
-        joint = joined(single.mean[sound], single.covariance[sound], self.prior, worth)
-        if bool((joint.doubt > doubt).any()):
-            return self._unknown(reach)
-        claimed = np.sqrt(np.diag(joint.covariance))
-        widening = np.minimum(widening, np.maximum(self.prior.std / claimed, 1.0))
-        return self._estimate(
-            np.clip(joint.mean, self.prior.lower, self.prior.upper),
-            joint.covariance * np.outer(widening, widening),
-            claimed * widening,
-            np.asarray(True),
-            reach,
-        )
+            return self._estimate(*parts, self.together.alone)
+        if sound.sum() < LEAST_SOUND * sound.size:
+            return self._unknown()
+        rule = self.together.rule({name: values[sound] for name, values in measured.items()})
+        joint = answered(single.mean[sound], single.covariance[sound], self.prior, rule)
+        if bool((joint.doubt > self.together.doubt).any()):
+            return self._unknown()
+        std = np.sqrt(np.diag(joint.covariance))
+        return self._estimate(joint.mean, joint.covariance, std, np.asarray(True), rule.reach)
 
-    def _unknown(self, reach: Floats) -> Estimate:
+    def _unknown(self) -> Estimate:
         """The prior, flagged."""
-        covariance = np.diag(self.prior.std**2)
-        return self._estimate(self.prior.mean, covariance, self.prior.std, np.asarray(False), reach)
+        mean, std = self.prior.mean, self.prior.std
+        return self._estimate(mean, np.diag(std**2), std, np.asarray(False), self.together.alone)
 
     def _estimate(
         self,
@@ -183,16 +178,33 @@ def checksum(metadata: Mapping[str, str]) -> str:
     return hashlib.sha256(json.dumps(entries).encode()).hexdigest()
 
 
-def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
-    """Whether graph and metadata are those that were written.
+def behind(metadata: Mapping[str, str]) -> bytes:
+    """The metadata as it stands behind the graph in the file: entries of field 14, by key."""
+    found = b""
+    for key, value in sorted(metadata.items()):
+        entry = _field(1, key.encode()) + _field(2, value.encode())
+        found += _field(14, entry)
+    return found
 
-    The graph stands in front of the metadata in the file, in as many bytes as the metadata says.
-    """
-    size = metadata.get("graph_bytes", "0")
-    graph = content[: int(size) if size.isdecimal() and len(size) < 16 else 0]
-    return hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256") and checksum(
-        metadata
-    ) == metadata.get("metadata_sha256")
+
+def _field(number: int, content: bytes) -> bytes:
+    """A field of a protobuf message: its number and wire type 2, its length, its content."""
+    size, length = len(content), bytearray()
+    while size > 127:
+        length.append(size & 127 | 128)
+        size >>= 7
+    return bytes((number << 3 | 2, *length, size)) + content
+
+
+def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
+    """Whether the file is the graph and the metadata that were written, and not a byte more."""
+    told = behind(metadata)
+    graph = content.removesuffix(told)
+    return (
+        len(graph) + len(told) == len(content)
+        and hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256")
+        and checksum(metadata) == metadata.get("metadata_sha256")
+    )
 
 
 def _check_origin(metadata: Mapping[str, str]) -> None:
@@ -226,6 +238,19 @@ def _session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ModelFileError(f"{file} is not a whole ONNX model: {first[:160]}") from None
+
+
+def _together(said: dict[str, Any]) -> Together:
+    driven = Driven(tuple(said["over"]), *(np.asarray(said[key], float) for key in DRIVEN))
+    return Together(
+        driven,
+        tuple(
+            Kind(tuple(kind["varies"]), *(np.asarray(kind[key], float) for key in KIND))
+            for kind in said["kinds"]
+        ),
+        np.asarray(said["alone"], float),
+        np.asarray(said["doubt"], float),
+    )
 
 
 def _column(entries: list[dict[str, Any]], key: str) -> Floats:

@@ -1,13 +1,14 @@
 """The released models: whole, from today's recipes, and as good as their cards say."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from datagen.engine import pieces
-from datagen.recipe import read_recipe
+from datagen.recipe import Block, read_recipe
 from soilml import Estimator
 from soilml.quantities import column
 from training.spec import read_spec
@@ -56,3 +57,48 @@ def test_is_as_good_on_another_seed_as_its_card_says(name):
     inside = np.mean((truth >= found.low) & (truth <= found.high), axis=0)
     assert (np.abs(inside - 0.9) < 0.02).all()
     assert found.in_range.mean() > 0.995
+
+
+STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
+
+
+def runs(recipe, rows, steady, count=400):
+    """Columns (runs, rows) of runs in which something is steady."""
+    recipe = replace(recipe, blocks=(Block(rows, 1.0, steady),)).sized(rows * count, seed=777)
+    parts = list(pieces(recipe))
+    return {k: np.concatenate([p[k] for p in parts]).reshape(count, rows) for k in parts[0]}
+
+
+def coverage(estimator, columns, copies=1):
+    """Share of the runs that are in range, and of the truths in their intervals, (q,)."""
+    truth = np.stack([columns[column(n)][:, 0] for n in estimator.names], axis=1)
+    found = [
+        estimator.run(
+            **{n: np.repeat(columns[column(n)][i], copies) for n in estimator.inputs},
+        )
+        for i in range(len(truth))
+    ]
+    low, high = np.stack([e.low for e in found]), np.stack([e.high for e in found])
+    inside = np.mean((truth >= low) & (truth <= high), axis=0)
+    return np.mean([e.in_range for e in found]), inside
+
+
+@pytest.mark.parametrize("name", RELEASED)
+@pytest.mark.parametrize("steady", STEADY, ids=lambda steady: "-".join(("steady", *steady)))
+def test_intervals_hold_in_every_kind_of_run(name, steady):
+    estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+    recipe = read_recipe(RELEASED[name][0])
+    for rows in (2, 7, 18, 40):
+        sound, inside = coverage(estimator, runs(recipe, rows, steady))
+        assert sound > 0.97
+        assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)
+
+
+@pytest.mark.parametrize("name", RELEASED)
+def test_readings_repeated_and_points_held_claim_no_more_than_they_tell(name):
+    estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+    recipe = read_recipe(RELEASED[name][0])
+    for rows, copies in ((1, 32), (3, 10)):
+        sound, inside = coverage(estimator, runs(recipe, rows, ()), copies)
+        assert sound > 0.97
+        assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)

@@ -63,9 +63,9 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
         "",
         *_scores(trained.scores, [o["name"] for o in outputs]),
         "",
-        "Several readings of one soil together (`run`): how much each row is taken to add, what "
-        "the standard deviation is multiplied by, and what came of it on runs that neither was "
-        "fitted to.",
+        "Several readings of one soil together (`run`), by what the run varied: what came of them "
+        "on runs that joining was not fitted to. Rows of nearly the same slip and load count as "
+        "one, and a run between these kinds is taken between them.",
         "",
         *_together(trained, [o["name"] for o in outputs]),
         "",
@@ -125,18 +125,12 @@ def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
 
 
 def _together(trained: Trained, names: list[str]) -> list[str]:
-    head = " | ".join(f"{what} {n}" for what in ("widening", "error", "90 %") for n in names)
-    lines = [
-        f"| rows | sets | worth of a row | {head} |",
-        "|---:|---:|---:|" + "---:|" * (3 * len(names)),
-    ]
-    joint = trained.together
-    for rows, worth, widening in zip(joint.rows, joint.worth, joint.widening, strict=True):
-        cells = [f"{w:.2f}" for w in widening]
-        if score := trained.sets.get(int(rows)):
-            cells += [f"{v:.3f}" for v in score.relative] + [f"{v:.1%}" for v in score.cover90]
-            sets = str(score.rows)
-        else:
-            cells, sets = cells + [""] * (2 * len(names)), ""
-        lines.append(f"| {rows:g} | {sets} | {worth:g} | {' | '.join(cells)} |")
+    head = " | ".join(f"{what} {n}" for what in ("error", "90 %") for n in names)
+    lines = [f"| run | rows | sets | {head} |", "|---|---:|---:|" + "---:|" * (2 * len(names))]
+    for kind, scores in trained.sets.items():
+        for rows, score in scores.items():
+            cells = [f"{v:.3f}" for v in score.relative] + [f"{v:.1%}" for v in score.cover90]
+            lines.append(f"| {kind} | {rows} | {score.rows} | {' | '.join(cells)} |")
+        if not scores:
+            lines.append(f"| {kind} | | 0 |{' |' * (2 * len(names))}")
     return lines

@@ -112,7 +112,7 @@ def _sets(table: Table) -> dict[int, list[Table]]:
     """Sets by size: single rows, one from each run, and all runs of a length that is common."""
     runs = [rows for _, rows in table.groups("run")]
     step = max(len(runs) // MOST_SETS, 1)
-    found = {1: [rows.rows(np.asarray([0])) for rows in runs[::step]]}
+    found = {1: [rows.rows(np.asarray([i % len(rows)])) for i, rows in enumerate(runs[::step])]}
     for size in sorted({len(rows) for rows in runs} - {1}):
         alike = [rows for rows in runs if len(rows) == size][:MOST_SETS]
         if len(alike) >= LEAST_SETS:

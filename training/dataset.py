@@ -51,11 +51,16 @@ class Dataset:
 
     def thinned(self, most: int = 2) -> Dataset:
         """At most so many rows of each run: rows of one soil err alike and would count double."""
-        order = np.argsort(self.run, kind="stable")
-        run = self.run[order]
-        starts = np.flatnonzero(np.r_[True, np.diff(run) != 0])
-        place = np.arange(len(run)) - np.repeat(starts, np.diff(np.r_[starts, len(run)]))
-        return self.rows(np.sort(order[place < most]))
+        return self.rows(np.sort(np.concatenate([run[:most] for run in self.runs()])))
+
+    def runs(self) -> list[NDArray[np.int64]]:
+        """Row numbers of each run, shuffled.
+
+        Rows of a recipe are drawn to fill the range: the first rows of all runs are driven alike.
+        """
+        order = np.random.default_rng(0).permutation(len(self))
+        order = order[np.argsort(self.run[order], kind="stable")]
+        return np.split(order, np.flatnonzero(np.diff(self.run[order])) + 1)
 
     @property
     def units(self) -> tuple[str, ...]:

@@ -14,8 +14,8 @@ from scipy.stats import qmc
 
 from soilml import __version__
 from soilml.errors import SoilmlError
-from soilml.features import computed, inputs_of, parts
-from soilml.onboard import FORMAT, checksum
+from soilml.features import READABLE, computed, inputs_of, parts
+from soilml.onboard import DRIVEN, FORMAT, KIND, behind, checksum
 from soilml.quantities import QUANTITIES
 from soilml.saving import replacing
 from training.graph import IR_VERSION, OPSET, Graph
@@ -84,17 +84,10 @@ def export(
         )
     metadata = _metadata(trained, parity, data_path)
     graph = model.SerializeToString(deterministic=True)
-    metadata["graph_bytes"] = str(len(graph))
     metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
     metadata["metadata_sha256"] = checksum(metadata)
-    for key, value in sorted(metadata.items()):
-        entry = model.metadata_props.add()
-        entry.key, entry.value = key, value
-    content = model.SerializeToString(deterministic=True)
-    if not content.startswith(graph):
-        raise SoilmlError("this version of onnx does not write the metadata behind the graph")
     with replacing(path) as part:
-        part.write_bytes(content)
+        part.write_bytes(graph + behind(metadata))
     return metadata
 
 
@@ -132,10 +125,13 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
         "gear": json.dumps(json.loads(recipe).get("gear", {}), sort_keys=True),
         "together": json.dumps(
             {
-                "rows": joint.rows.tolist(),
-                "worth": joint.worth.tolist(),
-                "widening": joint.widening.tolist(),
-                "reach": joint.reach.tolist(),
+                "over": joint.driven.names,
+                **{key: getattr(joint.driven, key).tolist() for key in DRIVEN},
+                "kinds": [
+                    {"varies": kind.varies} | {key: getattr(kind, key).tolist() for key in KIND}
+                    for kind in joint.kinds
+                ],
+                "alone": joint.alone.tolist(),
                 "doubt": joint.doubt.tolist(),
             }
         ),
@@ -159,12 +155,15 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
         ),
         "metrics_of_sets": json.dumps(
             {
-                size: {
-                    "rmse_share_of_prior": score.relative.tolist(),
-                    "cover90": score.cover90.tolist(),
-                    "sets": score.rows,
+                kind: {
+                    size: {
+                        "rmse_share_of_prior": score.relative.tolist(),
+                        "cover90": score.cover90.tolist(),
+                        "sets": score.rows,
+                    }
+                    for size, score in scores.items()
                 }
-                for size, score in trained.sets.items()
+                for kind, scores in trained.sets.items()
             }
         ),
         "parity": f"{parity:.3e}",
@@ -204,15 +203,19 @@ def _parity(trained: Trained, content: bytes) -> float:
 
 
 def _probe(trained: Trained) -> dict[str, Any]:
-    """A few readings with their answers, which the board checks when it loads the file."""
+    """A few readings with their answers, which the board checks when it loads the file.
+
+    The last is far out of range, and possible: halfway to the end of what can be measured.
+    """
     chosen = np.linspace(0, len(trained.parts.train) - 1, 8).astype(int)
-    readings = {
-        name: values[chosen].astype(np.float32).astype(np.float64)
-        for name, values in trained.parts.train.measured.items()
-    }
-    mean, std, _ = trained.predict(computed(trained.spec.features, readings))
+    readings = {}
+    for name, values in trained.parts.train.measured.items():
+        far = 0.5 * (values.max() + min(READABLE[name][1], 100.0 * np.abs(values).max()))
+        readings[name] = np.append(values[chosen], far).astype(np.float32).astype(np.float64)
+    mean, std, inside = trained.predict(computed(trained.spec.features, readings))
     return {
         "readings": {name: values.tolist() for name, values in readings.items()},
         "mean": mean.tolist(),
         "std": std.tolist(),
+        "in_range": inside.tolist(),
     }

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.estimate import Known, Together, joined
+from soilml.estimate import Driven, Known, Rule, Together, answered
 from soilml.fusion import RULES
 from training.calibrate import (
     LEAST_GROUPS,
     Calibrated,
     calibrated,
     covariances,
+    driven_of,
     groups_of,
-    runs_of,
+    long_groups,
+    measured_of,
+    runs_that,
     together,
 )
 from training.dataset import Dataset, Split, split
@@ -45,7 +48,7 @@ class Trained:
     data: Dataset
     parts: Split
     scores: dict[str, Score]
-    sets: dict[int, Score]
+    sets: dict[str, dict[int, Score]]
     members: tuple[Calibrated, ...]
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -76,6 +79,8 @@ def train(
     targets = parts.train.targets
     prior = Known(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
     first, second, third = _thirds(parts.calibrate.thinned(), spec.seed)
+    unseen = np.isin(parts.calibrate.run, third.run)
+    _check_enough(data, parts.calibrate.rows(~unseen))
     members = []
     for regressor in spec.regressors:
         _fit(regressor, parts, partial(progress, f"fitting {regressor.kind}"))
@@ -93,8 +98,8 @@ def train(
         seen = parts.calibrate.thinned()
         estimator = calibrated(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
     scores["estimator"] = _scored(estimator, third, prior.std)
-    unseen = np.isin(parts.calibrate.run, third.run)
-    joint = _together(estimator, parts.calibrate.rows(~unseen), prior)
+    driven = driven_of(parts.train)
+    joint = _together(estimator, parts.calibrate.rows(~unseen), prior, driven)
     return Trained(
         spec=spec,
         estimator=estimator,
@@ -107,6 +112,17 @@ def train(
         sets=_set_scores(estimator, joint, parts.calibrate.rows(unseen), prior),
         members=tuple(members),
     )
+
+
+def _check_enough(data: Dataset, calibrate: Dataset) -> None:
+    """Raise `InputError` where intervals would be measured on too few rows."""
+    found = len(groups_of(calibrate.runs(), 1))
+    if found < LEAST_GROUPS:
+        needed = int(1.1 * len(data) * LEAST_GROUPS / max(found, 1)) + 1
+        raise InputError(
+            f"{len(data)} rows leave {found} to measure the intervals on; needed are "
+            f"{LEAST_GROUPS}: generate about {needed} rows of such runs, or more"
+        )
 
 
 def _fit(regressor: Any, parts: Split, progress: Callable[[int, int], None]) -> None:
@@ -134,29 +150,37 @@ def _thirds(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
     return data.rows(place == 0), data.rows(place == 1), data.rows(place == 2)
 
 
-def _together(estimator: Calibrated, data: Dataset, prior: Known) -> Together:
+def _together(estimator: Calibrated, data: Dataset, prior: Known, driven: Driven) -> Together:
     mean, std = estimator.predict(data.features)
-    return together(mean, covariances(std, estimator.correlation), data, prior)
+    return together(mean, covariances(std, estimator.correlation), data, prior, driven)
 
 
 def _set_scores(
     estimator: Calibrated, joint: Together, data: Dataset, prior: Known
-) -> dict[int, Score]:
-    """Figures of several rows joined, by their number, on runs that joining was not fitted to."""
+) -> dict[str, dict[int, Score]]:
+    """Figures of several rows joined, by what the run varied and the number of rows.
+
+    On runs that joining was not fitted to.
+    """
     mean, std = estimator.predict(data.features)
     covariance = covariances(std, estimator.correlation)
-    found = {}
-    for length in joint.rows[1:].astype(int):
-        groups = groups_of(runs_of(data), int(length))
-        if len(groups) < LEAST_GROUPS:
-            break
-        worth, widening, reach, _ = joint.at(int(length))
-        answer = joined(mean[groups], covariance[groups], prior, worth)
-        claimed = np.sqrt(np.diagonal(answer.covariance, axis1=1, axis2=2))
-        spread = np.minimum(claimed * widening, prior.std) * reach / NINETY
-        kept = np.clip(answer.mean, prior.lower, prior.upper)
-        found[int(length)] = scored(data.targets[groups[:, 0]], kept, spread, prior.std)
+    found: dict[str, dict[int, Score]] = {}
+    for kind in joint.kinds:
+        scores = found[joint.said(kind)] = {}
+        for groups in long_groups(runs_that(kind.varies, data, joint.driven)):
+            answers = [
+                _joined(mean[rows], covariance[rows], prior, joint.rule(measured_of(data, rows)))
+                for rows in groups
+            ]
+            middle, spread = (np.stack(part) for part in zip(*answers, strict=True))
+            scores[groups.shape[1]] = scored(data.targets[groups[:, 0]], middle, spread, prior.std)
     return found
+
+
+def _joined(mean: Floats, covariance: Floats, prior: Known, rule: Rule) -> tuple[Floats, Floats]:
+    """Mean, and the standard deviation of a Gaussian with the interval that is answered."""
+    joint = answered(mean, covariance, prior, rule)
+    return joint.mean, np.sqrt(np.diag(joint.covariance)) * rule.reach / NINETY
 
 
 def _scored(estimator: Calibrated, data: Dataset, prior_std: Floats) -> Score:

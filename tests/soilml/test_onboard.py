@@ -119,6 +119,19 @@ def test_no_reading_and_readings_of_two_lengths_are_refused(estimator):
         estimator(slip=[0.1, 0.2], torque=[1.0, 2.0, 3.0], load=60.0)
 
 
+def test_a_reading_repeated_tells_what_it_tells_once(estimator):
+    alone = estimator(slip=0.3, torque=3.0, load=60.0)
+    again = estimator.run(slip=np.full(500, 0.3), torque=np.full(500, 3.0), load=np.full(500, 60.0))
+    assert bool(again.in_range)
+    np.testing.assert_allclose(again.std, alone.std, rtol=0.1)
+    np.testing.assert_allclose(again.mean, alone.mean, atol=0.03 * alone.prior_std.min())
+    run = {"slip": [0.1, 0.3, 0.5], "torque": [1.7, 3.4, 7.0], "load": [40.0, 60.0, 110.0]}
+    once = estimator.run(**run)
+    often = estimator.run(**{name: np.repeat(values, 20) for name, values in run.items()})
+    for field in ("mean", "std", "low", "high"):
+        np.testing.assert_allclose(getattr(often, field), getattr(once, field), rtol=0.02)
+
+
 def test_one_row_together_is_that_row(estimator):
     alone = estimator(slip=0.3, torque=3.0, load=60.0)
     together = estimator.run(slip=0.3, torque=3.0, load=60.0)
@@ -165,6 +178,39 @@ def test_every_single_damaged_byte_is_found(tmp_path, small_model):
         with pytest.raises(ModelFileError) as caught:
             Estimator.load(tmp_path / "damaged.onnx")
         assert "\n" not in str(caught.value)
+
+
+def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
+    whole = small_model.read_bytes()
+    model = onnx.load(small_model)
+    more = onnx.ModelProto()
+    more.graph.initializer.append(
+        onnx.numpy_helper.from_array(np.zeros(1), model.graph.initializer[0].name)
+    )
+    swapped = onnx.ModelProto()
+    swapped.CopyFrom(model)
+    for entry in reversed(model.metadata_props):
+        swapped.metadata_props.remove(entry)
+        swapped.metadata_props.append(entry)
+    graph_alone = onnx.ModelProto()
+    graph_alone.CopyFrom(model)
+    del graph_alone.metadata_props[:]
+    front = len(graph_alone.SerializeToString(deterministic=True))
+    for content in (
+        whole + more.SerializeToString(),
+        more.SerializeToString() + whole,
+        whole[:front] + more.SerializeToString() + whole[front:],
+        whole + whole[front:],  # the metadata twice
+        swapped.SerializeToString(deterministic=True),
+    ):
+        (tmp_path / "more.onnx").write_bytes(content)
+        with pytest.raises(ModelFileError):
+            Estimator.load(tmp_path / "more.onnx")
+
+
+def test_the_probe_asks_for_a_row_out_of_range(estimator):
+    asked = json.loads(estimator.metadata["probe"])["in_range"]
+    assert asked == [True] * 8 + [False]
 
 
 def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small_model):

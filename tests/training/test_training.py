@@ -1,16 +1,20 @@
 """Training: splits, calibration, specs, cards, pictures."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from soilml.errors import InputError, TableError
 from soilml.estimate import Known
-from training.calibrate import calibrated, covariances, together
+from training.calibrate import calibrated, covariances, driven_of, together
 from training.dataset import read_dataset, split
 from training.fused import fused
 from training.linear import LinearGaussian
 from training.score import scored
 from training.spec import read_spec
+from training.train import train
 
 FEATURES = ("slip", "torque/load", "load")
 TARGETS = ("cohesion", "friction_angle", "shear_modulus")
@@ -85,13 +89,38 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     prior = Known(data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper)
     mean, std = member.predict(parts.calibrate.features)
     covariance = covariances(std, member.correlation)
-    joint = together(mean, covariance, parts.calibrate, prior)
-    assert joint.rows.tolist() == [1, 2, 3, 4, 6, 8, 12, 16, 24, 32]
-    assert (joint.worth[1:] <= joint.worth[0]).all()
+    driven = driven_of(parts.train)
+    assert driven.names == ("slip", "load")
+    joint = together(mean, covariance, parts.calibrate, prior, driven)
+    steady, one_slip, one_load, free = joint.kinds
+    np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
+    assert (free.worth[1:] <= free.worth[0]).all()
+    for kind in (steady, one_slip, one_load):  # none in the data: rows narrow nothing
+        assert kind.rows.tolist() == [1.0]
+        assert np.exp(kind.at(32)[0]) == pytest.approx(1 / 32)
     alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
     mean, std = member.predict(alone.features)
-    unknown = together(mean, covariances(std, member.correlation), alone, prior)
-    assert unknown.worth[-1] == pytest.approx(1 / 32)  # nothing known: rows narrow nothing
+    unknown = together(mean, covariances(std, member.correlation), alone, prior, driven)
+    assert all(np.exp(k.at(32)[0]) == pytest.approx(1 / 32) for k in unknown.kinds)
+
+
+def test_rows_of_a_run_are_taken_from_anywhere_in_it(data):
+    many = data.rows(data.run_length == 32)
+    for start in (0, 1):
+        first = np.asarray([run[start] for run in many.runs()])
+        share = (many.measured["slip"][first] - 0.05) / 0.55
+        assert np.ptp(share) > 0.7 and abs(share.mean() - 0.5) < 0.15
+    assert sorted(np.concatenate(many.runs())) == list(range(len(many)))
+
+
+def test_too_few_rows_for_intervals_are_refused_before_anything_is_fitted(data):
+    alone = data.rows(np.flatnonzero(data.run_length == 1)[:200])
+    spec = replace(read_spec("linear"), regressors=())
+    with pytest.raises(InputError, match=r"200 rows leave \d+ .* about [34]\d\d rows") as caught:
+        train(spec, alone)
+    enough = int(re.search(r"about (\d+) rows", str(caught.value))[1])
+    more = data.rows(np.flatnonzero(data.run_length == 1)[:enough])
+    assert train(read_spec("linear"), more).together.alone.shape == (3,)
 
 
 def test_train_writes_model_card_and_picture(small_model):
