@@ -62,7 +62,7 @@ def parity() -> str:
 
 def centres(folder: Path) -> str:
     """How many centres the inverse problem of one reading needs."""
-    generate(read_recipe("wheel").sized(65536, 1), folder / "data.parquet")
+    generate(read_recipe("wheel"), folder / "data.parquet")
     parts = split(read_dataset(folder / "data.parquet", FEATURES, SHEAR), seed=0)
     train, check = parts.train, parts.calibrate.thinned()
     spread = train.targets.std(axis=0)
