@@ -16,7 +16,7 @@ from datagen.hidden.sets import draw
 from soilml.case import Case, read_case
 from soilml.effects import EFFECTS
 from soilml.gap import GapReport, gap
-from soilml.gap.cells import operating
+from soilml.identification.driven import operating
 from soilml.quantities import CHANNELS, column
 from soilml.table import Table
 

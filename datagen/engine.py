@@ -15,7 +15,7 @@ from datagen.recipe import Recipe
 from datagen.sample import drawn
 from datagen.sensors import reported, true_values
 from soilml.errors import InputError
-from soilml.operating import Operating
+from soilml.operating import COVARIATES, Operating
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.saving import replacing
 from soilml.status import Status
@@ -79,7 +79,8 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
     """Rows `first` to `last` (excluded) of a block."""
     rows = drawn(recipe, block, first, last)
     case = recipe.case.with_values(rows.soil)
-    force = case.model(case.soil, Operating(slip=rows.slip, load=rows.load))
+    at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
+    force = case.model(case.soil, at)
     truth = true_values(rows.slip, rows.load, force)
     readings = reported(recipe, block, np.arange(first, last), rows.run, truth)
     reasons = np.asarray([status.reason for status in Status])
@@ -87,6 +88,7 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
     return {
         "run": np.asarray([f"{recipe.blocks[block].label}{number}" for number in rows.run]),
         **readings,
+        **{COVARIATES[field]: values for field, values in rows.covariates.items()},
         **{names[path]: values for path, values in rows.soil.items()},
         "status": reasons[force.status],
     }

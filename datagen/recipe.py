@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from soilml.case import Case, take_case
+from soilml.effects import EFFECTS, Effect
 from soilml.errors import InputError
 from soilml.noise import Noise, take_noise
-from soilml.operating import MOST_SLIP
+from soilml.operating import COVARIATES, MOST_SLIP
 from soilml.prior import Prior, take_prior
 from soilml.quantities import COLUMNS
 from soilml.settings import Settings, read_settings
@@ -48,6 +50,7 @@ class Recipe:
     case: Case
     slip: Prior
     load: Prior
+    covariates: dict[str, Prior]
     bias: dict[str, Noise]
     blocks: tuple[Block, ...]
     rows: int
@@ -93,17 +96,19 @@ def located(path: str | os.PathLike[str], package: str, folder: str) -> Path:
     return own
 
 
-def read_recipe(path: str | os.PathLike[str]) -> Recipe:
+def read_recipe(
+    path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS
+) -> Recipe:
     """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
     file = located(path, "datagen", "recipes")
     settings = read_settings(file)
-    recipe = _take_recipe(settings)
+    recipe = _take_recipe(settings, effects)
     settings.finish()
     return recipe
 
 
-def _take_recipe(settings: Settings) -> Recipe:
-    case = take_case(settings)
+def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
+    case = take_case(settings, effects)
     if not case.prior:
         settings.fail("nothing varies: give ranges in [soil.prior]")
     operating = settings.table("operating")
@@ -112,6 +117,12 @@ def _take_recipe(settings: Settings) -> Recipe:
         operating.fail(f"slip is [{slip.lower:g}, {slip.upper:g}]; it must lie between -1 and 1")
     if load.lower <= 0:
         operating.fail(f"load_N begins at {load.lower:g}; it must lie above zero")
+    operating.knows(COVARIATES.values())
+    covariates = {f: take_prior(operating, k) for f, k in COVARIATES.items() if k in operating}
+    for effect in case.model.effects:
+        for field in effect.about.needs:
+            if field not in covariates:
+                operating.fail(f"{COVARIATES[field]} is missing; the effect {effect.name} needs it")
     operating.finish()
     bias_settings = settings.table("bias")
     bias = {key: take_noise(bias_settings, key) for key in SENSED if key in bias_settings}
@@ -123,6 +134,7 @@ def _take_recipe(settings: Settings) -> Recipe:
         case=case,
         slip=slip,
         load=load,
+        covariates=covariates,
         bias=bias,
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),

@@ -22,6 +22,7 @@ class Drawn:
     soil: dict[str, Floats]
     slip: Floats
     load: Floats
+    covariates: dict[str, Floats]
 
 
 def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
@@ -49,7 +50,23 @@ def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
         soil={path: prior.at(soil[:, i]) for i, (path, prior) in enumerate(priors)},
         slip=recipe.slip.at(operating[:, 0]),
         load=recipe.load.at(operating[:, 1]),
+        covariates=_covariates(recipe, block, run),
     )
+
+
+def _covariates(recipe: Recipe, block: int, run: NDArray[np.int64]) -> dict[str, Floats]:
+    """Speed, pass and slip angle where the recipe varies them: one draw for each run."""
+    if not recipe.covariates:
+        return {}
+    count = run[-1] - run[0] + 1
+    u = _sobol(len(recipe.covariates), (recipe.seed, block, 3), int(run[0]), int(count))
+    found = {
+        field: prior.at(u[run - run[0], i])
+        for i, (field, prior) in enumerate(recipe.covariates.items())
+    }
+    if "pass_number" in found:
+        found["pass_number"] = np.round(found["pass_number"])
+    return found
 
 
 def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.saving import named
 
 HELP = "synthetic measurements from a recipe, as Parquet"
@@ -31,6 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT.parquet")
     parser.add_argument("--rows", type=int, help="how many, instead of the recipe's")
     parser.add_argument("--seed", type=int, help="instead of the recipe's")
+    add_effects_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -47,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     from datagen.progress import bar
     from datagen.recipe import read_recipe
 
-    recipe = read_recipe(args.recipe).sized(args.rows, args.seed)
+    recipe = read_recipe(args.recipe, chosen_effects(args)).sized(args.rows, args.seed)
     with bar("simulating", recipe.rows) as progress:
         made = generate(recipe, args.out, progress)
     note = f", {made.failed} without equilibrium" if made.failed else ""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from soilml.case import read_case
+from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.commands.output import put, watched
 from soilml.errors import FitError, InputError
 from soilml.identification.fit import Fit
@@ -45,6 +46,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
     parser.add_argument("--method", default="nonlinear", help="nonlinear, linear or newton")
     parser.add_argument("--free", metavar="A,B,...", help="parameters to find")
+    add_effects_option(parser)
     parser.add_argument("--by", metavar="run", help="one answer for each value of this column")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.json", help="where to write the answer")
@@ -66,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     need("scipy", "identify")
     from soilml.identification import identify
 
-    case = read_case(args.model)
+    case = read_case(args.model, chosen_effects(args))
     table = chosen_rows(args, RUNS)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
     failed: dict[str, str] = {}

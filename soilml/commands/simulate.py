@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.case import read_case
+from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.commands.output import deliver
 from soilml.errors import InputError
-from soilml.operating import Operating
+from soilml.operating import COVARIATES, Operating
 from soilml.saving import named
 from soilml.status import Status
 
@@ -37,6 +38,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL.toml", help="gear, soil and effects")
     parser.add_argument("--slip", required=True, help="slip ratios, driving above 0, braking below")
     parser.add_argument("--load", required=True, help="vertical loads, N")
+    parser.add_argument("--speed", type=float, metavar="M_S", help="below zero in reverse")
+    parser.add_argument("--pass", dest="passes", type=float, help="1 on virgin soil, 2 in a rut")
+    parser.add_argument("--slip-angle", type=float, metavar="RAD", help="wheel out of its path")
+    add_effects_option(parser)
     parser.add_argument(
         "--run", dest="label", metavar="NAME", help="put a column run with this name in front"
     )
@@ -50,7 +55,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate and deliver the table."""
-    case = read_case(args.model)
+    case = read_case(args.model, chosen_effects(args))
     slips, loads = numbers("--slip", args.slip), numbers("--load", args.load)
     if slips.size * loads.size > MOST_ROWS:
         raise InputError(
@@ -58,7 +63,8 @@ def run(args: argparse.Namespace) -> int:
             f"at most {MOST_ROWS} are simulated at once"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
-    force = case.model(case.soil, Operating(slip=slip, load=load))
+    given = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
+    force = case.model(case.soil, Operating(slip=slip, load=load, **given))
     failed = int(np.count_nonzero(force.status))
     if failed == slip.size:
         worst = Status(int(force.status[0]))
@@ -70,6 +76,11 @@ def run(args: argparse.Namespace) -> int:
         | {
             "slip": slip,
             "load_N": load,
+            **{
+                COVARIATES[field]: np.full(slip.size, value)
+                for field, value in given.items()
+                if value is not None
+            },
             "torque_Nm": force.torque,
             "drawbar_pull_N": force.drawbar_pull,
             "sinkage_m": force.sinkage,

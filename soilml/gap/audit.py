@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from soilml.case import Case
 from soilml.effects import EFFECTS, Effect
 from soilml.errors import InputError
-from soilml.gap.cells import Cells, declared_std, operating
+from soilml.gap.cells import Cells, declared_std
 from soilml.gap.menu import cells_at, menu
 from soilml.gap.predict import linearised, soil_axis
 from soilml.gap.score import outside
 from soilml.gap.signatures import Signature, signatures
+from soilml.identification.driven import operating
 from soilml.identification.free import chosen
 from soilml.parameters import declared
 from soilml.quantities import CHANNELS, SHEAR, column

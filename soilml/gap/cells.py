@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.case import Case
+from soilml.identification.driven import operating
 from soilml.noise import Noise
-from soilml.operating import COVARIATES, Operating
+from soilml.operating import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.table import Table
 
@@ -81,16 +82,6 @@ class Cells:
         """The same cells with these constant standard deviations where none was declared."""
         own = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])
         return replace(self, std=np.where(np.isfinite(self.std), self.std, own))
-
-
-def operating(table: Table) -> Operating:
-    """The rows of a table as they were driven; a covariate with a blank cell counts as unknown."""
-    known = {
-        field: table[key]
-        for field, key in COVARIATES.items()
-        if key in table and np.isfinite(table[key]).all()
-    }
-    return Operating(slip=table["slip"], load=table["load_N"], **known)
 
 
 def cells_of(case: Case, table: Table) -> Cells:

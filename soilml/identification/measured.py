@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.errors import FitError, TableError
+from soilml.identification.driven import operating
+from soilml.operating import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.table import Table
 
@@ -30,15 +32,24 @@ class Channel:
 
 @dataclass(frozen=True)
 class Measured:
-    """Rows (n,): slip and load as reported, their noise, and the channels to be explained."""
+    """Rows (n,): how they were driven, the noise of that, and what is to be explained."""
 
-    slip: Floats
-    load: Floats
+    at: Operating
     slip_std: Floats
     load_std: Floats
     channels: tuple[Channel, ...]
     left_out: tuple[str, ...]
     notes: tuple[str, ...] = ()
+
+    @property
+    def slip(self) -> Floats:
+        """Slip of each row, (n,)."""
+        return np.asarray(self.at.slip)
+
+    @property
+    def load(self) -> Floats:
+        """Load of each row, (n,), N."""
+        return np.asarray(self.at.load)
 
     @property
     def cells(self) -> int:
@@ -74,8 +85,7 @@ def measured_rows(case: Case, table: Table) -> Measured:
     used = [c for c in found if c.declared] or found
     left_out = [column(c.name) for c in found if c not in used]
     return Measured(
-        slip=table["slip"],
-        load=table["load_N"],
+        at=operating(table),
         slip_std=np.nan_to_num(_declared(case, table, "slip")),
         load_std=np.nan_to_num(_declared(case, table, "load_N")),
         channels=tuple(used),

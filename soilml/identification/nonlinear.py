@@ -141,7 +141,7 @@ def _best(
     except ImportError:
         raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
     looks = np.vstack([nominal, qmc.Sobol(len(free), scramble=True, rng=7).random(LOOKS)])
-    y = stacked(data, predicted(case, free, looks, data.slip, data.load))
+    y = stacked(data, predicted(case, free, looks, data.at))
     if np.isnan(y).any(axis=1).all():
         raise FitError(
             "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,12 @@ Floats = NDArray[np.float64]
 STEP = 1e-4
 
 
-def predicted(
-    case: Case, free: Sequence[Free], u: Floats, slip: Floats, load: Floats
-) -> dict[str, Floats]:
+def predicted(case: Case, free: Sequence[Free], u: Floats, at: Operating) -> dict[str, Floats]:
     """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
     values = {f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)}
     changed = case.with_values(values)
-    force = changed.model(changed.soil, Operating(slip=slip, load=load))
-    shape = (len(u), len(slip))
+    force = changed.model(changed.soil, at)
+    shape = (len(u), len(at.slip))
     return {
         "torque": np.broadcast_to(force.torque, shape),
         "drawbar_pull": np.broadcast_to(force.drawbar_pull, shape),
@@ -53,7 +52,7 @@ def declared_at(case: Case, data: Measured, free: Sequence[Free], u: Floats) -> 
 
     Those that the table gives stay, and so do those of readings for which nothing is predicted.
     """
-    y = predicted(case, free, u[None, :], data.slip, data.load)
+    y = predicted(case, free, u[None, :], data.at)
     parts = []
     for c in data.channels:
         kept, noise = np.isfinite(c.reading), case.noise.get(column(c.name))
@@ -74,7 +73,7 @@ def linearised(
     sets = np.tile(u, (2 * p + 1, 1))
     sets[np.arange(p), np.arange(p)] = up
     sets[p + np.arange(p), np.arange(p)] = down
-    y = stacked(data, predicted(case, free, sets, data.slip, data.load))
+    y = stacked(data, predicted(case, free, sets, data.at))
     return y[-1], np.asarray(((y[:p] - y[p:-1]) / (up - down)[:, None]).T)
 
 
@@ -90,6 +89,7 @@ def input_noise(case: Case, data: Measured, free: Sequence[Free], u: Floats) -> 
             moved = points | {name: points[name] + sign * 0.5 * std}
             moved["slip"] = np.clip(moved["slip"], -0.999, 0.999)
             moved["load"] = np.clip(moved["load"], 1e-3 * data.load, 2.0 * data.load)
-            y.append(stacked(data, predicted(case, free, u[None, :], **moved))[0])
+            at = replace(data.at, slip=moved["slip"], load=moved["load"])
+            y.append(stacked(data, predicted(case, free, u[None, :], at))[0])
         total = np.hypot(total, np.nan_to_num(y[1] - y[0]))
     return np.asarray(total)
