@@ -128,11 +128,12 @@ def _reached_before(scene: Scene, force: Force, slope: Array) -> Array:
         own = integrate(stresses)[0]
         doubted = doubted | (loaded(scene, force.sinkage, rough=True).load != own)
     index = xp.nonzero(doubted)[0]
-    looked, sinkage = rows(scene, index), force.sinkage[index]
-    most = xp.zeros_like(sinkage)
-    for i in range(LOOKS):
-        look = loaded(looked, sinkage * (DEEPEST_LOOK * ((i + 1) / LOOKS) ** 2), rough=True)
-        most = xp.maximum(most, look.load)
+    if index.shape[0] == 0:
+        return slope < GENTLE
+    shares = [DEEPEST_LOOK * ((i + 1) / LOOKS) ** 2 for i in range(LOOKS)]
+    sinkage = xp.concat([force.sinkage[index] * share for share in shares], axis=0)
+    look = loaded(rows(scene, xp.concat([index] * LOOKS, axis=0)), sinkage, rough=True)
+    most = xp.max(xp.reshape(look.load, (LOOKS, index.shape[0])), axis=0)
     place = xp.clip(xp.cumulative_sum(xp.astype(doubted, xp.int64)) - 1, 0, None)
     reached = xp.take(xp.concat([most, xp.zeros_like(slope[:1])]), place) > NEARLY * scene.at.load
     return (slope < GENTLE) | (doubted & reached)

@@ -23,7 +23,7 @@ from soilml.gap.covariance import (
 from soilml.gap.fit import GapFit
 from soilml.gap.predict import soil_axis
 from soilml.gap.search import Found, search
-from soilml.gap.signatures import signatures
+from soilml.gap.signatures import Signature, signatures
 from soilml.gap.smooth import smooth_columns
 from soilml.gap.sound import MOST_STRAY, strays
 from soilml.identification.free import Free
@@ -69,7 +69,7 @@ def analysed(
     found = _nothing(soil)
     for _ in range(PASSES):
         before = bench.covariance.scatter
-        bench, lost = _scattered(bench, best, cells)
+        bench, lost = _scattered(bench, best, cells, found.left.signatures)
         dropped += lost
         if len(dropped) > MOST_STRAY * (len(cells) + len(dropped)):
             text = f"{len(dropped)} readings stray from all others: look at the sensors first"
@@ -96,10 +96,13 @@ def _alike(one: Scatter, other: Scatter) -> bool:
     )
 
 
-def _scattered(bench: Bench, fit: GapFit, cells: Cells) -> tuple[Bench, list[str]]:
+def _scattered(
+    bench: Bench, fit: GapFit, cells: Cells, known: Sequence[Signature]
+) -> tuple[Bench, list[str]]:
     """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
     case, reading = fit.fitted(), cells.reading
-    known, _ = signatures(case, cells, bench.effects)
+    if not known or len(known[0].column) != len(cells):
+        known, _ = signatures(case, cells, bench.effects)
     raw = np.linalg.solve(bench.covariance.whiten, fit.slope)
     space = np.column_stack([raw, *[s.column for s in known], smooth_columns(cells)])
     residual = reading - fit.prediction
@@ -128,4 +131,5 @@ def _nothing(soil: GapFit) -> Found:
     from soilml.gap.search import Left
 
     blank = Scores(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0))
-    return Found(soil, Left((), blank, 1.0), (), (), Left((), blank, 1.0), {})
+    left = Left((), (), blank, 1.0)
+    return Found(soil, left, (), (), left, {})

@@ -33,46 +33,53 @@ def next_runs(bench: Bench, rivals: Sequence[Candidate]) -> list[NextRun]:
     if len(rivals) < 2:
         return []
     fits = {"+".join(c.names): c.fit for c in rivals[:5]}
-    names = list(fits)
+    one, *others = fits.values()
+    known = [_compared(one, other, bench.cells, bench.covariance.whiten) for other in others]
     found = []
     for option in menu(bench.cells):
         try:
-            cells = cells_at(option, bench.cells, fits[names[0]].fitted())
-            apart = [_apart(bench, fits[names[0]], fits[n], cells) for n in names[1:]]
+            cells = cells_at(option, bench.cells, one.fitted())
+            whiten = spread(bench, one, cells).whiten
+            apart = [
+                _apart(other, old, _compared(one, other, cells, whiten))
+                for other, old in zip(others, known, strict=True)
+            ]
         except (InputError, np.linalg.LinAlgError):
             continue
         if not np.isfinite(apart).all():
             continue
         found.append(NextRun(option.kind, option.text, min(apart), _rows(cells, fits)))
     for kind, (text, after) in CHECKS.items():
-        apart = [_checked(fits[names[0]], fits[n], after) for n in names[1:]]
+        apart = [_checked(one, other, after) for other in others]
         if min(apart) > 0.0:
             found.append(NextRun(kind, text, min(apart), ()))
     return sorted(found, key=lambda run: -run.separates)[:LISTED]
 
 
-def _apart(bench: Bench, one: GapFit, other: GapFit, cells: Cells) -> float:
+Compared = tuple[Floats, Floats]
+
+
+def _compared(one: GapFit, other: GapFit, cells: Cells, whiten: Floats) -> Compared:
+    """Whitened difference (m,) of two explanations on some cells, and the other's slope (m, p)."""
+    mine = predicted(one.case, one.axes, one.x[None, :], cells)[0]
+    theirs, slope = linearised(other.case, other.axes, other.x, cells)
+    return whiten @ (mine - theirs), whiten @ slope
+
+
+def _apart(other: GapFit, old: Compared, new: Compared) -> float:
     """Sigma that a run adds between two explanations, the other one adapting itself to all rows."""
-    known = (bench.cells, bench.covariance.whiten)
-    new = (cells, spread(bench, one, cells).whiten)
-    after, before = _distance(one, other, [known, new]), _distance(one, other, [known])
-    return float(np.sqrt(max(after**2 - before**2, 0.0)))
+    return float(np.sqrt(max(_left(other, [old, new]) - _left(other, [old]), 0.0)))
 
 
-def _distance(one: GapFit, other: GapFit, parts: Sequence[tuple[Cells, Floats]]) -> float:
-    """Sigma between what one explanation predicts of some cells and the best that another can."""
-    white, slopes = [], []
-    for part, whiten in parts:
-        mine = predicted(one.case, one.axes, one.x[None, :], part)[0]
-        theirs, slope = linearised(other.case, other.axes, other.x, part)
-        white.append(whiten @ (mine - theirs))
-        slopes.append(whiten @ slope)
+def _left(other: GapFit, parts: Sequence[Compared]) -> float:
+    """Squared sigma between one explanation and the best that another can do about it."""
     held = np.diag([1.0 / axis.std for axis in other.axes])
-    pull = -other.x * np.diag(held)
-    difference = np.concatenate([*white, pull])
-    slope = np.vstack([*slopes, held])
+    difference = np.concatenate([*[d for d, _ in parts], -other.x * np.diag(held)])
+    slope = np.vstack([*[s for _, s in parts], held])
+    if not (np.isfinite(difference).all() and np.isfinite(slope).all()):
+        return float("nan")
     step = np.linalg.lstsq(slope, difference, rcond=1e-10)[0]
-    return float(np.linalg.norm(difference - slope @ step))
+    return float(np.sum((difference - slope @ step) ** 2))
 
 
 def _checked(one: GapFit, other: GapFit, after: dict[str, float]) -> float:

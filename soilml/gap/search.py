@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from soilml.gap.candidate import Bench, Candidate, coordinates
 from soilml.gap.fit import GapFit
 from soilml.gap.score import Scores, outside, scores
-from soilml.gap.signatures import Signature, signatures
+from soilml.gap.signatures import Signature, Untestable, signatures
 from soilml.gap.smooth import smooth_columns
 
 Floats = NDArray[np.float64]
@@ -36,15 +36,11 @@ HOPE = 3.0
 class Left:
     """What a fit leaves: scores of the catalogue and of smooth shapes, tested together."""
 
+    signatures: tuple[Signature, ...]
     names: tuple[str, ...]
     scores: Scores
     #: p value of the largest score among all columns
     p: float
-
-    @property
-    def by_name(self) -> dict[str, float]:
-        """Score of each effect of the catalogue."""
-        return {n: float(z) for n, z in zip(self.names, self.scores.z, strict=False)}
 
 
 @dataclass(frozen=True)
@@ -60,6 +56,8 @@ class Found:
     #: what the best leaves, or the soil alone where nothing was found
     left: Left
     predicted_gain: dict[str, float]
+    #: effects of which these runs can say nothing
+    cannot: tuple[Untestable, ...] = ()
 
     @property
     def gap(self) -> bool:
@@ -83,7 +81,7 @@ def left_by(bench: Bench, fit: GapFit, known: Sequence[Signature], seed: int) ->
     signs = np.asarray([s.sign for s in known] + [0] * smooth.shape[1], dtype=np.float64)
     space = np.column_stack([fit.slope, *bench.forms(fit)])
     found = scores(fit.residual, columns, space, signs, bench.covariance.scatter.freedom, seed)
-    return Left(tuple(s.name for s in known), found, found.worst)
+    return Left(tuple(known), tuple(s.name for s in known), found, found.worst)
 
 
 def predicted_gains(bench: Bench, fit: GapFit, known: Sequence[Signature]) -> dict[str, float]:
@@ -124,10 +122,10 @@ def search(bench: Bench, soil: GapFit, seed: int, starts: Starts | None = None) 
     to it. `starts` are coordinates by names, from an earlier search.
     """
     starts = starts or {}
-    known, _ = signatures(soil.fitted(), bench.cells, bench.effects)
+    known, cannot = signatures(soil.fitted(), bench.cells, bench.effects)
     first = left_by(bench, soil, known, seed)
     gains = predicted_gains(bench, soil, known)
-    nothing = Found(soil, first, (), (), first, gains)
+    nothing = Found(soil, first, (), (), first, gains, tuple(cannot))
     if first.p >= LEVEL:
         return nothing
     start = coordinates(soil)
@@ -152,7 +150,7 @@ def search(bench: Bench, soil: GapFit, seed: int, starts: Starts | None = None) 
         left = _left(bench, best, seed)
     final = [c for c in level if c.cost <= best.cost + REJECTED]
     final.sort(key=lambda c: c.cost)
-    return Found(soil, first, tuple(final), tuple(tried.values()), left, gains)
+    return replace(nothing, causes=tuple(final), tried=tuple(tried.values()), left=left)
 
 
 def _loosened(bench: Bench, candidates: Sequence[Candidate]) -> list[Candidate]:

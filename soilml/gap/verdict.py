@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ def values_of(fit: GapFit, *, soil: bool) -> dict[str, Value]:
     }
 
 
-def named(bench: Bench, causes: Sequence[Candidate]) -> list[NamedEffect]:
+def named(causes: Sequence[Candidate], alike: Likeness) -> list[NamedEffect]:
     """The effects of the best candidate, with what explains the data as well."""
     if not causes:
         return []
@@ -68,7 +69,7 @@ def named(bench: Bench, causes: Sequence[Candidate]) -> list[NamedEffect]:
             for path, value in parameters.items()
             if path.rpartition(".")[0] == name
         }
-        snr, rival = separation(bench, fit, name, float(_size(fit, name)))
+        snr, rival = alike.separation(name, _size(fit, name))
         found.append(NamedEffect(name, own, tuple(sorted(others)), snr, rival))
     return found
 
@@ -80,48 +81,45 @@ def _size(fit: GapFit, name: str) -> float:
     return 0.0
 
 
-def separation(bench: Bench, fit: GapFit, name: str, size: float) -> tuple[float, str]:
-    """Separating signal-to-noise of an effect at a size (reference sizes), and its nearest rival.
+@dataclass(frozen=True)
+class Likeness:
+    """Signatures of the catalogue on these runs, soil projected off: lengths (sigma), cosines."""
 
-    Length of its projected signature times the sine to the nearest rival's, in sigma.
-    """
-    case = bench.case.with_values(
-        {
-            a.path: v
-            for a, v in zip(fit.axes, fit.values().values(), strict=True)
-            if "." not in a.path
-        }
-    )
-    known, _ = signatures(case, bench.cells, bench.effects)
-    names = [s.name for s in known]
-    if name not in names:
-        return 0.0, ""
-    soil = fit.slope[:, : len(bench.soil)]
-    columns = outside(bench.covariance.whiten @ np.stack([s.column for s in known], axis=1), soil)
-    length = np.linalg.norm(columns, axis=0)
-    unit = columns / np.where(length > 0, length, 1.0)
-    i = names.index(name)
-    cosine = np.abs(unit.T @ unit[:, i])
-    cosine[i] = 0.0
-    rival = int(np.argmax(cosine))
-    sine = float(np.sqrt(max(0.0, 1.0 - cosine[rival] ** 2)))
-    return abs(size) * float(length[i]) * sine, names[rival]
+    names: tuple[str, ...]
+    length: Floats  # (k,)
+    cosine: Floats  # (k, k), without the diagonal
+
+    def separation(self, name: str, size: float) -> tuple[float, str]:
+        """Separating signal-to-noise of an effect at a size (reference sizes), nearest rival.
+
+        Length of its projected signature times the sine to the nearest rival's, in sigma.
+        """
+        if name not in self.names:
+            return 0.0, ""
+        i = self.names.index(name)
+        rival = int(np.argmax(self.cosine[i]))
+        sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
+        return abs(size) * float(self.length[i]) * sine, self.names[rival]
+
+    def mimicry(self, chosen: Sequence[str]) -> float:
+        """Largest cosine between a chosen effect's signature and another's."""
+        mine = np.isin(self.names, chosen)
+        if not mine.any() or mine.all():
+            return 0.0
+        return float(self.cosine[mine][:, ~mine].max())
 
 
-def mimicry(bench: Bench, found: Found) -> float:
-    """Largest cosine between the best cause's signature and another's, soil projected off."""
-    if not found.causes:
-        return 0.0
-    fit = found.causes[0].fit
-    known, _ = signatures(found.soil.fitted(), bench.cells, bench.effects)
+def likeness(bench: Bench, fit: GapFit) -> Likeness:
+    """How alike the catalogue's effects look on the soil of a fit."""
+    soil = {path: v for path, v in fit.values().items() if "." not in path}
+    known, _ = signatures(bench.case.with_values(soil), bench.cells, bench.effects)
     columns = bench.covariance.whiten @ np.stack([s.column for s in known], axis=1)
     columns = outside(columns, fit.slope[:, : len(bench.soil)])
-    unit = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    mine = [s.name in found.causes[0].names for s in known]
-    if not any(mine) or all(mine):
-        return 0.0
-    cosine = np.abs(unit[:, mine].T @ unit[:, ~np.asarray(mine)])
-    return float(cosine.max())
+    length = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(length > 0, length, 1.0)
+    cosine = np.abs(unit.T @ unit)
+    np.fill_diagonal(cosine, 0.0)
+    return Likeness(tuple(s.name for s in known), length, cosine)
 
 
 def map_of(bench: Bench, fit: GapFit, seed: int) -> list[Where]:

@@ -22,9 +22,8 @@ from soilml.gap.remainder import remainder
 from soilml.gap.report import Curves, GapReport, Shrink, Tried
 from soilml.gap.search import REJECTED
 from soilml.gap.shrink import held_out_region, held_out_runs, shrink, unseen
-from soilml.gap.signatures import signatures
 from soilml.gap.sound import Gate, examined, repeated_noise, without_repeats
-from soilml.gap.verdict import map_of, mimicry, named, status_of, values_of
+from soilml.gap.verdict import likeness, map_of, named, status_of, values_of
 from soilml.gap.words import not_claimed, sentence
 from soilml.identification.free import Free, chosen
 from soilml.identification.measured import same_wheel
@@ -126,14 +125,13 @@ def _reported(
     claimed = status in ("named", "form-open", "class")
     if not claimed:  # the figures are those of the model that is handed over
         after, gaps = found.soil, {name: s.unchanged() for name, s in gaps.items()}
-    named_effects = named(bench, found.causes) if claimed else []
-    _, cannot = signatures(found.soil.fitted(), bench.cells, bench.effects)
+    alike = likeness(bench, after) if claimed else None
     rivals = _rivals(found.causes, found.tried)
     report = GapReport(
         status=status,
         sentence="",
         model=grown_case(after),
-        effects=tuple(named_effects),
+        effects=() if alike is None else tuple(named(found.causes, alike)),
         cause_set=tuple(c.names for c in found.causes) if claimed else (),
         stand_in=() if claimed or not found.causes else found.causes[0].names,
         reasons=gate.unnameable if status == "not-testable" else (),
@@ -141,10 +139,10 @@ def _reported(
         gap=gaps,
         soil_before=values_of(found.soil, soil=True),
         soil_after=values_of(after, soil=True),
-        mimic_radius=mimicry(bench, found),
+        mimic_radius=0.0 if alike is None else alike.mimicry(found.causes[0].names),
         next_runs=tuple(next_runs(bench, rivals)) if found.gap else (),
         tried=tuple(_tried(analysis)),
-        untestable={u.name: u.reason for u in cannot},
+        untestable={u.name: u.reason for u in found.cannot},
         notes=_notes(analysis, gate, after),
         scatter=_scatter(analysis),
         remainder=remainder(bench, after) if found.gap else {},
