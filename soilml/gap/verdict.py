@@ -19,8 +19,11 @@ from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Squared prior spreads that a law may be bent by before it is another one.
-STRAINED = 6.0
+#: Squared prior spreads that the law of one effect, or those of several, may be bent by before
+#: they are other laws; several bent ones fit anything.
+STRAINED, STRAINED_SEVERAL = 4.0, 1.0
+#: Mean squared residual above which further bends of a law cannot be all that is missing.
+UNFIT = 2.0
 #: Share of the gap that may be left on runs that an explanation was not fitted to.
 CARRIES = 0.5
 
@@ -35,7 +38,11 @@ def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> s
         return "no-gap"
     if unnameable:
         return "not-testable"
-    if not found.causes or not found.adequate or found.causes[0].strain > STRAINED:
+    if not found.causes or not found.adequate:
+        return "unknown"
+    best = found.causes[0]
+    bent = STRAINED if len(best.names) == 1 else STRAINED_SEVERAL
+    if best.strain > bent or float(np.mean(best.fit.residual**2)) > UNFIT:
         return "unknown"
     if runs is not None and runs.after - 1.0 > CARRIES * (runs.before - 1.0) > 0.0:
         return "unknown"
