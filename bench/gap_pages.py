@@ -14,9 +14,9 @@ import numpy as np
 Judged = dict[str, Any]
 
 
-def text(sets: Sequence[Judged]) -> str:
-    """The part of BENCHMARKS.md."""
-    parts = [_head(sets), _gates(sets), _naming(sets), _snr(sets), _confusion(sets)]
+def text(sets: Sequence[Judged], alone: Sequence[float]) -> str:
+    """The part of BENCHMARKS.md; `alone` are seconds of analyses with the machine to themselves."""
+    parts = [_head(sets), _gates(sets, alone), _naming(sets), _snr(sets), _confusion(sets)]
     parts += [_region(sets), _soil(sets), _tiers(sets)]
     return "\n".join(parts)
 
@@ -41,10 +41,10 @@ def _head(sets: Sequence[Judged]) -> str:
     )
 
 
-def _gates(sets: Sequence[Judged]) -> str:
+def _gates(sets: Sequence[Judged], alone: Sequence[float]) -> str:
     rows = [
         (name, measured, goal, "yes" if met else "**no**" if goal != "-" else "")
-        for name, measured, goal, met in gap_table.gates(sets)
+        for name, measured, goal, met in gap_table.gates(sets, alone)
     ]
     return "### Gates\n\nRates with their 95 % interval.\n\n" + _table(
         ("figure", "measured", "gate", "met"), rows

@@ -78,6 +78,26 @@ class Cells:
         floor = np.asarray([1e-3 * np.median(self.std[self.channel == i]) for i in self.channel])
         return replace(self, std=np.maximum(std, floor))
 
+    def declared(self) -> tuple[Cells, list[str]]:
+        """The channels whose noise is known, if there is one, and what was left out in words."""
+        unknown = {int(i) for i in self.channel[~np.isfinite(self.std)]}
+        if not unknown or len(unknown) == len(self.channels):
+            return self, []
+        said = [
+            f"{column(self.channels[i])} is left out: its noise is not declared and no rows were "
+            "driven alike"
+            for i in sorted(unknown)
+        ]
+        kept = [i for i in range(len(self.channels)) if i not in unknown]
+        cells = self.keeping(np.isin(self.channel, kept))
+        place = {old: new for new, old in enumerate(kept)}
+        return replace(
+            cells,
+            channels=tuple(self.channels[i] for i in kept),
+            noise=tuple(self.noise[i] for i in kept),
+            channel=np.asarray([place[int(i)] for i in cells.channel], dtype=np.int64),
+        ), said
+
     def with_noise(self, std: dict[str, float]) -> Cells:
         """The same cells with these constant standard deviations where none was declared."""
         own = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])

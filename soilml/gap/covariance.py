@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 SCATTER = {"friction_angle": np.deg2rad(0.5), "bearing": 0.05}
 #: Spread of the prior of scatter, in those units, and of the log of the noise's scale.
 USUAL_SCATTER, USUAL_SCALE = 1.0, 0.3
+#: With fewer runs than this scatter cannot be measured; this much of it is taken for granted then.
+FEW_RUNS, GRANTED = 6, 0.8
 #: Correlations of neighbouring samples, and scales of scatter, that are tried.
 MEMORY = (0.25, 0.5, 0.7, 0.85, 0.95)
 TIMES = (0.0, 0.25, 0.5, 0.8, 1.2, 1.8, 3.0, 5.0)
@@ -130,7 +132,9 @@ def estimated(cells: Cells, columns: Floats, residual: Floats, space: Floats) ->
     """
     several = len(cells.runs) > 1
     basis = _basis(space / cells.std[:, None]) * cells.std[:, None]
-    times = TIMES if several else (0.0,)
+    times: tuple[float, ...] = TIMES if several else (0.0,)
+    if several and len(cells.runs) < FEW_RUNS:
+        times = tuple(t for t in TIMES if t >= GRANTED)
     independent = np.eye(len(cells))
     best, lowest = _climb(cells, columns, residual, basis, independent, 0.0, times)
     if _memory_seen(cells, residual, basis):
@@ -156,7 +160,7 @@ def _climb(
     """Coordinate search over the scales, at one memory."""
     same = _same_run(cells)
     channels = len(cells.channels)
-    scale, tau = np.ones(channels), np.zeros(2)
+    scale, tau = np.ones(channels), np.full(2, times[0])
 
     def objective(scale: Floats, tau: Floats) -> float:
         std = cells.std * scale[cells.channel]

@@ -20,6 +20,8 @@ from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
+#: Sigma beyond which two explanations are as far apart as anybody needs.
+ENOUGH = 10.0
 #: Suggestions that are listed.
 LISTED = 8
 
@@ -48,14 +50,20 @@ def next_runs(bench: Bench, rivals: Sequence[Candidate]) -> list[NextRun]:
             continue
         if not np.isfinite(apart).all():
             continue
-        found.append(NextRun(option.kind, option.text, min(apart), _rows(cells, fits)))
+        found.append(NextRun(option.kind, option.text, _worth(apart), _rows(cells, fits)))
     for kind, (text, after) in CHECKS.items():
         apart = [_checked(one, other, after) for other in others]
-        if min(apart) > 0.0:
-            found.append(NextRun(kind, text, min(apart), ()))
+        if max(apart) > 0.0:
+            found.append(NextRun(kind, text, _worth(apart), ()))
     return sorted(found, key=lambda run: -run.separates)[:LISTED]
 
 
+def _worth(apart: Sequence[float]) -> float:
+    """Sigma between the first explanation and the others, on average, each up to `ENOUGH`."""
+    return float(np.mean([min(sigma, ENOUGH) for sigma in apart]))
+
+
+#: Difference and slope, whitened.
 Compared = tuple[Floats, Floats]
 
 

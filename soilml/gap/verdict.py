@@ -24,8 +24,9 @@ Floats = NDArray[np.float64]
 STRAINED, STRAINED_SEVERAL = 4.0, 1.0
 #: Mean squared residual above which further bends of a law cannot be all that is missing.
 UNFIT = 2.0
-#: Share of the gap that may be left on runs that an explanation was not fitted to.
-CARRIES = 0.5
+#: Share of the gap that may be left on runs that an explanation was not fitted to, where the gap
+#: stands out there.
+CARRIES, STANDS_OUT = 0.5, 2.0
 
 
 def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> str:
@@ -44,7 +45,8 @@ def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> s
     bent = STRAINED if len(best.names) == 1 else STRAINED_SEVERAL
     if best.strain > bent or float(np.mean(best.fit.residual**2)) > UNFIT:
         return "unknown"
-    if runs is not None and runs.after - 1.0 > CARRIES * (runs.before - 1.0) > 0.0:
+    carried = runs is None or runs.after - 1.0 <= CARRIES * (runs.before - 1.0)
+    if runs is not None and runs.before > STANDS_OUT and not carried:
         return "unknown"
     if len(found.causes) > 1:
         return "class"

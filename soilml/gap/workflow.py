@@ -58,7 +58,8 @@ def gap(
     soil = [f for f in wanted if "." not in f.path]
     cells = cells_of(case, seen)
     noise, notes = repeated_noise(cells)
-    cells = cells.with_noise(noise)
+    cells, left_out = cells.with_noise(noise).declared()
+    notes += left_out
     gate = examined(cells, seen, repeats, len(soil))
     if gate.refused:
         return _refused(case, (*gate.refused, *gate.unnameable), gate.notes, seed)

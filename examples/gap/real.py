@@ -1,0 +1,86 @@
+"""Published single-wheel tests through the gap workflow: `make gap-real SOILML_DATA=...`."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from soilml.case import read_case
+from soilml.cli import main
+from soilml.gap.grow import model_text
+from soilml.noise import Noise
+from soilml.saving import save_text
+
+HERE = Path(__file__).parent
+KLS1 = HERE.parent / "kls1" / "model.toml"
+OUT = Path("demo/gap/real")
+
+
+def run() -> None:
+    """KLS-1: the lugged wheel on the smooth one's soil. CMU: a smooth wheel, straight ahead."""
+    data = Path(os.environ.get("SOILML_DATA", ""))
+    kls1 = data / "kls1_rashid1" / "single_wheel_tests.csv"
+    cmu = data / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
+    if not (kls1.is_file() and cmu.is_file()):
+        sys.exit("set SOILML_DATA to the folder that holds kls1_rashid1 and cmu_smooth_wheel")
+    OUT.mkdir(parents=True, exist_ok=True)
+    lugged(kls1)
+    straight(cmu, "all", -1.0)
+    straight(cmu, "driving", 0.0)
+
+
+def lugged(table: Path) -> None:
+    """Identify the smooth wheel's soil, and look for what the lugs change."""
+    smooth, found = OUT / "kls1_smooth.toml", OUT / "kls1_smooth.json"
+    where = ["--where", "run=kls1_smooth_w59", "--out", str(found)]
+    _ran(["identify", str(KLS1), str(table), *where])
+    soil = json.loads(found.read_text())["parameters"]
+    case = read_case(KLS1).with_values({name: entry["value"] for name, entry in soil.items()})
+    case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
+    save_text(smooth, model_text(case, ["the soil as the smooth wheel shows it"]))
+    rows = _rows(table, lambda row: row["run"] == "kls1_lug10_w59")
+    runs = OUT / "kls1_lugged.csv"
+    _written(runs, rows)
+    free = ["--free", "shear_modulus"]  # the soil is the smooth wheel's
+    _ran(["gap", str(smooth), str(runs), *free, "--out", str(OUT / "kls1_lugged")])
+
+
+def straight(table: Path, name: str, lowest: float) -> None:
+    """The trials without slip angle above a slip; repeats of one slip are in different runs."""
+    rows = _rows(
+        table, lambda row: float(row["slip_angle_rad"]) == 0.0 and float(row["slip"]) > lowest
+    )
+    seen: dict[str, int] = {}
+    for row in rows:
+        place = f"{float(row['slip']):.1f}"
+        seen[place] = seen.get(place, 0) + 1
+        row["run"] = f"repeat_{seen[place]}"
+        row["torque_Nm"] = ""
+        del row["side_force_N"], row["slip_angle_rad"], row["drawbar_pull_N_std"]
+    runs = OUT / f"cmu_{name}.csv"
+    _written(runs, rows)
+    _ran(["gap", str(HERE / "cmu.toml"), str(runs), "--out", str(OUT / f"cmu_{name}")])
+
+
+def _ran(command: list[str]) -> None:
+    print(f"\n$ soilml {' '.join(command)}", flush=True)
+    if main(command) != 0:
+        raise SystemExit(1)
+
+
+def _rows(table: Path, wanted) -> list[dict[str, str]]:  # type: ignore[no-untyped-def]
+    with table.open() as lines:
+        return [dict(row) for row in csv.DictReader(lines) if wanted(row)]
+
+
+def _written(path: Path, rows: list[dict[str, str]]) -> None:
+    lines = [",".join(rows[0]), *[",".join(row.values()) for row in rows]]
+    save_text(path, "\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,184 @@
+"""Five stories of a model that lacks something: `make gap-demo`."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from datagen.hidden.plans import Plan
+from datagen.hidden.sets import Drawn, draw
+from soilml.cli import main
+from soilml.writing import aligned, csv_text
+
+#: The plans of the stories; the truth stays in this file and never reaches the analyst.
+PLANS = {
+    "slip-sinkage": Plan("B", "slip-sinkage/lyasko", 1.0, 0.01, 8, "dry-sand", 3, seed=2),
+    "torque-sensor": Plan("S", "torque-gain", 1.0, 0.01, 8, "dry-sand", 3, seed=3),
+    "nothing": Plan("N0", "", 0.0, 0.01, 8, "dry-sand", 3, seed=4),
+    "unknown": Plan("C", "stiff-layer", 1.0, 0.01, 8, "dry-sand", 3, seed=5),
+}
+#: Hidden in the story of the slope: a little bulldozing, in times the formula.
+SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Told:
+    """A story's end: what was hidden, what gap.json says, and the truth of the soil."""
+
+    hidden: str
+    said: dict[str, Any]
+    soil: dict[str, float]
+
+
+def analysed(folder: Path, model: str, columns: dict[str, Any], *options: str) -> dict[str, Any]:
+    """Write what the analyst is given, run `soilml gap`, read gap.json."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "model.toml").write_text(model)
+    (folder / "runs.csv").write_text(csv_text(columns))
+    out = folder / "gap"
+    given = ["gap", str(folder / "model.toml"), str(folder / "runs.csv"), "--out", str(out)]
+    if main([*given, *options]) != 0:
+        raise SystemExit(1)
+    found: dict[str, Any] = json.loads((out / "gap.json").read_text())
+    return found
+
+
+def both(drawn: Drawn) -> dict[str, Any]:
+    """The runs and the region held out from them, in one table."""
+    names = [name for name in drawn.columns if name in drawn.region]
+    region = {n: drawn.region[n] for n in names}
+    region["run"] = np.asarray([f"heavy_{run}" for run in region["run"]])
+    return {n: [*drawn.columns[n], *region[n]] for n in names}
+
+
+def hidden_story(name: str, folder: Path) -> Told:
+    """A story of the sealed generator."""
+    plan = PLANS[name]
+    drawn = draw(replace(plan))
+    said = analysed(folder / name, drawn.model, drawn.columns)
+    return Told(plan.cause or "nothing", said, drawn.truth["soil"])
+
+
+def slip_sinkage(folder: Path) -> Told:
+    """Slip-sinkage by a law that the catalogue has not, soil differing from run to run."""
+    drawn = draw(PLANS["slip-sinkage"])
+    columns = both(drawn)
+    heaviest = max(columns["load_N"])
+    said = analysed(
+        folder / "slip-sinkage", drawn.model, columns, "--holdout", f"load_N={float(heaviest)!r}"
+    )
+    return Told("slip-sinkage, z = z0 (1 + s) / (1 - s / 2)", said, drawn.truth["soil"])
+
+
+def reverse_run(folder: Path) -> tuple[Told, Told]:
+    """A little bulldozing, which a slope of the bed mimics until the wheel runs in reverse."""
+    place = folder / "slope"
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "rig.toml").write_text(TRUTH.format(share=SHARE))
+    rng = np.random.default_rng(7)
+    forward = [_simulated(place, f"run_{i}", 40.0 + 15.0 * i, 0.05, rng) for i in range(8)]
+    first = analysed(place, GIVEN, _joined(forward))
+    suggested = [run for run in first["next_runs"] if run["kind"] == "reverse"]
+    print(f"suggested: {suggested[0]['text'] if suggested else 'no reverse run'}\n")
+    backward = [_simulated(place, f"back_{i}", 40.0 + 35.0 * i, -0.05, rng) for i in range(4)]
+    second = analysed(place, GIVEN, _joined([*forward, *backward]))
+    soil = {"friction_angle": 0.5}
+    return Told("bulldozing", first, soil), Told("bulldozing, with a reverse run", second, soil)
+
+
+def _simulated(
+    place: Path, run: str, load: float, speed: float, rng: np.random.Generator
+) -> dict[str, Any]:
+    """A run of eight slips from `soilml simulate`, with 1 % noise."""
+    out = place / "simulated.csv"
+    asked = ["--slip", "0.05:0.6:8", "--load", f"{load:g}", "--speed", f"{speed:g}", "--run", run]
+    if main(["simulate", str(place / "rig.toml"), *asked, "--out", str(out)]) != 0:
+        raise SystemExit(1)
+    with out.open() as lines:
+        rows = list(csv.DictReader(lines))
+    out.unlink()
+    columns: dict[str, Any] = {"run": [row["run"] for row in rows]}
+    for name in ("slip", "load_N", "speed_m_s", "torque_Nm", "drawbar_pull_N", "sinkage_m"):
+        columns[name] = np.asarray([float(row[name]) for row in rows])
+    for name, floor in (("torque_Nm", 0.0), ("drawbar_pull_N", 0.2), ("sinkage_m", 0.0)):
+        std = np.hypot(0.01 * columns[name], floor)
+        columns[name] = columns[name] + std * rng.standard_normal(len(rows))
+    return columns
+
+
+def _joined(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    return {name: [v for run in runs for v in run[name]] for name in runs[0]}
+
+
+GIVEN = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+cohesion = 900.0
+friction_angle = 0.52
+shear_modulus = 0.015
+kc = 990.0
+kphi = 1528000.0
+n = 1.1
+[soil.prior]
+cohesion = [0.0, 4000.0]
+friction_angle = [0.3, 0.8]
+shear_modulus = [0.003, 0.04]
+[noise]
+torque_Nm = "1 %"
+drawbar_pull_N = "1 % + 0.2"
+sinkage_m = "1 %"
+"""
+TRUTH = (
+    GIVEN.replace("cohesion = 900.0", "cohesion = 1040.0")
+    .replace("friction_angle = 0.52", "friction_angle = 0.50")
+    .replace("shear_modulus = 0.015", "shear_modulus = 0.012")
+    + '[[effect]]\nname = "bulldozing"\nshare = {share}\n'
+)
+
+
+def tell(folder: Path) -> list[Told]:
+    """All stories, in order."""
+    first, second = reverse_run(folder)
+    rest = [hidden_story(name, folder) for name in ("torque-sensor", "nothing", "unknown")]
+    return [slip_sinkage(folder), first, second, *rest]
+
+
+def line(told: Told) -> tuple[str, ...]:
+    """A story as a line of the table."""
+    said = told.said
+    causes = " | ".join("+".join(names) for names in said["cause_set"]) or "-"
+    region = said["gap"].get("held_out_region")
+    gap = "-" if region is None else f"{region['before']:.3g} -> {region['after']:.3g}"
+    phi = "-"
+    if "friction_angle" in said["soil"]["after"]:
+        off = [
+            abs(
+                np.degrees(
+                    said["soil"][when]["friction_angle"]["value"] - told.soil["friction_angle"]
+                )
+            )
+            for when in ("before", "after")
+        ]
+        phi = f"{off[0]:.2f} -> {off[1]:.2f}"
+    return told.hidden, said["status"], causes, gap, phi
+
+
+def run() -> None:
+    """Tell all stories and print how they ended."""
+    folder = Path("demo/gap")
+    header = ("hidden", "status", "causes", "held-out region", "phi error, deg")
+    print(aligned(header, [line(told) for told in tell(folder)], text_columns=3))
+    print(f"\nreports: {folder}/*/gap/report.html", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run()
