@@ -56,6 +56,8 @@ class EffectCard:
     isolate: str
     #: fields of `Operating` that must be given, and must vary for the effect to be found
     needs: tuple[str, ...] = ()
+    #: what the runs of one model cannot vary, and a search for missing effects thus cannot test
+    varied: str = ""
     #: for sensors and rigs: how large the fault may be in a setup that was checked, one standard
     #: deviation, in the unit of its size; None where nothing is known
     calibration: float | None = None

@@ -36,6 +36,7 @@ class SmallWheelStiffness(Shaped):
         kind="soil",
         reference={"exponent": -0.3},
         signs={"sinkage": -1},
+        varied="wheels of several diameters: with one it is a change of kc and kphi",
         isolate="the same runs with a wheel of another diameter; plate tests of the soil",
     )
     exponent: Annotated[Real, Parameter("1", -2.0, 0.0, "m, power of the diameter")] = 0.0

@@ -57,13 +57,14 @@ def size_axis(effect: type[Effect], calibration: float | None) -> Axis:
     size = effect.about.size
     parameter = declared(effect)[size]
     unit = effect.about.reference[size]
+    lower, upper = sorted((parameter.lower / unit, parameter.upper / unit))
     return Axis(
         f"{effect.name}.{size}",
         parameter.unit,
-        parameter.lower / unit,
-        parameter.upper / unit,
+        lower,
+        upper,
         Prior(0.0, unit),
-        float("inf") if calibration is None else calibration / unit,
+        float("inf") if calibration is None else calibration / abs(unit),
     )
 
 

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 #: Family-wise level of the test for a gap.
 LEVEL = 0.03
 #: Level below which what a candidate leaves is no noise.
-ADEQUATE = 0.002
+ADEQUATE = 0.001
 #: Objective above the best one's at which a candidate is rejected.
 REJECTED = 9.0
 #: How much a further effect must lower the objective.

@@ -82,6 +82,8 @@ def signatures(
 
 def _lacking(effect: type[Effect], cells: Cells) -> str:
     """Why these runs cannot test an effect for want of a covariate; nothing where they can."""
+    if effect.about.varied:
+        return f"needs {effect.about.varied}"
     for field in effect.about.needs:
         value = getattr(cells.at, field)
         if value is None:

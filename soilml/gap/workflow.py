@@ -142,7 +142,7 @@ def _reported(
         soil_after=values_of(after, soil=True),
         mimic_radius=0.0 if alike is None else alike.mimicry(found.causes[0].names),
         next_runs=tuple(next_runs(bench, rivals)) if found.gap else (),
-        tried=tuple(_tried(analysis)),
+        tried=tuple(_tried(analysis, claimed=claimed)),
         untestable={u.name: u.reason for u in found.cannot},
         notes=_notes(analysis, gate, after),
         scatter=_scatter(analysis),
@@ -187,7 +187,7 @@ def _gaps(
     return gaps
 
 
-def _tried(analysis: Analysis) -> list[Tried]:
+def _tried(analysis: Analysis, *, claimed: bool) -> list[Tried]:
     found = analysis.found
     if not found.tried:
         return []
@@ -197,7 +197,7 @@ def _tried(analysis: Analysis) -> list[Tried]:
     for c in sorted(found.tried, key=lambda c: c.cost):
         gain = found.predicted_gain.get(c.names[0], 0.0) if len(c.names) == 1 else float("nan")
         if c.names in kept:
-            verdict = "explains the data"
+            verdict = "explains the data" if claimed else "fits best, not claimed"
         elif not c.strict.converged:
             verdict = "fit failed: no evidence either way"
         elif c.cost <= lowest + REJECTED:
