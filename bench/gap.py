@@ -13,13 +13,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
 from gap_case import judged
+from place import FILE, MARK
 
 from datagen.hidden.plans import matrix
 from datagen.progress import bar
 from soilml.saving import save_text
-
-ROOT = Path(__file__).parents[1]
-MARK = "\n<!-- written by make bench-gap -->\n"
 
 
 def run() -> None:
@@ -43,9 +41,8 @@ def run() -> None:
     text = gap_pages.text(sets, alone)
     print(text)
     if not args.few and args.every == 1 and args.seed == 0:
-        file = ROOT / "BENCHMARKS.md"
-        before = file.read_text().partition(MARK)[0].rstrip() + "\n" if file.exists() else ""
-        save_text(file, before + MARK + "\n" + text)
+        before = FILE.read_text().partition(MARK)[0].rstrip() + "\n" if FILE.exists() else ""
+        save_text(FILE, before + MARK + "\n" + text)
 
 
 if __name__ == "__main__":

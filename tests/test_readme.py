@@ -20,7 +20,7 @@ def blocks(language):
 
 def test_the_python_lines_run(monkeypatch):
     monkeypatch.chdir(ROOT)
-    (lines,) = blocks("python")
+    lines, _ = blocks("python")
     names: dict = {}
     exec(lines, names)
     assert names["force"].torque.shape == (50,)
@@ -52,6 +52,22 @@ def test_the_table_of_runs_is_valid(tmp_path):
     (tmp_path / "runs.csv").write_text(text)
     table = read_table(tmp_path / "runs.csv", RUNS)
     assert np.isnan(table["drawbar_pull_N"]).all()
+
+
+def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
+    _, effect = blocks("python")
+    (tmp_path / "mine.py").write_text(effect)
+    model = next(b for b in blocks("toml") if "[gear]" in b)
+    (tmp_path / "model.toml").write_text(f'{model}[[effect]]\nname = "cable-drag"\nforce = 2.0\n')
+    command = ["simulate", str(tmp_path / "model.toml"), "--slip", "0.3", "--load", "60"]
+    assert main(command) == 2
+    assert "cable-drag" in capsys.readouterr().err
+    assert main([*command, "--effects", str(tmp_path / "mine.py")]) == 0
+    dragged = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
+    (tmp_path / "model.toml").write_text(model)
+    assert main(command) == 0
+    free = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
+    assert free - dragged == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("command", ORDER)
