@@ -1,5 +1,6 @@
 """Measured tests, where `SOILML_DATA` names a folder that holds them."""
 
+import importlib.util
 import json
 import os
 from pathlib import Path
@@ -46,3 +47,21 @@ def test_a_table_with_several_wheels_asks_for_a_choice(capsys):
     model = str(ROOT / "examples/kls1/model.toml")
     assert main(["identify", model, str(KLS1)]) == 2
     assert "--where" in capsys.readouterr().err
+
+
+def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
+    """A lugged wheel at one load is not named; a smooth one that digs itself in is."""
+    spec = importlib.util.spec_from_file_location("real", ROOT / "examples" / "gap" / "real.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.chdir(tmp_path)
+    module.run()
+
+    def said(name):
+        return json.loads((tmp_path / "demo/gap/real" / name / "gap.json").read_text())
+
+    lugged = said("kls1_lugged")
+    assert lugged["status"] == "not-testable" and lugged["effects"] == []
+    assert lugged["fits_best_but_not_claimed"] == ["grousers", "slip-sinkage"]
+    assert said("cmu_driving")["cause_set"] == [["slip-sinkage"]]
+    assert said("cmu_all")["status"] == "unknown"

@@ -1,0 +1,75 @@
+"""The stories of examples/gap, end to end through the command line."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SENSORS = {"torque-gain", "torque-offset", "load-gain", "drawbar-gain", "slip-scale"}
+
+
+@pytest.fixture(scope="module")
+def stories(tmp_path_factory):
+    spec = importlib.util.spec_from_file_location("stories", ROOT / "examples" / "gap" / "run.py")
+    module = importlib.util.module_from_spec(spec)
+    import sys
+
+    sys.modules["stories"] = module
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("stories")
+    return module.tell(folder), folder
+
+
+def phi_error(told, when):
+    return abs(told.said["soil"][when]["friction_angle"]["value"] - told.soil["friction_angle"])
+
+
+def test_slip_sinkage_by_another_law_is_found_and_predicts_heavier_loads(stories):
+    told = stories[0][0]
+    assert told.said["cause_set"] == [["slip-sinkage"]]
+    assert told.said["status"] in ("named", "form-open")
+    region = told.said["gap"]["held_out_region"]
+    assert region["after"] <= 0.25 * region["before"]
+    assert phi_error(told, "after") < phi_error(told, "before")
+
+
+def test_bulldozing_and_a_slope_look_alike_until_the_wheel_runs_in_reverse(stories):
+    first, second = stories[0][1:3]
+    assert first.said["status"] == "class"
+    assert {("bulldozing",), ("slope",)} <= {tuple(c) for c in first.said["cause_set"]}
+    assert "reverse" in {run["kind"] for run in first.said["next_runs"]}
+    assert second.said["status"] == "named"
+    assert second.said["cause_set"] == [["bulldozing"]]
+
+
+def test_a_sensor_that_is_off_is_not_named_as_physics(stories):
+    told = stories[0][3]
+    assert told.said["status"] in ("named", "class")
+    assert any(SENSORS & set(names) for names in told.said["cause_set"])
+    assert ["torque-gain"] in told.said["cause_set"]
+
+
+def test_where_nothing_is_hidden_nothing_is_found(stories):
+    assert stories[0][4].said["status"] == "no-gap"
+    assert stories[0][4].said["effects"] == []
+
+
+def test_what_no_catalogue_has_is_left_unnamed(stories):
+    told, folder = stories[0][5], stories[1]
+    assert told.said["status"] == "unknown"
+    assert told.said["cause_set"] == [] and told.said["effects"] == []
+    assert "[[effect]]" not in (folder / "unknown" / "gap" / "model.toml").read_text()
+
+
+def test_the_report_stands_alone_and_next_runs_carry_predictions(stories):
+    folder = stories[1] / "slip-sinkage" / "gap"
+    page = (folder / "report.html").read_text()
+    assert "slip-sinkage" in page and "<script" not in page and 'src="http' not in page
+    header = (folder / "next_runs.csv").read_text().splitlines()[0].split(",")
+    assert header[:4] == ["run", "kind", "what", "separates_sigma"]
+    assert any(name.startswith("torque_Nm if ") for name in header)
+    figures = json.loads((folder / "gap.json").read_text())
+    assert np.isfinite(figures["gap"]["train"]["before"])
