@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.effects import EFFECTS
+from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.effects.base import STAGES
 from soilml.errors import InputError
+from soilml.operating import COVARIATES
 from soilml.parameters import declared
 from soilml.writing import aligned
 
@@ -22,24 +23,32 @@ List the effects that [[effect]] in a model file may name.
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("name", nargs="?", help="one effect")
+    add_effects_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
+    effects = chosen_effects(args)
     if args.name is None:
-        listed = [(name, ", ".join(declared(cls)), cls.about.text) for name, cls in EFFECTS.items()]
-        print(aligned(("effect", "parameters", "what it is"), listed, text_columns=3))
+        listed = [
+            (name, cls.about.kind, cls.about.size, cls.about.text) for name, cls in effects.items()
+        ]
+        print(aligned(("effect", "of the", "size", "what it is"), listed, text_columns=4))
         return 0
-    if args.name not in EFFECTS:
-        raise InputError(f"no effect {args.name!r}; there are: {', '.join(EFFECTS)}")
-    cls = EFFECTS[args.name]
+    if args.name not in effects:
+        raise InputError(f"no effect {args.name!r}; there are: {', '.join(effects)}")
+    cls = effects[args.name]
     acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if hasattr(cls, stage))
     neutral = cls()
     rows = [
         (name, p.text, f"{getattr(neutral, name):g}", f"{p.lower:g} .. {p.upper:g}", p.unit)
         for name, p in declared(cls).items()
     ]
-    print(f"{args.name}: {cls.about.text}\nacts on: {acts}\nsource: {cls.about.source}\n")
+    about = cls.about
+    print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
+    if about.needs:
+        print(f"needs: {', '.join(COVARIATES[field] for field in about.needs)}")
+    print(f"told from others by: {about.isolate}\nsource: {about.source}\n")
     print(aligned(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
     print(
         f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"

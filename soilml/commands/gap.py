@@ -74,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     effects = chosen_effects(args)
     case = read_case(args.model, effects)
     table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    if sys.stderr.isatty():
+        print(f"analysing {len(table)} rows ...", file=sys.stderr, flush=True)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
     report = gap(
         case,
