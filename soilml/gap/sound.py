@@ -86,9 +86,8 @@ def examined(cells: Cells, table: Table, repeats: int, parameters: int) -> Gate:
     if not cells.channels:
         refused.append("no torque, drawbar pull or sinkage was measured")
     elif len(cells) < parameters + SPARE:
-        refused.append(
-            f"{len(cells)} readings for {parameters} soil parameters: nothing is left to show a gap"
-        )
+        count = "1 reading" if len(cells) == 1 else f"{len(cells)} readings"
+        refused.append(f"{count} for {parameters} soil parameters: nothing is left to show a gap")
     if len(cells.runs) < 2:
         unnameable.append("one run only: soil that differs from run to run cannot be told apart")
     if cells.channels and distinct(np.log(cells.load)) < 2:
