@@ -1,0 +1,120 @@
+"""What the tests of the gap workflow share: a wheel, runs driven with it, and sealed sets."""
+
+from __future__ import annotations
+
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from datagen.hidden import draw, matrix
+from soilml.case import Case, read_case
+from soilml.effects import EFFECTS
+from soilml.gap import gap
+from soilml.gap.analysis import SCATTER
+from soilml.gap.candidate import Bench
+from soilml.gap.cells import cells_of
+from soilml.gap.covariance import Scatter, assembled, scatter_columns
+from soilml.gap.predict import soil_axis
+from soilml.identification.free import chosen
+from soilml.operating import Operating
+from soilml.quantities import CHANNELS, column
+from soilml.table import Table
+
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.3, 0.8]
+shear_modulus = [0.005, 0.04]
+[noise]
+torque_Nm = "1 %"
+drawbar_pull_N = "1 % + 0.2"
+sinkage_m = "1 %"
+"""
+LOADS = (40.0, 60.0, 90.0, 140.0)
+
+
+def case_of(text: str = MODEL, effects=EFFECTS) -> Case:
+    """The case that a model file with this text holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.toml"
+        path.write_text(text)
+        return read_case(path, effects)
+
+
+def driven(case, effects=(), *, loads=LOADS, slips=8, noise=1.0, soils=None, seed=0, **covariates):
+    """A table of one run for each load; `soils` are the soil values of each run, by name."""
+    rng = np.random.default_rng(seed)
+    model = case.model
+    for effect in effects:
+        model = model + effect
+    runs, load = len(loads), np.repeat(np.asarray(loads, dtype=float), slips)
+    slip = np.tile(np.linspace(0.06, 0.6, slips), runs)
+    known = {name: np.repeat(np.asarray(v, dtype=float), slips) for name, v in covariates.items()}
+    per_run = {name: np.repeat(values, slips) for name, values in (soils or {}).items()}
+    soil = case.with_values(per_run).soil if per_run else case.soil
+    force = model(soil, Operating(slip=slip, load=load, **known))
+    columns = {"run": np.repeat([f"run_{i}" for i in range(runs)], slips)}
+    columns |= {"slip": slip, "load_N": load}
+    for name in CHANNELS:
+        true = np.asarray(getattr(force, name))
+        std = case.noise[column(name)].std(true) if column(name) in case.noise else 0.0
+        columns[column(name)] = true + noise * std * rng.standard_normal(true.size)
+    names = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}
+    return Table(columns | {names[name]: values for name, values in known.items()})
+
+
+def bench_of(case, table, scatter=(0.0, 0.0)) -> Bench:
+    """A bench on these rows that believes the declared noise and this scatter."""
+    cells = cells_of(case, table)
+    columns = scatter_columns(case, cells)
+    known = Scatter(
+        np.ones(len(cells.channels)),
+        scatter[0] * SCATTER["friction_angle"],
+        scatter[1] * SCATTER["bearing"],
+        0.0,
+        1e6,
+    )
+    axes = tuple(soil_axis(f) for f in chosen(case, None))
+    return Bench(case, axes, cells, assembled(cells, columns, known), EFFECTS, {})
+
+
+#: The first of its kind in the list of plans, whatever becomes of it.
+KINDS = {
+    "nothing": ("N0", "", 0.0, None),
+    "scatter": ("N1", "", 0.0, None),
+    "memory": ("N2", "", 0.0, None),
+    "outliers": ("N3", "", 0.0, None),
+    "slip-sinkage": ("A", "slip-sinkage", 2.0, 0.01),
+    "bulldozing": ("A", "bulldozing", 2.0, 0.01),
+    "exit-angle": ("A", "exit-angle", 2.0, 0.01),
+    "stick-slip": ("C", "stick-slip", 2.0, 0.01),
+}
+
+
+@cache
+def hidden(kind: str):
+    """The case, the table, the region held out and the truth of a sealed set."""
+    tier, cause, size, noise = KINDS[kind]
+    plan = next(
+        p
+        for p in matrix(True, seed=3)
+        if (p.tier, p.cause, p.size) == (tier, cause, size) and noise in (None, p.noise)
+    )
+    drawn = draw(plan)
+    columns, region = Table(dict(drawn.columns)), Table(dict(drawn.region))
+    return case_of(drawn.model), columns, region, drawn.truth
+
+
+@cache
+def analysed(kind: str):
+    """The report on a sealed set."""
+    case, table, _, _ = hidden(kind)
+    return gap(case, table)

@@ -1,0 +1,126 @@
+"""The gate: which data are analysed, what is set aside, and what is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import MODEL, bench_of, case_of, driven
+
+from soilml.gap.cells import cells_of
+from soilml.gap.smooth import smooth_columns
+from soilml.gap.sound import examined, repeated_noise, strays, without_repeats
+from soilml.table import Table
+
+
+def gate(table, text=MODEL):
+    case = case_of(text)
+    table, repeats = without_repeats(table)
+    cells = cells_of(case, table)
+    cells = cells.with_noise(repeated_noise(cells)[0])
+    return examined(cells, table, repeats, 3)
+
+
+def changed(table, **columns):
+    return replace(table, columns=table.columns | columns)
+
+
+def joined(*tables):
+    return Table({n: np.concatenate([t[n] for t in tables]) for n in tables[0].columns})
+
+
+def test_sound_runs_pass():
+    found = gate(driven(case_of()))
+    assert found.refused == found.unnameable == found.notes == ()
+
+
+def test_readings_far_from_all_others_are_found_and_no_others():
+    case = case_of()
+    table = driven(case, seed=4)
+    bench = bench_of(case, table)
+    soil = bench.soil_only([np.full(3, 0.5)])
+    space = np.column_stack(
+        [np.linalg.solve(bench.covariance.whiten, soil.slope), smooth_columns(bench.cells)]
+    )
+    residual = bench.cells.reading - soil.prediction
+    assert not strays(bench.covariance, residual, space).any()
+    struck = np.isin(np.arange(len(residual)), (9, 50, 77))
+    far = residual + np.where(struck, 9.0, 0.0) * bench.covariance.std
+    np.testing.assert_array_equal(strays(bench.covariance, far, space), struck)
+
+
+def test_rows_that_repeat_to_the_last_digit_count_once():
+    table = driven(case_of())
+    again = joined(table, table.rows(np.asarray([2, 5])))
+    kept, repeats = without_repeats(again)
+    assert repeats == 2 and len(kept) == len(table)
+    np.testing.assert_array_equal(kept["torque_Nm"], table["torque_Nm"])
+    assert "2 rows repeat another one" in gate(again).notes[0]
+    assert "rows repeat another one" in gate(joined(table, table)).refused[0]
+
+
+def test_rows_driven_alike_with_other_readings_are_no_repeats():
+    table = joined(driven(case_of(), seed=1), driven(case_of(), seed=2))
+    assert without_repeats(table)[1] == 0
+
+
+@pytest.mark.parametrize(
+    "how, said",
+    [
+        ({"loads": (60.0, 60.0, 60.0)}, "one load only"),
+        ({"loads": (60.0,), "slips": 24}, "one run only"),
+        ({"slips": 2, "loads": (40.0, 60.0, 80.0, 100.0)}, "fewer than three slips"),
+    ],
+)
+def test_runs_that_can_name_nothing(how, said):
+    found = gate(driven(case_of(), **how))
+    assert found.refused == ()
+    assert any(said in reason for reason in found.unnameable)
+
+
+def test_a_sensor_that_shows_the_same_in_every_row_is_dead():
+    table = driven(case_of())
+    found = gate(changed(table, sinkage_m=np.full(len(table), 0.01)))
+    assert found.refused == ("sinkage_m is the same in every row: is the sensor alive?",)
+
+
+def test_readings_as_few_as_parameters_show_nothing():
+    table = driven(case_of(), loads=(40.0, 80.0), slips=1)
+    assert "6 readings for 3 soil parameters" in gate(table).refused[0]
+
+
+def test_a_table_without_any_reading_is_refused():
+    table = driven(case_of())
+    blank = np.full(len(table), np.nan)
+    found = gate(changed(table, torque_Nm=blank, drawbar_pull_N=blank, sinkage_m=blank))
+    assert found.refused == ("no torque, drawbar pull or sinkage was measured",)
+
+
+QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
+
+
+def test_noise_that_nobody_declared_is_asked_for():
+    found = gate(driven(case_of()), QUIET)
+    assert len(found.refused) == 1
+    assert "give [noise] sinkage_m, or sinkage_m_std" in found.refused[0]
+
+
+def test_a_column_of_standard_deviations_declares_noise():
+    table = driven(case_of())
+    assert gate(changed(table, sinkage_m_std=np.full(len(table), 1e-4)), QUIET).refused == ()
+
+
+def test_rows_driven_alike_speak_for_noise_that_nobody_declared():
+    case = case_of(QUIET)
+    table = joined(*[driven(case_of(), loads=(60.0, 60.0, 90.0, 90.0), seed=s) for s in range(6)])
+    rng = np.random.default_rng(0)
+    spread = 2e-4 * rng.standard_normal(len(table))
+    table = changed(
+        table,
+        sinkage_m=driven(case_of(), loads=(60.0, 60.0, 90.0, 90.0) * 6, noise=0.0)["sinkage_m"]
+        + spread,
+    )
+    found, notes = repeated_noise(cells_of(case, table))
+    assert list(found) == ["sinkage"]
+    assert found["sinkage"] == pytest.approx(2e-4, rel=0.2)
+    assert "noise of sinkage_m is not declared" in notes[0]
+    assert gate(table, QUIET).refused == ()
