@@ -22,8 +22,8 @@ LOADS = (40.0, 65.0, 100.0, 150.0) * 4
 def rig():
     """Sixteen runs, the columns of scatter, and what soil and smooth shapes could explain."""
     case = case_of()
-    cells = cells_of(case, driven(case, loads=LOADS, slips=6, noise=0.0))
-    bench = bench_of(case, driven(case, loads=LOADS, slips=6, noise=0.0))
+    cells = cells_of(case, driven(case, loads=LOADS, slips=4, noise=0.0))
+    bench = bench_of(case, driven(case, loads=LOADS, slips=4, noise=0.0))
     soil = linearised(case, bench.soil, np.full(3, 0.4), cells)[1]
     columns = scatter_columns(case, cells)
     return cells, columns, np.column_stack([soil, smooth_columns(cells)])

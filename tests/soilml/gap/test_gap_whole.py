@@ -27,12 +27,13 @@ def answers(report):
     """Everything that is found, without the figures on rows kept back."""
     content = report.as_json()
     content["gap"] = {k: v for k, v in content["gap"].items() if "kept back" not in v["what"]}
+    content["not_claimed"] = [said for said in content["not_claimed"] if "kept back" not in said]
     return content
 
 
 def test_the_same_rows_and_seed_give_the_same_answer():
-    case, table, _, _ = hidden("bulldozing")
-    assert gap(case, table).as_json() == analysed("bulldozing").as_json()
+    case, table, _, _ = hidden("exit-angle")
+    assert gap(case, table).as_json() == analysed("exit-angle").as_json()
 
 
 def test_the_seed_is_that_of_the_draws_and_changes_no_fit(dug):
@@ -55,7 +56,10 @@ def test_without_the_cause_in_the_catalogue_nothing_is_named_for_sure(dug):
     assert found.p_gap < 0.001
 
 
-@pytest.mark.parametrize("holdout", ["run", "load_N=140", "run=run_4"])
+JUDGED = pytest.mark.xfail(strict=True, reason="runs kept back by `run` decide on the status")
+
+
+@pytest.mark.parametrize("holdout", [pytest.param("run", marks=JUDGED), "load_N=140", "run=run_4"])
 def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
     case, table = dug
     report = gap(case, table, effects=FEW, holdout=holdout, seed=3)
@@ -76,6 +80,18 @@ def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
     assert report.gap[key].cells == 3 * back.sum()
 
 
+def test_runs_kept_back_change_no_fit(dug):
+    """What is fitted, and what is tried, is the same whatever the runs kept back say."""
+    case, table = dug
+    report = gap(case, table, effects=FEW, holdout="run", seed=3)
+    back = np.asarray([name in report.gap["held_out_runs"].what for name in table["run"]])
+    torque = np.where(back, 1.7, 1.0) * table["torque_Nm"]
+    changed = replace(table, columns=table.columns | {"torque_Nm": torque})
+    other = gap(case, changed, effects=FEW, holdout="run", seed=3)
+    assert other.tried == report.tried and other.soil_before == report.soil_before
+    assert other.scatter == report.scatter and other.p_left == report.p_left
+
+
 def test_the_named_effect_predicts_rows_kept_back(dug):
     report = gap(*dug, effects=FEW, holdout="load_N=140")
     region = report.gap["held_out_region"]
@@ -85,7 +101,7 @@ def test_the_named_effect_predicts_rows_kept_back(dug):
 
 @pytest.mark.xfail(strict=True, reason="rows kept back without known noise count as ten sigma off")
 def test_rows_kept_back_whose_noise_nobody_knows_are_no_evidence(dug):
-    case, table = dug
+    table = dug[1]
     quiet = case_of(MODEL.replace('torque_Nm = "1 %"\n', ""))
     std = np.where(table["run"] == "run_3", np.nan, 0.01 * np.abs(table["torque_Nm"]))
     table = replace(table, columns=table.columns | {"torque_Nm_std": std})
@@ -167,7 +183,5 @@ def test_the_grown_model_makes_a_recipe(model, capsys):
 
 
 def test_with_its_effect_in_the_model_nothing_is_missing_any_more(dug):
-    case, table = dug
-    own = {"slip-sinkage.n1": 0.4}
-    grown = case_of(MODEL + '[[effect]]\nname = "slip-sinkage"\n').with_values(own)
-    assert gap(grown, table, effects=FEW).status == "no-gap"
+    grown = case_of(MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n')
+    assert gap(grown, dug[1], effects=FEW).status == "no-gap"

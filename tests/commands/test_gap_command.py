@@ -1,0 +1,249 @@
+"""`soilml gap`: four files, exit statuses, and what is refused."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from soilml.case import read_case
+from soilml.cli import main
+from soilml.effects import EFFECTS
+from soilml.effects.own import load_effects
+from soilml.operating import Operating
+
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.3, 0.8]
+shear_modulus = [0.005, 0.04]
+[noise]
+torque_Nm = "2 %"
+drawbar_pull_N = "2 % + 0.2"
+sinkage_m = "2 %"
+"""
+FILES = ["gap.json", "model.toml", "next_runs.csv", "report.html"]
+COLUMNS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
+
+OWN = '''\
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+from soilml.arrays import Real
+from soilml.effects import EffectCard
+from soilml.parameters import Parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class CableDrag:
+    """A cable that is dragged along pulls back, the more the wheel slips."""
+
+    name: ClassVar[str] = "cable-drag"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="a cable is dragged along",
+        source="own",
+        kind="rig",
+        reference={"drag": 20.0},
+        signs={"drawbar_pull": -1},
+        isolate="the same runs without the cable",
+    )
+    drag: Annotated[Real, Parameter("N", 0.0, 200.0, "pull at a slip of one")] = 0.0
+
+    def on_reading(self, force, scene):
+        slip = scene.at.slip
+        return replace(force, drawbar_pull=force.drawbar_pull - self.drag * slip * slip * slip)
+'''
+
+
+def noisy(rows, seed=0):
+    """Simulated rows (dicts of text) with the noise of the sensors, as a table with runs."""
+    rng = np.random.default_rng(seed)
+    lines = ["run,slip,load_N,torque_Nm,drawbar_pull_N,sinkage_m"]
+    for r in rows:
+        true = np.asarray([float(r[name]) for name in COLUMNS])
+        read = true + np.hypot(0.02 * true, [0.0, 0.2, 0.0]) * rng.standard_normal(3)
+        cells = [f"run_{r['load_N']}", r["slip"], r["load_N"], *map(repr, map(float, read))]
+        lines.append(",".join(cells))
+    return "\n".join(lines) + "\n"
+
+
+def driven(model_file, effects=(), loads=(40.0, 60.0, 90.0, 140.0), slips=6):
+    case = read_case(model_file)
+    model = case.model
+    for effect in effects:
+        model = model + effect
+    rows = []
+    for i, load in enumerate(loads):
+        slip = np.linspace(0.08, 0.6, slips)
+        force = model(case.soil, Operating(slip=slip, load=np.full(slips, load)))
+        for k in range(slips):
+            values = (force.torque[k], force.drawbar_pull[k], force.sinkage[k])
+            rows.append(dict(zip(COLUMNS, values, strict=True)) | {"i": i})
+            rows[-1] |= {"slip": f"{slip[k]:.6g}", "load_N": f"{load:g}"}
+    text = noisy(rows).splitlines()
+    lines = [f"r{r['i']}," + line.partition(",")[2] for r, line in zip(rows, text[1:], strict=True)]
+    return "\n".join([text[0], *lines]) + "\n"
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    """A model file and tables: runs of a wheel that digs itself in, under one load, two rows."""
+    folder = tmp_path_factory.mktemp("inputs")
+    (folder / "model.toml").write_text(MODEL)
+    digging = [EFFECTS["slip-sinkage"](n1=0.4)]
+    dug = driven(folder / "model.toml", digging)
+    (folder / "runs.csv").write_text(dug)
+    (folder / "two.csv").write_text("\n".join(dug.splitlines()[:3]) + "\n")
+    one = driven(folder / "model.toml", digging, loads=(60.0,) * 4)
+    (folder / "one.csv").write_text(one)
+    (folder / "quiet.toml").write_text(MODEL[: MODEL.index("[noise]")])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(inputs, tmp_path_factory):
+    """The folder that the analysis of the dug runs wrote."""
+    out = tmp_path_factory.mktemp("done") / "deep" / "out"
+    before = {p: p.read_bytes() for p in inputs.iterdir()}
+    command = ["gap", str(inputs / "model.toml"), str(inputs / "runs.csv"), "--out", str(out)]
+    assert main(command) == 0
+    assert {p: p.read_bytes() for p in inputs.iterdir()} == before
+    return out
+
+
+def content(folder):
+    return json.loads((folder / "gap.json").read_text())
+
+
+def test_the_folder_gets_four_files(done):
+    assert sorted(p.name for p in done.iterdir()) == FILES
+    assert "<html" in (done / "report.html").read_text().lower()
+
+
+def test_gap_json_has_the_promised_keys(done):
+    found = content(done)
+    assert {
+        "status", "effects", "cause_set", "where", "gap", "soil", "mimic_radius", "next_runs",
+        "seed", "soilml_version",
+    } <= set(found)  # fmt: skip
+    assert found["status"] == "named" and ["slip-sinkage"] in found["cause_set"]
+    (effect,) = found["effects"]
+    assert {"name", "parameters", "alternatives", "separating_snr"} <= set(effect)
+    assert set(effect["parameters"]["n1"]) == {"value", "std", "unit"}
+    assert {"channel", "slip", "load_N", "z", "p"} <= set(found["where"][0])
+    assert len(found["where"][0]["slip"]) == len(found["where"][0]["load_N"]) == 2
+    assert set(found["gap"]) == {"train", "held_out_runs", "held_out_region"}
+    for figures in found["gap"].values():
+        assert figures["before"] > figures["after"] > 0.0
+    assert set(found["soil"]) == {"before", "after"}
+    assert found["seed"] == 0
+
+
+def test_gap_json_is_json_that_every_reader_takes(done):
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    json.loads((done / "gap.json").read_text(), parse_constant=refuse)
+
+
+def test_the_model_that_was_written_carries_what_was_named(done):
+    case = read_case(done / "model.toml")
+    (effect,) = case.model.effects
+    found = content(done)
+    assert effect.name == found["effects"][0]["name"]
+    assert effect.n1 == found["effects"][0]["parameters"]["n1"]["value"]
+    for name, value in found["soil"]["after"].items():
+        assert float(getattr(case.soil, name)) == value["value"]
+
+
+def test_next_runs_csv_has_a_line_for_every_operating_point(done):
+    rows = list(csv.DictReader(io.StringIO((done / "next_runs.csv").read_text())))
+    assert list(rows[0])[:6] == ["run", "kind", "what", "separates_sigma", "slip", "load_N"]
+    assert any(name.startswith("torque_Nm if slip-sinkage") for name in rows[0])
+    kinds = list(dict.fromkeys(r["kind"] for r in rows))
+    assert kinds == [run["kind"] for run in content(done)["next_runs"]]
+    for r in rows:
+        assert r["run"].startswith("next_") and float(r["separates_sigma"]) >= 0.0
+        assert not r["slip"] or float(r["load_N"]) > 0.0
+
+
+def analysed(inputs, tmp_path, capsys, *arguments):
+    """Status of an analysis that ran, and its gap.json."""
+    assert main(["gap", *arguments, "--out", str(tmp_path / "out")]) == 0
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == FILES
+    found = content(tmp_path / "out")
+    assert capsys.readouterr().out.startswith(f"{found['status']}: ")
+    return found
+
+
+def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
+    files = (str(inputs / "model.toml"), str(inputs / "two.csv"))
+    found = analysed(inputs, tmp_path, capsys, *files, "--seed", "3")
+    assert found["status"] == "bad-data" and found["seed"] == 3
+    assert found["effects"] == found["cause_set"] == found["next_runs"] == []
+    assert any("6 readings for 3 soil parameters" in reason for reason in found["reasons"])
+    text = (tmp_path / "out" / "next_runs.csv").read_text()
+    assert text.strip() == "run,kind,what,separates_sigma,slip,load_N"
+
+
+def test_one_load_is_not_testable_and_names_nothing(inputs, tmp_path, capsys):
+    files = (str(inputs / "model.toml"), str(inputs / "one.csv"))
+    found = analysed(inputs, tmp_path, capsys, *files)
+    assert found["status"] == "not-testable"
+    assert found["effects"] == found["cause_set"] == []
+    assert "one load only" in found["reasons"][0]
+    assert "[[effect]]" not in (tmp_path / "out" / "model.toml").read_text()
+
+
+def test_noise_that_nobody_declared_is_bad_data_with_a_hint(inputs, tmp_path, capsys):
+    files = (str(inputs / "quiet.toml"), str(inputs / "runs.csv"))
+    found = analysed(inputs, tmp_path, capsys, *files)
+    assert found["status"] == "bad-data"
+    assert "give [noise] torque_Nm, or torque_Nm_std" in found["reasons"][0]
+
+
+def heavy(inputs, tmp_path):
+    text = (inputs / "runs.csv").read_text().splitlines()
+    text[3:3] = ["r9,0.3,100000,5.0,5.0,0.1"]
+    (tmp_path / "heavy.csv").write_text("\n".join(text) + "\n")
+    return str(inputs / "model.toml"), str(tmp_path / "heavy.csv")
+
+
+def test_a_load_that_the_soil_cannot_carry_is_bad_data(inputs, tmp_path, capsys):
+    found = analysed(inputs, tmp_path, capsys, *heavy(inputs, tmp_path))
+    assert found["status"] == "bad-data"
+    assert "the model cannot carry the load of row 3" in found["sentence"]
+
+
+@pytest.mark.xfail(strict=True, reason="rows are counted after those kept back are gone")
+def test_a_row_is_named_where_it_stands_in_the_table(inputs, tmp_path, capsys):
+    files = heavy(inputs, tmp_path)
+    found = analysed(inputs, tmp_path, capsys, *files, "--holdout", "run=r0")
+    assert "line 4" in found["sentence"] or "row 3" in found["sentence"]
+
+
+def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, capsys):
+    own = tmp_path / "own.py"
+    own.write_text(OWN)
+    true = tmp_path / "true.toml"
+    true.write_text(MODEL + '[[effect]]\nname = "cable-drag"\ndrag = 40.0\n')
+    command = ["simulate", str(true), "--slip", "0.08:0.6:8", "--load", "40,60,90,140"]
+    assert main([*command, "--effects", str(own)]) == 0
+    runs = tmp_path / "runs.csv"
+    runs.write_text(noisy(csv.DictReader(io.StringIO(capsys.readouterr().out))))
+    files = (str(inputs / "model.toml"), str(runs), "--effects", str(own))
+    found = analysed(inputs, tmp_path, capsys, *files)
+    assert ["cable-drag"] in found["cause_set"]
+    text = (tmp_path / "out" / "model.toml").read_text()
+    assert 'name = "cable-drag"' in text
+    (tmp_path / "out" / "model.toml").rename(tmp_path / "found.toml")
+    with_own = {**EFFECTS, **load_effects(own)}
+    (effect,) = read_case(tmp_path / "found.toml", with_own).model.effects
+    assert effect.drag == pytest.approx(40.0, rel=0.1)
