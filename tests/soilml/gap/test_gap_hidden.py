@@ -26,7 +26,7 @@ def soil_only(report, case):
     return case.with_values({k: v.value for k, v in report.soil_before.items()})
 
 
-@pytest.mark.parametrize("kind", ["nothing", "memory", "outliers"])
+@pytest.mark.parametrize("kind", ["nothing", "scatter", "memory", "outliers"])
 def test_where_nothing_is_hidden_no_gap_is_seen(kind):
     report = analysed(kind)
     assert report.status == "no-gap"
@@ -41,6 +41,12 @@ def test_where_nothing_is_hidden_no_cause_is_named(kind):
     assert report.cause_set == report.effects == report.model.model.effects == ()
     for shrunk in report.gap.values():
         assert shrunk.after == shrunk.before
+
+
+def test_soil_that_differs_from_run_to_run_is_noticed():
+    found = analysed("scatter").scatter
+    assert 0.002 < found["friction_angle_from_run_to_run_rad"] < 0.02  # half a degree is 0.0087
+    assert 0.01 < found["bearing_from_run_to_run"] < 0.12  # 0.05 is true
 
 
 def test_samples_that_remember_are_noticed():
@@ -115,7 +121,7 @@ def test_what_fits_best_without_being_believed_is_not_in_the_model():
         assert any("any cause" in said for said in report.not_claimed)
 
 
-@pytest.mark.parametrize("kind", ["slip-sinkage", "stick-slip", "scatter"])
+@pytest.mark.parametrize("kind", ["slip-sinkage", "stick-slip", "bulldozing"])
 def test_what_a_report_says_fits_together(kind):
     report = analysed(kind)
     assert report.status in STATUSES
