@@ -25,9 +25,10 @@ class Noise:
 
     def as_setting(self) -> Any:
         """As it is written in TOML."""
+        share = f"{100 * self.share:.15g} %"
         if self.share and self.constant:
-            return f"{100 * self.share:g} % + {self.constant:g}"
-        return f"{100 * self.share:g} %" if self.share else self.constant
+            return f"{share} + {self.constant!r}"
+        return share if self.share else self.constant
 
 
 _SHARE = re.compile(r"\s*([0-9.eE+-]+)\s*%\s*(?:\+\s*([0-9.eE+-]+)\s*)?")

@@ -59,6 +59,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder is there already."""
     folder = Path(args.out)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {args.out} is a file; needed is a folder")
     return [folder / name for name in FILES] if folder.is_dir() else []
 
 

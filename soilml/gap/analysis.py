@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from soilml.gap.signatures import Signature, signatures
 from soilml.gap.smooth import smooth_columns
 from soilml.gap.sound import MOST_STRAY, strays
 from soilml.identification.free import Free
+from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
@@ -51,8 +52,12 @@ def analysed(
     effects: Mapping[str, type[Effect]],
     calibration: Mapping[str, float],
     seed: int,
+    place: Callable[[int], str],
 ) -> Analysis:
-    """Search the cells for what the soil alone does not explain."""
+    """Search the cells for what the soil alone does not explain.
+
+    `place` says where a row stands, for messages.
+    """
     axes = tuple(soil_axis(f) for f in free)
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     starts = [nominal, np.full(len(free), 0.5), np.full(len(free), 0.25)]
@@ -63,14 +68,14 @@ def analysed(
     if not np.isfinite(soil.prediction).all():
         bad = int(cells.row[np.flatnonzero(~np.isfinite(soil.prediction))[0]])
         return Analysis(
-            bench, _nothing(soil), (), f"the model cannot carry the load of row {bad + 1}"
+            bench, _nothing(soil), (), f"the model cannot carry the load of {place(bad)}"
         )
     best, dropped = soil, []
     found = _nothing(soil)
     for _ in range(PASSES):
         before = bench.covariance.scatter
         bench, lost = _scattered(bench, best, cells, found.left.signatures)
-        dropped += lost
+        dropped += [f"{name} at {place(row)}" for name, row in lost]
         if len(dropped) > MOST_STRAY * (len(cells) + len(dropped)):
             text = f"{len(dropped)} readings stray from all others: look at the sensors first"
             return Analysis(bench, _nothing(soil), (), text)
@@ -98,7 +103,7 @@ def _alike(one: Scatter, other: Scatter) -> bool:
 
 def _scattered(
     bench: Bench, fit: GapFit, cells: Cells, known: Sequence[Signature]
-) -> tuple[Bench, list[str]]:
+) -> tuple[Bench, list[tuple[str, int]]]:
     """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
     case, reading = fit.fitted(), cells.reading
     if not known or len(known[0].column) != len(cells):
@@ -112,7 +117,9 @@ def _scattered(
     explained = fit.prediction + _explained(wide, residual, space)
     cells = cells.expecting(explained)
     away = strays(assembled(cells, columns, typical), residual, space)
-    lost = [f"{cells.channels[cells.channel[i]]}@{cells.row[i]}" for i in np.flatnonzero(away)]
+    lost = [
+        (column(cells.channels[cells.channel[i]]), int(cells.row[i])) for i in np.flatnonzero(away)
+    ]
     kept = ~away
     cells = cells.keeping(kept)
     covariance = estimated(cells, columns[kept], residual[kept], space[kept])

@@ -99,7 +99,7 @@ def audit(
     Channels are those whose noise is declared. Raises `InputError` where none is, or where the
     model carries a load of the design nowhere.
     """
-    cells = planned(case, design)
+    cells = planned(case, design.rows(design.answered))
     wanted = chosen(case, free if free is not None or case.prior else SHEAR)
     axes = [soil_axis(f) for f in wanted if "." not in f.path]
     at = np.asarray([f.prior.fraction(f.nominal) for f in wanted if "." not in f.path])

@@ -52,9 +52,16 @@ def gap(
     cannot be analysed give a report of status `bad-data`.
     """
     same_wheel(case, table)
+    answered = table.answered
+    if not answered.any():
+        raise InputError(f"{table.source}: no row has the status ok")
+    table, unanswered = table.rows(answered), int(np.count_nonzero(~answered))
     table, repeats = without_repeats(table)
     seen, kept_back, what = _split(table, holdout, seed)
     wanted = chosen(case, free if free is not None or case.prior else SHEAR)
+    for f in wanted:
+        if free is not None and "." in f.path:
+            raise InputError(f"--free {f.path} is no soil parameter; only those may differ here")
     soil = [f for f in wanted if "." not in f.path]
     cells = cells_of(case, seen)
     noise, notes = repeated_noise(cells)
@@ -63,11 +70,19 @@ def gap(
     gate = examined(cells, seen, repeats, len(soil))
     if gate.refused:
         return _refused(case, (*gate.refused, *gate.unnameable), gate.notes, seed)
+    if unanswered:
+        notes.append(
+            "1 row is left out: its status is not ok"
+            if unanswered == 1
+            else f"{unanswered} rows are left out: their status is not ok"
+        )
     gate = replace(gate, notes=(*notes, *gate.notes))
-    found = analysed(case, soil, cells, effects, calibration or {}, seed)
+    found = analysed(case, soil, cells, effects, calibration or {}, seed, seen.place)
     if found.refused:
         return _refused(case, (found.refused,), gate.notes, seed)
     beyond = None if kept_back is None else cells_of(case, kept_back).with_noise(noise)
+    if beyond is not None:
+        beyond = beyond.keeping(np.isfinite(beyond.std))
     return _reported(case, found, gate, soil, beyond, what, seed)
 
 
@@ -121,8 +136,11 @@ def _reported(
 ) -> GapReport:
     bench, found = analysis.bench, analysis.found
     after = found.causes[0].fit if found.causes else found.soil
-    gaps = _gaps(analysis, after, beyond, what, seed)
+    gaps = _gaps(analysis, after, seed)
     status = status_of(found, gate.unnameable, gaps.get("held_out_runs"))
+    if beyond is not None and len(beyond):  # after the verdict, in which they take no part
+        name = "held_out_runs" if what.startswith("runs") else "held_out_region"
+        gaps[name] = unseen(bench, found.soil, after, beyond, what)
     claimed = status in ("named", "form-open", "class")
     if not claimed:  # the figures are those of the model that is handed over
         after, gaps = found.soil, {name: s.unchanged() for name, s in gaps.items()}
@@ -167,19 +185,11 @@ def _rivals(causes: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Can
     return [causes[0], *sorted(others, key=lambda c: c.cost)[:1]]
 
 
-def _gaps(
-    analysis: Analysis, after: GapFit, beyond: Cells | None, what: str, seed: int
-) -> dict[str, Shrink]:
+def _gaps(analysis: Analysis, after: GapFit, seed: int) -> dict[str, Shrink]:
     bench, soil = analysis.bench, analysis.found.soil
     std = bench.covariance.std
     gaps = {"train": shrink(bench.cells, std, soil.prediction, after.prediction, "all rows fitted")}
     runs, region = held_out_runs(bench, soil, after, seed), held_out_region(bench, soil, after)
-    if beyond is not None and len(beyond):
-        kept_back = unseen(bench, soil, after, beyond, what)
-        if what.startswith("runs"):
-            runs = kept_back
-        else:
-            region = kept_back
     if runs is not None:
         gaps["held_out_runs"] = runs
     if region is not None:

@@ -136,7 +136,10 @@ def test_faults_in_options(folder, capsys, fault):
 
 
 OTHERS = {
-    "folder that is a file": (["gap", "model.toml", "runs.csv", "--out", "file"], "cannot be made"),
+    "folder that is a file": (
+        ["gap", "model.toml", "runs.csv", "--out", "file"],
+        "is a file; needed is a folder",
+    ),
     "folder in a file": (["gap", "model.toml", "runs.csv", "--out", "file/out"], "cannot be made"),
     "file that is a folder": (["gap", "model.toml", "runs.csv", "--out", "taken"], "gap.json"),
     "over the model": (

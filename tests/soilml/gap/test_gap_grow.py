@@ -74,7 +74,6 @@ def test_a_soil_of_any_digits_is_kept_to_the_last():
     assert again.soil == case.soil
 
 
-@pytest.mark.xfail(strict=True, reason="a share of noise is written with six digits")
 def test_noise_of_any_digits_is_kept_to_the_last():
     case = case_of(MODEL.replace('"1 %"', '"1.23456789 %"'))
     assert case_of(model_text(case)).noise == case.noise
@@ -145,7 +144,7 @@ def test_a_checked_sensor_tells_a_fault_from_physics(rivals, monkeypatch):
     monkeypatch.setattr("soilml.gap.next_runs.LISTED", 99)
     found = {run.kind: run for run in next_runs(*rivals)}
     gain = abs(rivals[1][1].fit.values()["torque-gain.gain"])
-    assert found["dead-weight torque"].separates == pytest.approx(gain / 0.003)
+    assert found["dead-weight torque"].separates == pytest.approx(min(gain / 0.003, 10.0))
     assert all(run.rows == () for kind, run in found.items() if kind in CHECKS)
 
 
