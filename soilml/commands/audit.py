@@ -6,13 +6,16 @@ import argparse
 import json
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.case import read_case
 from soilml.commands.models import add_effects_option, chosen_effects
-from soilml.gap import Audit, audit
 from soilml.reading import read_table
 from soilml.saving import named, save_text
 from soilml.writing import aligned
+
+if TYPE_CHECKING:
+    from soilml.gap import Audit
 
 HELP = "what these runs could name, before they are driven"
 DESCRIPTION = """\
@@ -47,6 +50,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
+    from soilml.gap import audit
+
     effects = chosen_effects(args)
     case = read_case(args.model, effects)
     design = read_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
