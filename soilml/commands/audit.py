@@ -82,7 +82,8 @@ def _for_people(found: Audit) -> str:
     parts = [aligned(header, rows, text_columns=2, last_left=True)]
     if found.classes:
         parts.append(
-            "cannot be told apart:\n" + "\n".join("  " + ", ".join(c) for c in found.classes)
+            "at its reference size, the weaker of these looks like another of them:\n"
+            + "\n".join("  " + ", ".join(c) for c in found.classes)
         )
     if found.untestable:
         lines = [f"  {name}: {why}" for name, why in found.untestable.items()]

@@ -29,6 +29,9 @@ name the missing effect if the data can tell it from all others, add it, and sho
   soilml gap MODEL.toml RUNS.csv --out DIR --holdout run          a quarter of the runs kept back
   soilml gap MODEL.toml RUNS.csv --out DIR --holdout load_N=150   rows kept back by value
 
+Rows of one run were driven on one bed (one load a run is best). Soil parameters without a prior are
+held at the model's values: what is off in them looks like an effect.
+
 RUNS.csv: run, slip, load_N, torque_Nm, and any of drawbar_pull_N, sinkage_m, speed_m_s (below zero
 in reverse), pass, slip_angle_rad, time_s, <column>_std. DIR gets report.html (look at it first),
 gap.json, model.toml (the model with what was added) and next_runs.csv (what to drive next).
@@ -163,6 +166,7 @@ def _for_people(report: Any) -> str:
         parts.append(aligned(("effect", "value", "std", "unit"), rows))
     if report.next_runs:
         best = report.next_runs[0]
-        parts.append(f"next: {best.kind} ({best.text}), separates {best.separates:.2g} sigma")
+        apart = "10 sigma or more" if best.separates >= 10.0 else f"{best.separates:.2g} sigma"
+        parts.append(f"next: {best.kind} ({best.text}): sets the explanations {apart} apart")
     parts += [f"! {note}" for note in report.notes]
     return "\n\n".join(parts)

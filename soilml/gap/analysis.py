@@ -107,7 +107,7 @@ def _scattered(
     """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
     case, reading = fit.fitted(), cells.reading
     if not known or len(known[0].column) != len(cells):
-        known, _ = signatures(case, cells, bench.effects)
+        known, _ = signatures(case, cells, bench.others(fit))
     raw = np.linalg.solve(bench.covariance.whiten, fit.slope)
     space = np.column_stack([raw, *[s.column for s in known], smooth_columns(cells)])
     residual = reading - fit.prediction

@@ -16,7 +16,7 @@ from soilml.gap.covariance import Covariance
 from soilml.gap.fit import GapFit, descend
 from soilml.gap.predict import SHAPE_STD, Axis, shape_axes, size_axis
 from soilml.gap.score import outside
-from soilml.gap.signatures import grown
+from soilml.gap.signatures import grown, standing
 
 Floats = NDArray[np.float64]
 
@@ -81,6 +81,11 @@ class Bench:
     covariance: Covariance
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
+
+    def others(self, fit: GapFit) -> dict[str, type[Effect]]:
+        """The effects whose size is not among the coordinates of a fit."""
+        fitted = {axis.path.rpartition(".")[0] for axis in fit.axes}
+        return {name: effect for name, effect in self.effects.items() if name not in fitted}
 
     def with_effects(self, names: Sequence[str]) -> Case:
         """The case with these effects added."""
@@ -156,8 +161,14 @@ class Bench:
         kept = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
         return float(np.sum((kept.T @ fit.residual) ** 2))
 
+    def _first(self, axis: Axis) -> float:
+        """Where a coordinate starts: where the case has it, else a little off zero."""
+        if axis.path in self.case.parameters() and not _is_shape(axis):
+            return standing(self.case, axis.path, axis.prior.upper)
+        return _small(axis)
+
     def _from(self, case: Case, axes: Sequence[Axis], start: Mapping[str, float]) -> GapFit:
-        begin = np.asarray([start.get(axis.path, _small(axis)) for axis in axes])
+        begin = np.asarray([start.get(axis.path, self._first(axis)) for axis in axes])
         try:
             return descend(case, axes, self.cells, self.covariance.whiten, begin)
         except InputError:  # a trial past what the model allows: start from nothing

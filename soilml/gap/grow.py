@@ -7,14 +7,32 @@ from dataclasses import replace
 
 from soilml.case import Case
 from soilml.gap.fit import GapFit
+from soilml.gap.predict import SHAPE_STD
 from soilml.parameters import declared
+from soilml.prior import Prior
 from soilml.soils import Soil
+
+#: Standard deviations to either side of an effect's size that its prior reaches.
+KNOWN = 3.0
 
 
 def grown_case(fit: GapFit) -> Case:
-    """The fitted case: soil and effects at their optimum, priors and noise as they were."""
-    fitted = fit.fitted()
-    return replace(fitted, prior=dict(fit.case.prior), noise=dict(fit.case.noise))
+    """The fitted case: soil and effects at their optimum, priors and noise as they were.
+
+    An effect's size gets a prior of three standard deviations to either side, so that those who
+    use the model carry on what is open about it.
+    """
+    fitted, prior, stds = fit.fitted(), dict(fit.case.prior), fit.stds()
+    for path, value in fit.values().items():
+        name, _, parameter = path.rpartition(".")
+        if not name or parameter in SHAPE_STD:
+            continue
+        bounds = fitted.parameters()[path][0]
+        lower = max(bounds.lower, value - KNOWN * stds[path])
+        upper = min(bounds.upper, value + KNOWN * stds[path])
+        if lower < upper:
+            prior[path] = Prior(lower, upper)
+    return replace(fitted, prior=prior, noise=dict(fit.case.noise))
 
 
 def model_text(case: Case, comments: Sequence[str] = ()) -> str:

@@ -171,7 +171,7 @@ def _loosened(bench: Bench, candidates: Sequence[Candidate]) -> list[Candidate]:
 
 def _left(bench: Bench, candidate: Candidate, seed: int) -> Left:
     fit = candidate.fit
-    known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
+    known, _ = signatures(fit.fitted(), bench.cells, bench.others(fit))
     return left_by(bench, fit, known, seed)
 
 
@@ -212,7 +212,7 @@ def _one_more(
     found: dict[tuple[str, ...], Candidate] = {}
     for candidate in sorted(level, key=lambda c: c.cost)[:3]:
         fit = candidate.fit
-        known, _ = signatures(fit.fitted(), bench.cells, bench.effects)
+        known, _ = signatures(fit.fitted(), bench.cells, bench.others(fit))
         gains = predicted_gains(bench, fit, known)
         for name in _promising(gains)[:3]:
             names = tuple(sorted((*candidate.names, name)))

@@ -43,28 +43,37 @@ class Untestable:
 
 
 def grown(case: Case, effect: type[Effect]) -> Case:
-    """The case with one effect more, at its neutral size."""
+    """The case with the effect: as it has it, or with one more at its neutral size."""
+    if any(own.name == effect.name for own in case.model.effects):
+        return case
     made: Any = effect()
     return replace(case, model=case.model + made)
+
+
+def standing(case: Case, path: str, unit: float) -> float:
+    """The coordinate at which a case has an effect's size, in reference sizes; 0 where not."""
+    own = case.parameters()
+    return float(own[path][1]) / unit if path in own else 0.0
 
 
 def signatures(
     case: Case, cells: Cells, effects: Mapping[str, type[Effect]]
 ) -> tuple[list[Signature], list[Untestable]]:
-    """Signatures of all effects that the case lacks, and those that these runs cannot test."""
-    own = {effect.name for effect in case.model.effects}
+    """Signatures of all effects, and those that these runs cannot test.
+
+    An effect that the case has is moved from the size that it has there: it may be wrong.
+    """
     base = predicted(case, [], np.zeros((1, 0)), cells)[0]
     found, cannot = [], []
     for name, effect in effects.items():
-        if name in own:
-            continue
         if reason := _lacking(effect, cells):
             cannot.append(Untestable(name, reason))
             continue
         axis = size_axis(effect, None)
-        x = SECANT if axis.upper >= SECANT else -SECANT
+        at = standing(case, axis.path, axis.prior.upper)
+        x = SECANT if axis.upper >= at + SECANT else -SECANT
         try:
-            moved = predicted(grown(case, effect), [axis], np.asarray([[x]]), cells)[0]
+            moved = predicted(grown(case, effect), [axis], np.asarray([[at + x]]), cells)[0]
         except InputError as error:
             cannot.append(Untestable(name, str(error)))
             continue
@@ -75,7 +84,7 @@ def signatures(
         if not np.any(np.abs(column) > 1e-6 * cells.std):
             cannot.append(Untestable(name, "it changes no reading that there is"))
             continue
-        sign = 0 if axis.lower < 0.0 < axis.upper else int(np.sign(x))
+        sign = 0 if axis.lower < at < axis.upper else int(np.sign(x))
         found.append(Signature(name, effect.about.kind, column, sign))
     return found, cannot
 

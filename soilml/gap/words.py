@@ -12,9 +12,12 @@ def figure(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
 
 
-def sentence(report: GapReport, unnameable: Sequence[str]) -> str:
-    """The verdict in one sentence."""
-    names = " + ".join(e.name for e in report.effects)
+def sentence(report: GapReport, unnameable: Sequence[str], own: Sequence[str]) -> str:
+    """The verdict in one sentence; `own` are the effects that the model had before."""
+    names = " + ".join(
+        f"{e.name} (the model has it at another size)" if e.name in own else e.name
+        for e in report.effects
+    )
     train = report.gap["train"]
     closed = (
         f"mean squared residual {figure(train.before)} -> {figure(train.after)} (1 is the noise)"
@@ -40,8 +43,8 @@ def sentence(report: GapReport, unnameable: Sequence[str]) -> str:
     return f"The gap is {names}: {closed}; no other effect of the catalogue explains it."
 
 
-def not_claimed(report: GapReport, unnameable: Sequence[str]) -> list[str]:
-    """What a reader might take from the report, and should not."""
+def not_claimed(report: GapReport, unnameable: Sequence[str], held: Sequence[str]) -> list[str]:
+    """What a reader might take from the report, and should not; `held` were held fixed."""
     said = [f"{reason}: no cause is named" for reason in unnameable]
     if report.status == "no-gap":
         said.append("that the model is complete: only that these runs do not show otherwise")
@@ -54,6 +57,11 @@ def not_claimed(report: GapReport, unnameable: Sequence[str]) -> list[str]:
         said.append("which of the effects it is; model.toml carries the best one as a stand-in")
     if report.status == "unknown":
         said.append("any cause: model.toml is the soil fitted again and nothing else")
+    if held:
+        said.append(
+            f"that {', '.join(held)} of the model file are right: they were held, and what is off "
+            "in them looks like an effect; let them differ with a prior, or with --free"
+        )
     said.append("that a smaller gap proves a cause: wrong effects close gaps too")
     if "held_out_region" in report.gap:
         region = report.gap["held_out_region"]

@@ -14,6 +14,7 @@ from soilml.errors import InputError
 from soilml.gap.analysis import Analysis, analysed
 from soilml.gap.candidate import Candidate
 from soilml.gap.cells import Cells, cells_of
+from soilml.gap.covariance import FEW_RUNS
 from soilml.gap.fit import GapFit
 from soilml.gap.grow import grown_case
 from soilml.gap.next_runs import next_runs
@@ -27,6 +28,7 @@ from soilml.gap.verdict import likeness, map_of, named, status_of, values_of
 from soilml.gap.words import not_claimed, sentence
 from soilml.identification.free import Free, chosen
 from soilml.identification.measured import same_wheel
+from soilml.parameters import declared
 from soilml.quantities import SHEAR, column
 from soilml.table import Table
 
@@ -172,9 +174,16 @@ def _reported(
     )
     return replace(
         report,
-        sentence=sentence(report, gate.unnameable),
-        not_claimed=tuple(not_claimed(report, gate.unnameable)),
+        sentence=sentence(report, gate.unnameable, [e.name for e in case.model.effects]),
+        not_claimed=tuple(not_claimed(report, gate.unnameable, _held(case, free))),
     )
+
+
+def _held(case: Case, free: Sequence[Free]) -> list[str]:
+    """Soil and gear parameters that were believed as the model file has them."""
+    freed = {f.path for f in free}
+    soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
+    return [*soil, *(f"gear.{name}" for name in declared(type(case.model.gear)))]
 
 
 def _rivals(causes: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Candidate]:
@@ -234,6 +243,12 @@ def _notes(analysis: Analysis, gate: Gate, after: GapFit) -> tuple[str, ...]:
     for name, scale in zip(analysis.bench.cells.channels, scatter.scale, strict=True):
         if scale > 1.25:
             said.append(f"{column(name)} scatters {scale:.2g} times as much as declared")
+    if 1 < len(analysis.bench.cells.runs) < FEW_RUNS:
+        said.append(
+            f"fewer than {FEW_RUNS} runs cannot show how the soil scatters between them: "
+            f"{np.degrees(scatter.friction_angle):.2g} deg and {scatter.bearing:.0%} of bearing "
+            "are taken for granted, and residuals may stand below 1"
+        )
     if scatter.memory > 0.0:
         said.append(
             f"neighbouring samples of a run share their noise (correlation {scatter.memory:.2g}): "

@@ -117,11 +117,11 @@ def test_an_effect_whose_covariate_never_varied_cannot_be_tested(name, column):
             assert cannot[0].reason == f"needs runs at several values of {column}"
 
 
-def test_an_effect_that_the_model_has_is_not_looked_for():
+def test_an_effect_that_the_model_has_is_moved_from_its_size():
     case = grown(case_of(), EFFECTS["grousers"])
     cells = bench_of(case_of(), driven(case_of())).cells
-    known, cannot = signatures(case, cells, {"grousers": EFFECTS["grousers"]})
-    assert known == cannot == []
+    (known,), cannot = signatures(case, cells, {"grousers": EFFECTS["grousers"]})
+    assert known.name == "grousers" and cannot == []
 
 
 def test_smooth_columns_touch_one_channel_each_and_are_free_of_each_other(clean):

@@ -88,9 +88,11 @@ def rivals():
     return bench, [bench.fit([name], start) for name in ("slip-sinkage", "torque-gain")]
 
 
-def test_the_grown_case_is_the_fit_with_priors_and_noise_as_they_were(rivals):
+def test_the_grown_case_is_the_fit_with_a_prior_for_what_was_added(rivals):
     bench, (one, _) = rivals
     case = grown_case(one.fit)
+    size = case.prior.pop("slip-sinkage.n1")
+    assert size.lower < one.fit.values()["slip-sinkage.n1"] < size.upper
     assert case.prior == bench.case.prior and case.noise == bench.case.noise
     assert [e.name for e in case.model.effects] == ["slip-sinkage"]
     assert case.model.effects[0].n1 == one.fit.values()["slip-sinkage.n1"]
