@@ -50,7 +50,7 @@ def _head(sets: Sequence[Judged]) -> str:
 
 def _gates(sets: Sequence[Judged], alone: Sequence[float]) -> str:
     rows = [
-        (name, measured, goal, "yes" if met else "**no**" if goal != "-" else "")
+        (name, measured, goal, "" if goal == "-" else "yes" if met else "**no**")
         for name, measured, goal, met in gap_table.gates(sets, alone)
     ]
     return "### Gates\n\nRates with their 95 % interval.\n\n" + _table(

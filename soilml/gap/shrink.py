@@ -93,7 +93,7 @@ def _crossed(
             try:
                 again = refitted(bench, fit, ~out)
             except (InputError, np.linalg.LinAlgError):
-                again = fit
+                continue  # no fit, no prediction: these cells count as far off
             y = predicted(again.case, again.axes, again.x[None, :], bench.cells)[0]
             target[out] = y[out]
     held = np.isin(fold, folds)
