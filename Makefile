@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo gap test check models kls1 gap-real bench bench-gap clean
+.PHONY: help demo demo-papers gap test check models kls1 gap-real bench bench-gap clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -28,6 +28,9 @@ demo: $(VENV)/.ready ## from physics to an estimate on board, with a table and a
 
 gap: $(VENV)/.ready ## five stories of a model that lacks something, with their reports
 	@$(BIN)/python examples/gap/run.py
+
+demo-papers: $(VENV)/.ready ## every system of the source papers, with pictures and their printed numbers
+	@$(BIN)/python examples/papers/run.py
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check

@@ -11,7 +11,7 @@ import numpy as np
 
 from soilml.arrays import Array, Real, namespace
 from soilml.contact import Force
-from soilml.effects.base import Effect, through
+from soilml.effects.base import Effect, suits, through
 from soilml.equilibrium import at_rest, settled, stresses_along
 from soilml.errors import InputError
 from soilml.gears.base import Gear
@@ -39,6 +39,10 @@ class Model:
     def __add__(self, effect: Effect) -> Model:
         if any(effect.name == other.name for other in self.effects):
             raise InputError(f"the model has the effect {effect.name!r} already")
+        if not suits(effect, self.gear):
+            raise InputError(
+                f"the effect {effect.name} is one of rigid wheels, not of {self.gear.name}"
+            )
         return replace(self, effects=(*self.effects, effect))
 
     def __call__(self, soil: Soil, at: Operating) -> Force:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from soilml.arrays import Array
 from soilml.errors import InputError
+from soilml.gears.rim import RigidWheel
 from soilml.operating import COVARIATES
 
 T = TypeVar("T")
@@ -54,6 +55,8 @@ class EffectCard:
     signs: dict[str, int]
     #: runs that would tell it from others
     isolate: str
+    #: it changes the arc of a rigid wheel, or needs its radius: for no other gear
+    wheel: bool = False
     #: fields of `Operating` that must be given, and must vary for the effect to be found
     needs: tuple[str, ...] = ()
     #: what the runs of one model cannot vary, and a search for missing effects thus cannot test
@@ -66,6 +69,11 @@ class EffectCard:
     def size(self) -> str:
         """The parameter that is the size of the effect."""
         return next(iter(self.reference))
+
+
+def suits(effect: Any, gear: Any) -> bool:
+    """Whether an effect, or its class, means something for this gear."""
+    return isinstance(gear, RigidWheel) or not effect.about.wheel
 
 
 def covariate(scene: Any, field: str, effect: str) -> Array:

@@ -29,6 +29,7 @@ class BearingFriction:
         text="friction of the bearing is in the measured torque",
         source="Coulomb friction",
         kind="rig",
+        wheel=True,
         reference={"coefficient": 0.01},
         signs={"torque": +1},
         isolate="turning the wheel, loaded, on a smooth roller or a second bearing",

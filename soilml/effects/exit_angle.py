@@ -38,6 +38,7 @@ class ExitAngle(Shaped):
         text="the rim touches the soil behind the axle too: theta_2 below zero",
         source="Ishigami et al. 2007, J. Field Robotics 24(3); Ding et al. 2011",
         kind="soil",
+        wheel=True,
         reference={"kappa": 0.15},
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="runs near zero slip; the wheel weighed on its stand",

@@ -38,6 +38,7 @@ class Grousers(Shaped):
         text="lugs carry the soil around: it shears further out than the rim",
         source="Ding et al. 2011, J. Terramechanics 48(1)",
         kind="wheel",
+        wheel=True,
         reference={"height": 0.01},
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",

@@ -39,6 +39,7 @@ class SidewallShear(Shaped):
         text="the buried side walls shear the soil too: more torque and pull",
         source="geometry; Jaky 1944; Janosi and Hanamoto 1961",
         kind="soil",
+        wheel=True,
         reference={"share": 1.0},
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with a wheel of another width; heavier loads, which bury more wall",

@@ -34,6 +34,7 @@ class SmallWheelStiffness(Shaped):
         text="the soil's stiffness depends on the diameter of the wheel",
         source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
         kind="soil",
+        wheel=True,
         reference={"exponent": -0.3},
         signs={"sinkage": -1},
         varied="wheels of several diameters: with one it is a change of kc and kphi",

@@ -34,6 +34,7 @@ class StressShift(Shaped):
         text="stresses sit at the front of the contact: small wheels",
         source="Nagatani et al. 2009, IROS, sec. IV",
         kind="soil",
+        wheel=True,
         reference={"shift": 0.2},
         signs={"drawbar_pull": -1, "sinkage": +1},
         isolate="force sensors in the rim; the same soil under a larger wheel",

@@ -34,6 +34,7 @@ class WheelFlexibility(Shaped):
         text="the wheel deflects under its load and touches along a longer arc",
         source="Bekker 1969; Schmid 1995, J. Terramechanics 32(1)",
         kind="wheel",
+        wheel=True,
         reference={"compliance": 2e-5},
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",

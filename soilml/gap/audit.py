@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.effects import EFFECTS, Effect
+from soilml.effects.base import suits
 from soilml.errors import InputError
 from soilml.gap.cells import Cells, declared_std
 from soilml.gap.menu import cells_at, menu
@@ -99,6 +100,7 @@ def audit(
     Channels are those whose noise is declared. Raises `InputError` where none is, or where the
     model carries a load of the design nowhere.
     """
+    effects = {name: e for name, e in effects.items() if suits(e, case.model.gear)}
     cells = planned(case, design.rows(design.answered))
     wanted = chosen(case, free if free is not None or case.prior else SHEAR)
     axes = [soil_axis(f) for f in wanted if "." not in f.path]

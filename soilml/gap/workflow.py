@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.effects import EFFECTS, Effect
+from soilml.effects.base import suits
 from soilml.errors import InputError
 from soilml.gap.analysis import Analysis, analysed
 from soilml.gap.candidate import Candidate
@@ -53,6 +54,7 @@ def gap(
     Raises `InputError` and `TableError` for names, columns and rows that make no sense; data that
     cannot be analysed give a report of status `bad-data`.
     """
+    effects = {name: e for name, e in effects.items() if suits(e, case.model.gear)}
     same_wheel(case, table)
     answered = table.answered
     if not answered.any():

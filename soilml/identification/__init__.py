@@ -13,6 +13,7 @@ import numpy as np
 
 from soilml.case import Case
 from soilml.errors import InputError
+from soilml.gears.rim import RigidWheel
 from soilml.identification.fit import Fit
 from soilml.identification.free import Free, chosen
 from soilml.identification.linear import linear
@@ -29,6 +30,8 @@ METHODS: dict[str, Method] = {
     "linear": linear,
     "newton": newton,
 }
+#: Those that rest on the closed form of a rigid wheel's linear stresses.
+CLOSED_FORM = ("linear", "newton")
 
 
 def identify(
@@ -42,6 +45,11 @@ def identify(
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+    if method in CLOSED_FORM and not isinstance(case.model.gear, RigidWheel):
+        raise InputError(
+            f"the {method} method has its equations for rigid wheels alone, not for "
+            f"{case.model.gear.name}; take nonlinear"
+        )
     data = measured_rows(case, table)
     fit = METHODS[method](case, data, chosen(case, free))
     return replace(fit, warnings=(*fit.warnings, *_not_followed(fit, data, free), *data.notes))
@@ -55,7 +63,7 @@ def _not_followed(fit: Fit, data: Measured, free: Sequence[str] | None) -> list[
             f"{', '.join(others)} found too, though not asked for: the {fit.method} method finds "
             f"{', '.join(fit.names)} together"
         )
-    if fit.method in ("linear", "newton") and (np.any(data.slip_std) or np.any(data.load_std)):
+    if fit.method in CLOSED_FORM and (np.any(data.slip_std) or np.any(data.load_std)):
         said.append(f"the {fit.method} method does not carry noise of slip and load into std")
     return said
 

@@ -1,0 +1,1 @@
+"""Climbing ability of a rover, from gentle slopes and artificial slip."""

@@ -1,0 +1,1 @@
+"""A wheel that measures the normal stress on its rim, and what follows from that."""

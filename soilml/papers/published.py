@@ -1,0 +1,92 @@
+"""A printed number, and how a computed one stands beside it."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import resources
+
+from soilml.errors import InputError
+from soilml.papers import PAPERS
+
+COLUMNS = ("key", "what", "source", "unit", "published", "tolerance", "reason")
+
+
+@dataclass(frozen=True)
+class Published:
+    """A number that a paper prints, how near a faithful model must come, or why it cannot.
+
+    `tolerance` is a share of the number where the file gives per cent, else in its unit. A row
+    with a `reason` is known not to be reproduced; one that nothing computes must have a reason.
+    """
+
+    paper: str
+    key: str
+    what: str
+    source: str
+    unit: str
+    published: float
+    tolerance: float
+    relative: bool
+    reason: str
+    compute: Callable[[], float] | None
+
+    @property
+    def allowed(self) -> float:
+        """Largest difference that counts as reproduced, in the number's unit."""
+        return self.tolerance * (abs(self.published) if self.relative else 1.0)
+
+    def compared(self) -> Compared:
+        """Compute the number and judge it; takes as long as its model takes."""
+        value = math.nan if self.compute is None else float(self.compute())
+        return Compared(self, value, bool(abs(value - self.published) <= self.allowed))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A printed number, the computed one (NaN where nothing computes it), and the judgement."""
+
+    row: Published
+    computed: float
+    holds: bool
+
+    @property
+    def said(self) -> str:
+        """The judgement in words."""
+        return "yes" if self.holds else "known" if self.row.reason else "NO"
+
+    @property
+    def honest(self) -> bool:
+        """Whether the file tells the truth: reproduced, or not and said so."""
+        return self.holds != bool(self.row.reason)
+
+
+def published(paper: str | None = None) -> Iterator[Published]:
+    """Every row of one paper, or of all; raises `InputError` for a paper that is not there."""
+    if paper is not None and paper not in PAPERS:
+        raise InputError(f"no paper {paper!r}; there are: {', '.join(PAPERS)}")
+    for name in PAPERS if paper is None else (paper,):
+        for chapter in PAPERS[name]:
+            computed = importlib.import_module(f"soilml.papers.{chapter}").COMPUTED
+            text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
+            for entry in csv.DictReader(text.splitlines()):
+                yield _row(name, entry, computed)
+
+
+def _row(paper: str, entry: dict[str, str], computed: dict[str, Callable[[], float]]) -> Published:
+    tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
+    return Published(
+        paper=paper,
+        key=entry["key"],
+        what=entry["what"],
+        source=entry["source"],
+        unit=entry["unit"],
+        published=float(entry["published"]),
+        tolerance=float(tolerance.rstrip("% ")) / 100.0 if relative else float(tolerance),
+        relative=relative,
+        reason=entry["reason"].strip(),
+        compute=computed.get(entry["key"]),
+    )

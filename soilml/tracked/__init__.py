@@ -1,0 +1,1 @@
+"""A tracked robot: its tests, and the soil from its drawbar pull."""

@@ -1,0 +1,1 @@
+"""Wheel-legs: their walk over time, their slip, and the soil from both."""
