@@ -12,6 +12,7 @@ _SUFFIX = {
     "1": "",
     "N m": "_Nm",
     "m/s": "_m_s",
+    "m/s^2": "_m_s2",
     "N/m^3": "_N_m3",
     "N/m^(n+1)": "_SI",
     "N/m^(n+2)": "_SI",
@@ -46,6 +47,9 @@ _ALL = (
     Quantity("speed", "v", "m/s", "travel speed of the axle"),
     Quantity("pass", "", "-", "1 on virgin soil, 2 in the rut of one wheel, ..."),
     Quantity("slip_angle", "beta", "rad", "angle between the wheel's plane and its travel"),
+    Quantity(
+        "vibration", "Delta a", "m/s^2", "largest amplitude of the hub's acceleration, a stride"
+    ),
     Quantity("time", "t", "s", "time since the start of the log"),
     Quantity("status", "", "-", "ok, or why the row has no answer"),
     Quantity("source", "", "-", "where the row comes from"),
@@ -59,6 +63,9 @@ _ALL = (
     Quantity("kc", "k_c", "N/m^(n+1)", "cohesive modulus of sinkage (Bekker)"),
     Quantity("kphi", "k_phi", "N/m^(n+2)", "frictional modulus of sinkage (Bekker)"),
     Quantity("n", "n", "1", "exponent of sinkage (Bekker)"),
+    Quantity(
+        "normal_stiffness", "sigma_1", "Pa", "normal stress of the soil 1 cm deep, linearised"
+    ),
     Quantity("a0", "a_0", "1", "angle of maximum stress, share of the entry angle at no slip"),
     Quantity("a1", "a_1", "1", "growth of that share with slip"),
     Quantity("unit_weight", "gamma", "N/m^3", "weight of the soil per volume"),
