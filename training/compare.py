@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from soilml.case import Case
 from soilml.errors import FitError, InputError
-from soilml.identification import METHODS, identify
+from soilml.identification import CLOSED_FORM, METHODS, identify
 from soilml.onboard import Estimator
 from soilml.prior import Prior
 from soilml.quantities import CHANNELS, column
 from soilml.table import Table
-from training.score import HALF, NINETY
+from training.score import HALF
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -155,7 +155,7 @@ def _analytic(
     size: int,
 ) -> tuple[str, Answers]:
     """Answers of an analytic method, and what it reads; no inputs where the table lacks them."""
-    channels = ["torque"] if method == "nonlinear" else ["torque", "sinkage"]
+    channels = ["torque", "sinkage"] if method in CLOSED_FORM else ["torque"]
     if any(column(c) not in sets[0] for c in channels):
         nothing = np.zeros((0, 0))
         return "", Answers(nothing, nothing, nothing, nothing, 0.0)
@@ -164,7 +164,7 @@ def _analytic(
         replace(s, columns={k: v for k, v in s.columns.items() if k not in hidden}) for s in sets
     ]
     value = np.full((len(sets), len(names)), np.nan)
-    std = np.full_like(value, np.nan)
+    std, low, high = (np.full_like(value, np.nan) for _ in range(3))
     started = time.perf_counter()
     for i, rows in enumerate(shown):
         progress(f"{method}, {size} rows", i, len(shown))
@@ -174,12 +174,14 @@ def _analytic(
             continue
         for k, name in enumerate(names):
             if name in fit.names:
-                value[i, k], std[i, k] = fit[name], fit.std[fit.names.index(name)]
+                own = fit.names.index(name)
+                value[i, k], std[i, k] = fit.values[own], fit.std[own]
+                low[i, k], high[i, k] = fit.interval[0][own], fit.interval[1][own]
     progress(f"{method}, {size} rows", len(shown), len(shown))
     seconds = (time.perf_counter() - started) / len(sets)
     given = {"linear": "; K given", "newton": "; c given"}.get(method, "")
     used = ", ".join(["slip", "load", *channels]) + given
-    return used, Answers(value, std, value - NINETY * std, value + NINETY * std, seconds)
+    return used, Answers(value, std, low, high, seconds)
 
 
 def _line(

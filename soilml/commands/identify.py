@@ -32,8 +32,10 @@ drawbar_pull_N, sinkage_m, and <column>_std, of slip and load too. Rows whose st
 left out. All rows are taken for one soil; --by run identifies each run on its own, and says which
 have no answer. What has a prior is found, unless --free names other parameters. Methods:
 nonlinear (least squares on the full integrals, bounded, several starts), linear (c and phi from
-sinkage, K given), newton (phi, K and kphi on the closed form, c given). A channel takes part where
-its noise is declared. The answer is JSON: into --out, or into a pipe; a terminal shows a table.
+sinkage, K given), newton (phi, K and kphi on the closed form, c given), posterior (mean, std and
+90 % interval of everything that the rows, their noise and the prior allow: no method does better on
+average). A channel takes part where its noise is declared. The answer is JSON: into --out, or into
+a pipe; a terminal shows a table.
 Read the warnings: they say what the rows cannot tell. `left of prior` is the width that the rows
 leave of the prior's; std is the expected distance to the truth, larger where the value of least
 squares stands anywhere in an open range.
@@ -44,7 +46,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", metavar="MODEL.toml")
     parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
-    parser.add_argument("--method", default="nonlinear", help="nonlinear, linear or newton")
+    parser.add_argument(
+        "--method", default="nonlinear", help="nonlinear, linear, newton or posterior"
+    )
     parser.add_argument("--free", metavar="A,B,...", help="parameters to find")
     add_effects_option(parser)
     parser.add_argument("--by", metavar="run", help="one answer for each value of this column")
@@ -123,17 +127,18 @@ def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Tabl
 
 def _for_people(found: Fit) -> str:
     rows = [
-        (name, f"{value:.5g}", f"{std:.3g}", unit, left)
-        for name, value, std, unit, left in zip(
+        (name, f"{value:.5g}", f"{std:.3g}", f"{low:.4g} .. {high:.4g}", unit, left)
+        for name, value, std, low, high, unit, left in zip(
             found.names,
             found.values,
             found.std,
+            *found.interval,
             found.units,
             [f"{found.left[n]:.0%}" if n in found.left else "" for n in found.names],
             strict=True,
         )
     ]
-    table = aligned(("parameter", "value", "std", "unit", "left of prior"), rows)
+    table = aligned(("parameter", "value", "std", "90 % interval", "unit", "left of prior"), rows)
     said = "\n".join(f"! {text}" for text in found.warnings)
     head = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
     return f"{head}\n\n{table}\n{said}".rstrip()

@@ -20,6 +20,7 @@ from soilml.identification.linear import linear
 from soilml.identification.measured import Measured, measured_rows
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
+from soilml.identification.posterior import posterior
 from soilml.table import Table
 
 Method = Callable[[Case, Measured, Sequence[Free]], Fit]
@@ -29,6 +30,7 @@ METHODS: dict[str, Method] = {
     "nonlinear": nonlinear,
     "linear": linear,
     "newton": newton,
+    "posterior": posterior,
 }
 #: Those that rest on the closed form of a rigid wheel's linear stresses.
 CLOSED_FORM = ("linear", "newton")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+#: Half-width of a Gaussian's 90 % interval in its standard deviations.
+GAUSSIAN_90 = 1.645
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,20 @@ class Fit:
     #: mean squared residual in standard deviations of the noise, per degree of freedom
     misfit: float = float("nan")
     channels: tuple[str, ...] = ()
+    #: ends of the 90 % interval, (p,), where the method knows them; else +- 1.645 std holds it
+    low: Floats | None = None
+    high: Floats | None = None
+
+    def warned(self, text: str) -> Fit:
+        """The same with one more warning."""
+        return replace(self, warnings=(*self.warnings, text))
+
+    @property
+    def interval(self) -> tuple[Floats, Floats]:
+        """Ends of the 90 % interval, (p,)."""
+        if self.low is None or self.high is None:
+            return self.values - GAUSSIAN_90 * self.std, self.values + GAUSSIAN_90 * self.std
+        return self.low, self.high
 
     @property
     def std(self) -> Floats:
@@ -48,14 +65,15 @@ class Fit:
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
-        rows = zip(self.names, self.values, self.std, self.units, strict=True)
+        rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
         correlation = self.correlation
         return {
             "method": self.method,
             "parameters": {
-                name: {"value": float(v), "std": float(s), "unit": unit}
+                name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
+                | {"unit": unit}
                 | ({"left_of_prior": self.left[name]} if name in self.left else {})
-                for name, v, s, unit in rows
+                for name, v, s, low, high, unit in rows
             },
             "correlation": {
                 a: {b: float(correlation[i, j]) for j, b in enumerate(self.names) if j != i}

@@ -1,0 +1,135 @@
+"""The posterior of the full model: what rows, noise and prior together allow to be known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.errors import FitError
+from soilml.identification.caveats import caveats
+from soilml.identification.fit import Fit
+from soilml.identification.free import Free
+from soilml.identification.measured import Measured
+from soilml.identification.population import ENOUGH, Population, population
+from soilml.identification.prediction import input_noise, predicted, readings, stacked
+from soilml.quantities import column
+
+Floats = NDArray[np.float64]
+
+#: Fractions of the posterior below the ends of the interval that is reported.
+INTERVAL = np.asarray([0.05, 0.95])
+#: Most model evaluations in one call, which bounds memory.
+CELLS = 200_000
+
+
+def posterior(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+    r"""Mean, covariance and 90 % interval of the exact posterior, by importance sampling.
+
+    .. math::
+        p(\theta | y) \propto p(\theta) \prod_i \frac{1}{\sigma_i(\theta)}
+        \exp\left[-\frac{(y_i - f(s_i, W_i; \theta))^2}{2 \sigma_i(\theta)^2}\right]
+
+    Its mean is the estimate with the least expected squared error that any method can have on data
+    that come from this model, prior and noise: the Bayes limit. Noise that is a share is a share
+    of the prediction, and noise of slip and load adds to it as in the nonlinear method, at the
+    best sample. Needs all noise declared. A parameter that the rows do not determine comes out as
+    its prior. References: Tarantola, Inverse Problem Theory, 2005, section 1.5; Cornuet et al.
+    2012 for the sampling. The limit is that of the model: where the model lacks an effect, the
+    interval is too narrow, and `misfit` tells.
+    """
+    found, misfit, cells = sampled(case, data, free)
+    values = np.stack([f.prior.at(found.u[:, i]) for i, f in enumerate(free)], axis=1)
+    mean = found.mean(values)
+    off = values - mean
+    low, high = found.quantiles(values, INTERVAL)
+    middle = np.asarray([f.prior.fraction(float(m)) for f, m in zip(free, mean, strict=True)])
+    covariance = (off.T * found.weights) @ off
+    fit = Fit(
+        method="posterior",
+        names=tuple(f.path for f in free),
+        units=tuple(f.unit for f in free),
+        values=mean,
+        covariance=covariance,
+        warnings=_unsettled(found),
+        rows_used=len(data.slip),
+        left={f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)},
+        misfit=misfit,
+        channels=tuple(column(c.name) for c in data.channels),
+        low=low,
+        high=high,
+    )
+    freedom = cells - len(free)
+    surplus = freedom > 0 and misfit > 1.0 + 2.0 * np.sqrt(2.0 / freedom)
+    said = caveats(fit, case, data, free, middle, surplus=False, undeclared=False)
+    return said.warned(_misfits(misfit)) if surplus else said
+
+
+def sampled(
+    case: Case, data: Measured, free: Sequence[Free], seed: int = 0
+) -> tuple[Population, float, int]:
+    """Weighted fractions of the priors, misfit of the best of them, and how many readings."""
+    if any(not c.declared for c in data.channels):
+        names = ", ".join(column(c.name) for c in data.channels if not c.declared)
+        raise FitError(f"the posterior method needs the noise of {names}: declare it in [noise]")
+    reading, declared = readings(data)
+    best: dict[str, Floats] = {}
+
+    def log_density(u: Floats) -> Floats:
+        step = max(CELLS // len(data.slip), 1)
+        parts = [_log(u[i : i + step]) for i in range(0, len(u), step)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _log(u: Floats) -> Floats:
+        y = stacked(data, predicted(case, free, u, data.at))
+        std = _noise(case, data, y, declared)
+        if not best:
+            first = np.nan_to_num(((y - reading) / std) ** 2, nan=np.inf).sum(axis=1)
+            best["extra"] = input_noise(case, data, free, u[int(np.argmin(first))])
+        std = np.hypot(std, best["extra"])
+        logs = -0.5 * (((y - reading) / std) ** 2).sum(axis=1) - np.log(std).sum(axis=1)
+        return np.where(np.isfinite(logs), logs, -np.inf)
+
+    found = population(log_density, len(free), seed)
+    if not np.isfinite(found.evidence):
+        raise FitError(
+            "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
+        )
+    top = found.u[[int(np.argmax(found.weights))]]
+    y = stacked(data, predicted(case, free, top, data.at))
+    std = np.hypot(_noise(case, data, y, declared), best["extra"])
+    cost = float((((y - reading) / std) ** 2).sum())
+    return found, cost / max(reading.size - len(free), 1), reading.size
+
+
+def _noise(case: Case, data: Measured, y: Floats, declared: Floats) -> Floats:
+    """Standard deviations (sets, cells): those of [noise] at the predictions, others as given."""
+    std, start = np.broadcast_to(declared, y.shape).copy(), 0
+    for c in data.channels:
+        kept = np.isfinite(c.reading)
+        cells = slice(start, start + int(kept.sum()))
+        start = cells.stop
+        noise = case.noise.get(column(c.name))
+        if noise is not None:
+            own = declared[cells] == noise.std(c.reading[kept])
+            expected = noise.std(y[:, cells])
+            std[:, cells] = np.where(own & (expected > 0), expected, std[:, cells])
+    return std
+
+
+def _unsettled(found: Population) -> tuple[str, ...]:
+    if found.effective >= 0.5 * ENOUGH:
+        return ()
+    return (
+        f"the samples are worth {found.effective:.0f} only: the values may stray by "
+        f"{100 / np.sqrt(found.effective):.0f} % of their std",
+    )
+
+
+def _misfits(misfit: float) -> str:
+    return (
+        f"residuals are {np.sqrt(misfit):.1f} times the declared noise: the model lacks something "
+        "or the noise is understated; std is that of the model as it is"
+    )
