@@ -1,0 +1,24 @@
+"""Soils that explain readings: draws of the exact posterior."""
+
+from __future__ import annotations
+
+import numpy as np
+from lunar.sweep import Floats, table
+
+from soilml import Case
+from soilml.identification import measured_rows
+from soilml.identification.free import chosen
+from soilml.identification.posterior import sampled
+
+
+def posterior(
+    case: Case, slip: Floats, torque: Floats, load: Floats, rng: np.random.Generator, count: int
+) -> Floats:
+    """`count` soils (count, 3) of what readings (r,) on one soil leave possible under the prior.
+
+    From the weighted samples of `soilml identify --method posterior`.
+    """
+    free = chosen(case, None)
+    found, _, _ = sampled(case, measured_rows(case, table(slip, torque, load)), free)
+    drawn = found.u[rng.choice(len(found.u), count, p=found.weights)]
+    return np.stack([f.prior.at(drawn[:, k]) for k, f in enumerate(free)], axis=1)

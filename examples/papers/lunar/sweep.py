@@ -1,0 +1,45 @@
+"""Soils of a prior, and what a wheel on them reports."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml import Case, Force, Operating, Table
+from soilml.quantities import SHEAR
+
+Floats = NDArray[np.float64]
+
+
+def soils(case: Case, count: int, rng: np.random.Generator) -> Floats:
+    """Cohesion (Pa), friction angle (rad), shear modulus (m) drawn from the prior, (count, 3)."""
+    return np.stack([case.prior[name].at(rng.random(count)) for name in SHEAR], axis=1)
+
+
+def driven(case: Case, values: Floats, slip: Floats, load: Floats | float) -> Force:
+    """What a case's model says of soils (..., 3) at slips and loads that broadcast with (...)."""
+    changed = case.with_values({name: values[..., k] for k, name in enumerate(SHEAR)})
+    return changed.model(changed.soil, Operating(slip=slip, load=load))
+
+
+def noisy(case: Case, torque: Floats, rng: np.random.Generator) -> Floats:
+    """What the torque sensor of a case reports, N m."""
+    return torque + case.noise["torque_Nm"].std(torque) * rng.standard_normal(torque.shape)
+
+
+def bounds(case: Case) -> tuple[Floats, Floats]:
+    """Lower and upper end of the prior, (3,) each."""
+    ends = [(case.prior[name].lower, case.prior[name].upper) for name in SHEAR]
+    lower, upper = np.asarray(ends).T
+    return lower, upper
+
+
+def table(slip: Floats, torque: Floats, load: Floats) -> Table:
+    """Readings (r,) of one soil, as `identify` takes them."""
+    run = np.full(slip.shape, "sweep")
+    return Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
+
+
+def three_loads() -> tuple[Floats, Floats]:
+    """Slips and loads (N) of eighteen readings, six slips at each of three loads."""
+    return np.repeat(np.linspace(0.2, 0.6, 6), 3), np.tile([25.0, 50.0, 100.0], 6)
