@@ -19,9 +19,8 @@ def run() -> None:
         if done.returncode != 0:
             sys.exit(f"{example.name} failed with status {done.returncode}")
     print("\n== soilml papers ==", flush=True)
-    code = "import sys; from soilml.cli import main; sys.exit(main(['papers', '--out', "
-    code += "'demo/papers/papers.csv']))"
-    done = subprocess.run([sys.executable, "-c", code])
+    table = "demo/papers/papers.csv"
+    done = subprocess.run([sys.executable, "-m", "soilml", "papers", "--out", table])
     print(f"\n{time.perf_counter() - started:.0f} s; pictures are in demo/papers")
     sys.exit(done.returncode)
 
