@@ -18,17 +18,19 @@ Nodes = tuple[NDArray[np.float64], NDArray[np.float64]]
 @cache
 def crowded_start(count: int) -> Nodes:
     """Fractions in (0, 1) and weights, crowded at 0: Gauss-Legendre in u with x = u^3."""
-    u, weight = _unit_gauss(count)
+    u, weight = gauss(count)
     return u**3, 3.0 * u**2 * weight
 
 
 @cache
 def crowded_ends(count: int) -> Nodes:
     """Fractions in (0, 1) and weights, crowded at both ends: x = 3 u^2 - 2 u^3."""
-    u, weight = _unit_gauss(count)
+    u, weight = gauss(count)
     return 3.0 * u**2 - 2.0 * u**3, 6.0 * u * (1.0 - u) * weight
 
 
-def _unit_gauss(count: int) -> Nodes:
+@cache
+def gauss(count: int) -> Nodes:
+    """Fractions in (0, 1) and weights of Gauss-Legendre."""
     x, weight = np.polynomial.legendre.leggauss(count)
     return (x + 1.0) / 2.0, weight / 2.0
