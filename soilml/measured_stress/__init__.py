@@ -1,6 +1,6 @@
 """A wheel that measures the normal stress on its rim, and what follows from that."""
 
-from soilml.measured_stress.arc import stressed_arc
+from soilml.measured_stress.arc import balanced_arc, stressed_arc
 from soilml.measured_stress.averaging import Felt, averaged
 from soilml.measured_stress.balance import WheelForces, forces
 from soilml.measured_stress.conventional import conventional
@@ -24,6 +24,7 @@ __all__ = [
     "StressProfile",
     "WheelForces",
     "averaged",
+    "balanced_arc",
     "conventional",
     "estimate",
     "forces",

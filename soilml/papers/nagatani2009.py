@@ -2,7 +2,82 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import cache, partial
+
+import numpy as np
+
+from soilml.effects import StressShift
+from soilml.gears import Wheel
+from soilml.measured_stress import (
+    Run,
+    SensingWheel,
+    Strength,
+    StressProfile,
+    balanced_arc,
+    profiled,
+    sensed,
+    solve,
+)
+from soilml.operating import Operating
+from soilml.scene import Scene
+from soilml.soils import soil
+
+GRAVITY = 9.80665
+#: Table I pairs its five slips with the five slopes of section IV.A, in order.
+SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
+#: Share of the way to the entry angle that keeps 30 of 70 degrees, rounded as the effect cites it.
+SHIFT = 0.57
+WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
+STRENGTH = Strength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
+WEIGHT = 28.92
+
+
+@cache
+def _found(slip: float) -> tuple[StressProfile, float]:
+    """The stress and the k_x (m) that the sensors give of an arc of 30 degrees with one k_x."""
+    at = Run(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
+    true = balanced_arc(math.radians(30.0), at, WHEEL, STRENGTH, float(SAND.shear_modulus))
+    profile = profiled(sensed(true, WHEEL), WHEEL)
+    return profile, solve(profile, at, WHEEL, STRENGTH).shear_modulus
+
+
+def _modulus(slip: float) -> float:
+    return _found(slip)[1]
+
+
+def _arc() -> float:
+    """The stressed arc in degrees, mean over the runs up to slip 0.5."""
+    profiles = [_found(slip)[0] for slip in SLOPES if slip < 0.5]
+    return float(np.rad2deg(np.mean([p.entry_angle - p.exit_angle for p in profiles])))
+
+
+def _shifted() -> float:
+    """The arc in degrees that `stress-shift` leaves of 70 degrees of contact."""
+    wheel, at = Wheel(radius=WHEEL.radius, width=WHEEL.width), Operating(slip=0.0, load=WEIGHT)
+    depth = np.asarray(WHEEL.radius * (1.0 - math.cos(math.radians(70.0))))
+    scene = Scene(wheel, SAND, at)
+    rim = wheel.shape(depth, SAND, at)
+    left = StressShift(shift=SHIFT).on_contact(rim, scene)
+    return float(np.rad2deg(left.entry - left.exit))
+
 
 #: By key of the CSV file of the same name.
-COMPUTED: dict[str, Callable[[], float]] = {}
+COMPUTED: dict[str, Callable[[], float]] = {
+    "radius": lambda: float(SensingWheel().radius),
+    "width": lambda: float(SensingWheel().width),
+    "sensors": lambda: float(SensingWheel().sensors),
+    "diameter": lambda: float(SensingWheel().diameter),
+    "interval": lambda: float(SensingWheel().interval),
+    "rim_speed": lambda: float(SensingWheel().rim_speed),
+    "saturation": lambda: float(SensingWheel().saturation),
+    "deadband": lambda: float(SensingWheel().deadband),
+    "weight": lambda: 12.0 * GRAVITY / 4.0,
+    "cohesion": lambda: float(SAND.cohesion),
+    "friction_angle": lambda: math.degrees(SAND.friction_angle),
+    "modulus_flat": lambda: float(SAND.shear_modulus),
+    "arc": _arc,
+    "arc_effect": _shifted,
+    **{f"modulus_{round(100 * slip):02d}": partial(_modulus, slip) for slip in SLOPES},
+}
