@@ -95,7 +95,8 @@ def main() -> None:
     )
 
     for shift, stiffer in ((0.3, 1.0), (0.57, 8.0)):
-        print(f"\nA wheel with stress-shift {shift:g}, on sand {stiffer:g} times as stiff:")
+        on = "that sand" if stiffer == 1.0 else f"sand {stiffer:g} times as stiff"
+        print(f"\nA wheel with stress-shift {shift:g} on {on}, its model without:")
         print(f"  {diagnosed(shift, stiffer)}")
     OUT.mkdir(parents=True, exist_ok=True)
     drawn(arcs, felt, grips, wide, pulls, known, tuned)

@@ -32,8 +32,9 @@ def averaged(readings: Readings, wheel: SensingWheel) -> Felt:
     References: Nagatani et al. 2009, section IV. Raises `InputError` where nothing was felt.
     """
     force = readings.force
-    inside = (force > 0.0) & (force < wheel.saturation)
-    if not (force > 0.0).any():
+    touched = (force > 0.0) & (force >= wheel.deadband)
+    inside = touched & (force < wheel.saturation)
+    if not touched.any():
         raise InputError(
             f"readings without contact: every sample lies in the deadband of {wheel.deadband:g} N"
         )
@@ -47,7 +48,7 @@ def averaged(readings: Readings, wheel: SensingWheel) -> Felt:
     some = count > 0
     return Felt(
         angle=summed(readings.angle)[some] / count[some],
-        normal=summed(force.mean(axis=2))[some] / count[some] / wheel.area,
+        normal=summed(np.where(touched, force, 0.0).mean(axis=2))[some] / count[some] / wheel.area,
         whole=summed(inside.all(axis=2).astype(np.float64))[some] == count[some],
-        saturated=float((force >= wheel.saturation).sum() / (force > 0.0).sum()),
+        saturated=float((force >= wheel.saturation).sum() / touched.sum()),
     )

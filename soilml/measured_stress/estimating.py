@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from soilml.measured_stress.averaging import averaged
 from soilml.measured_stress.profile import Floats, StressProfile
 from soilml.measured_stress.run import Run, Strength
 from soilml.measured_stress.sensing import Readings, SensingWheel
-from soilml.measured_stress.sharpening import sharpened
+from soilml.measured_stress.sharpening import fitted, sharpened
 from soilml.measured_stress.solving import solve
 from soilml.measured_stress.spread import between_turns, freedom, from_run, student
 
@@ -46,7 +47,7 @@ class Grip:
     def interval(self) -> tuple[float, float]:
         """k_x (m) lies in here nine times in ten."""
         reach = student(self.freedom) * float(np.sqrt(self.covariance[0, 0]))
-        return self.shear_modulus * np.exp(-reach), self.shear_modulus * np.exp(reach)
+        return self.shear_modulus * math.exp(-reach), self.shear_modulus * math.exp(reach)
 
 
 def estimate(readings: Readings, at: Run, wheel: SensingWheel, strength: Strength) -> Grip:
@@ -56,14 +57,16 @@ def estimate(readings: Readings, at: Run, wheel: SensingWheel, strength: Strengt
     c and phi, and lugs whose share of the load changes along the arc. Raises `FitError` as `solve`,
     `sharpened` and `between_turns` do.
     """
-    profile = profiled(readings, wheel)
+    felt = averaged(readings, wheel)
+    start = fitted(felt, wheel)
+    profile = sharpened(felt, wheel, start)
 
     def figures(profile: StressProfile, at: Run) -> Floats:
         found = solve(profile, at, wheel, strength)
         return np.log([found.shear_modulus, found.magnification])
 
     value = figures(profile, at)
-    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel), at))
+    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel, start), at))
     covariance = scatter + from_run(at, lambda a: figures(profile, a))
     covariance = covariance + np.diag([SHAPE**2, 0.0])
     return Grip(
@@ -72,13 +75,13 @@ def estimate(readings: Readings, at: Run, wheel: SensingWheel, strength: Strengt
         covariance=covariance,
         freedom=freedom(covariance[0, 0], scatter[0, 0], len(readings.angle)),
         profile=profile,
-        warnings=tuple(_said(averaged(readings, wheel).saturated, covariance)),
+        warnings=tuple(_said(felt.saturated, covariance)),
     )
 
 
-def profiled(readings: Readings, wheel: SensingWheel) -> StressProfile:
-    """The stress at points of the rim, from all readings."""
-    return sharpened(averaged(readings, wheel), wheel)
+def profiled(readings: Readings, wheel: SensingWheel, start: Floats | None = None) -> StressProfile:
+    """The stress at points of the rim, from all readings; `start` as in `sharpened`."""
+    return sharpened(averaged(readings, wheel), wheel, start)
 
 
 def _said(saturated: float, covariance: Floats) -> list[str]:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.errors import FitError
+from soilml.measured_stress.averaging import averaged
 from soilml.measured_stress.estimating import Grip, profiled
 from soilml.measured_stress.profile import Floats, StressProfile
 from soilml.measured_stress.run import Run, Strength
 from soilml.measured_stress.sensing import Readings, SensingWheel
+from soilml.measured_stress.sharpening import fitted
 from soilml.measured_stress.solving import carrying
 from soilml.measured_stress.spread import NUDGE, between_turns, freedom, from_run, student
 
@@ -43,7 +45,8 @@ def pull(readings: Readings, at: Run, wheel: SensingWheel, strength: Strength, g
     independent. Holds for slips up to 0.5 (their section V.C). Raises `FitError` where no
     magnification carries the load.
     """
-    profile = profiled(readings, wheel)
+    start = fitted(averaged(readings, wheel), wheel)
+    profile = profiled(readings, wheel, start)
 
     def figures(profile: StressProfile, at: Run, log_modulus: float) -> Floats:
         found = carrying(profile, at, wheel, strength, np.exp(np.asarray([log_modulus])))
@@ -56,7 +59,7 @@ def pull(readings: Readings, at: Run, wheel: SensingWheel, strength: Strength, g
     std = float(np.sqrt(grip.covariance[0, 0]))
     up, down = (figures(profile, at, modulus + k * NUDGE * std) for k in (1.0, -1.0))
     rate = (up - down) / (2.0 * NUDGE)
-    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel), at, modulus))
+    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel, start), at, modulus))
     covariance = scatter + from_run(at, lambda a: figures(profile, a, modulus))
     covariance = covariance + np.outer(rate, rate)
     said: tuple[str, ...] = ()

@@ -17,7 +17,7 @@ from soilml.parameters import Parameter, check
 Floats = NDArray[np.float64]
 
 #: Points across the diameter of a sensor.
-CHORDS = 24
+CHORDS = 48
 
 
 @final
@@ -41,6 +41,8 @@ class SensingWheel:
 
     def __post_init__(self) -> None:
         check(self, "sensing wheel: ")
+        if int(self.sensors) != self.sensors:
+            raise InputError(f"the row has {self.sensors:g} sensors; needed is a whole number")
         if self.deadband >= self.saturation:
             raise InputError(
                 f"the deadband ({self.deadband:g} N) must lie below saturation "
@@ -63,9 +65,9 @@ class SensingWheel:
         count = int(self.sensors)
         return np.asarray((2.0 * np.arange(count) + 1.0) / count - 1.0)
 
-    def chords(self) -> tuple[Floats, Floats]:
-        """Angles (rad) from the middle of a sensor and the shares of its area there, (CHORDS,)."""
-        turn = math.pi * np.arange(1, CHORDS + 1) / (CHORDS + 1)
+    def chords(self, count: int) -> tuple[Floats, Floats]:
+        """Angles (rad) from the middle of a sensor and the shares of its area there, (count,)."""
+        turn = math.pi * np.arange(1, count + 1) / (count + 1)
         share = np.sin(turn) ** 2
         return 0.5 * self.diameter / self.radius * np.cos(turn), share / share.sum()
 
@@ -130,7 +132,7 @@ def sensed(
         (at - profile.exit_angle) / (profile.entry_angle - profile.exit_angle), 0.0, 1.0
     )
     felt = normal * (1.0 - (lugs[1] + (lugs[0] - lugs[1]) * forward))
-    offset, share = wheel.chords()
+    offset, share = wheel.chords(CHORDS)
     mean = np.interp(angle[..., None] + offset, at, felt, left=0.0, right=0.0) @ share
     over = 1.0 + crown * (1.0 - 3.0 * wheel.across**2)
     force = wheel.area * mean[..., None] * over

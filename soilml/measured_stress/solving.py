@@ -16,7 +16,7 @@ from soilml.measured_stress.sensing import SensingWheel
 
 #: Shear moduli (m) looked at: from grip at once to none within any wheel's contact.
 STIFFEST, SOFTEST = 1e-5, 10.0
-LOOKS, ZOOMS = 64, 5
+LOOKS, ZOOMS = 32, 6
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ def test_a_saturated_top_is_inferred_from_the_flanks_and_said():
 
 
 def test_nine_of_ten_intervals_hold_the_truth():
-    rng, runs = np.random.default_rng(7), 60
+    rng, runs = np.random.default_rng(7), 50
     held = pulled = 0
     apart = []
     level, up = ([arc(at, lean) for lean in (-0.3, 0.0, 0.3)] for at in (LEVEL, UP))
@@ -176,6 +176,11 @@ def test_readings_that_tell_nothing_are_refused():
     with pytest.raises(FitError, match="places on the rim"):
         weak = replace(QUIET, saturation=0.15)
         sharpened(averaged(sensed(arc(), weak), weak), weak)
+    with pytest.raises(FitError, match="single arc"):
+        both = Readings(readings.angle, readings.force + np.roll(readings.force, 85, axis=1))
+        sharpened(averaged(both, QUIET), QUIET)
+    with pytest.raises(InputError, match="whole number"):
+        replace(QUIET, sensors=2.5)
     with pytest.raises(InputError, match="radians"):
         Readings(np.rad2deg(readings.angle), readings.force)
     with pytest.raises(InputError, match="shape"):
