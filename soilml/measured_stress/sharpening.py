@@ -39,9 +39,10 @@ def sharpened(felt: Felt, wheel: SensingWheel, start: Floats | None = None) -> S
     Bekker's wheel, a = 2 a parabola. Seven numbers by least squares on the bins that lie whole
     between deadband and saturation, so that both ends of the arc, which decide the shear, come
     from the flanks. The sensor of 9.5 mm spans 10 degrees of a rim of 55 mm: without this step the
-    arc looks that much longer. Own derivation; Nagatani et al. 2009 take the readings as they are.
-    Not for an arc with two peaks. `start` is what `fitted` found for nearly the same readings, and
-    saves time. Raises `FitError` where too few bins are left, or they show no single arc.
+    arc looks longer and k_x comes out 14 % too large. Own derivation; Nagatani et al. 2009 take
+    the readings as they are. Not for an arc with two peaks. `start` is what `fitted`
+    found for nearly the same readings, and saves time. Raises `FitError` where too few bins are
+    left, or they show no single arc.
     """
     x = fitted(felt, wheel, start)
     leave, entry, peak = x[:3]

@@ -35,10 +35,10 @@ def solve(profile: StressProfile, at: Run, wheel: SensingWheel, strength: Streng
 
     F_z is a straight line in M, so that M follows from k_x outright; the pull left over is then
     looked at over all k_x, and the one interval in which it changes sign is narrowed. References:
-    Nagatani et al. 2009, eqs. 11-15, who bisect twice. Without cohesion the pull left over falls
-    with k_x throughout, so that there is at most one answer; with it, none of 6000 random arcs had
-    two.
-    Raises `FitError` where there is none, and which side that is, or more than one.
+    Nagatani et al. 2009, eqs. 11-15, who bisect twice. Without cohesion, and where angle on
+    the rim and slope sum to less than a right angle, the pull left over crosses zero one way only,
+    so that there is at most one answer; with cohesion, none of 3000 random arcs had two. Raises
+    `FitError` where there is none, and which side that is, or more than one.
     """
     modulus = np.geomspace(STIFFEST, SOFTEST, LOOKS)
     left, magnification = excess(profile, at, wheel, strength, modulus)
@@ -60,7 +60,8 @@ def solve(profile: StressProfile, at: Run, wheel: SensingWheel, strength: Streng
     for _ in range(ZOOMS):
         modulus = np.geomspace(modulus[i], modulus[i + 1], LOOKS)
         left, magnification = excess(profile, at, wheel, strength, modulus)
-        i = int(_crossings(left)[0])
+        ends = _crossings(left)
+        i = int(ends[0]) if len(ends) else 0  # rounding may hide the last of it
     return Balanced(float(magnification[i]), float(modulus[i]))
 
 
