@@ -1,7 +1,9 @@
 """From what force sensors in the rim read to the soil's shear modulus and the drawbar pull."""
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -191,3 +193,10 @@ def test_readings_that_tell_nothing_are_refused():
         sensed(arc(), QUIET, lugs=(1.0, 0.0))
     with pytest.raises(InputError, match="turns"):
         sensed(arc(), QUIET, turns=0)
+
+
+def test_the_lines_on_the_page_run():
+    page = (Path(__file__).parents[3] / "docs/papers/nagatani2009.md").read_text()
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    assert names["grip"].interval[0] < TRUE < names["grip"].interval[1]
