@@ -69,6 +69,11 @@ _ALL = (
     Quantity("a0", "a_0", "1", "angle of maximum stress, share of the entry angle at no slip"),
     Quantity("a1", "a_1", "1", "growth of that share with slip"),
     Quantity("unit_weight", "gamma", "N/m^3", "weight of the soil per volume"),
+    Quantity("slope", "alpha", "rad", "slope of the ground along the travel, positive uphill"),
+    Quantity("rim_speed", "r omega", "m/s", "speed of the rim of the wheel about its axle"),
+    Quantity("angle", "theta", "rad", "place on the rim, from straight down, positive forward"),
+    Quantity("normal", "sigma_s", "Pa", "normal stress that a sensor on the rim reads"),
+    Quantity("wheel", "", "-", "which wheel of a rover: front or rear"),
 )
 
 #: Every quantity by name.

@@ -26,6 +26,8 @@ _LIMITS = {
     "load_N": (0.0, np.inf, "a load above zero, in N"),
     "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
     "slip_angle_rad": (-3.2, 3.2, "an angle in rad"),
+    "slope_rad": (-1.4, 1.4, "a slope in rad, positive uphill"),
+    "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
     "wheel_radius_m": (0.0, np.inf, "a radius above zero, in m"),
     "wheel_width_m": (0.0, np.inf, "a width above zero, in m"),
 }
