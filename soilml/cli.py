@@ -26,6 +26,7 @@ shear modulus, with an uncertainty that can be believed.
   from data to a flying file  soilml train
   from measurements to soil   soilml estimate (trained, on board), identify (analytic)
   which to believe            soilml compare
+  what slope can be climbed   soilml climb
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 ORDER = (
@@ -39,6 +40,7 @@ ORDER = (
     "train",
     "estimate",
     "compare",
+    "climb",
 )
 _NEGATIVE = re.compile(r"-[\d.]")
 

@@ -60,11 +60,7 @@ class Ability:
 
         Raises `InputError` for a limit outside the slips at which stress was measured.
         """
-        if not self.slip[0] <= slip_limit <= self.slip[-1]:
-            raise InputError(
-                f"slip limit {slip_limit:g}: stress was measured at slips from "
-                f"{self.slip[0]:.3g} to {self.slip[-1]:.3g} only; nothing is said outside"
-            )
+        check_slip(slip_limit, (float(self.slip[0]), float(self.slip[-1])))
         at = np.asarray([np.interp(slip_limit, self.slip, slope) for slope in self.slope])
         below = np.where(self.slip <= slip_limit, self.slope, -np.inf).max(axis=1)
         return np.asarray(np.maximum(at, below))
@@ -76,6 +72,27 @@ def band(draws: Floats) -> Band:
     return Band(middle, lower, upper)
 
 
+def shared_slips(front: StressBySlip, rear: StressBySlip) -> tuple[float, float]:
+    """From which to which slip the stress of both wheels is known; raises `FitError` if none."""
+    lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
+    if not lowest < highest:
+        raise FitError(
+            f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
+            f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
+            "needed are slips that both had"
+        )
+    return lowest, highest
+
+
+def check_slip(limit: float, measured: tuple[float, float]) -> None:
+    """Raise `InputError` for a slip limit outside the slips at which stress was measured."""
+    if not measured[0] <= limit <= measured[1]:
+        raise InputError(
+            f"slip limit {limit:g}: stress was measured at slips from {measured[0]:.3g} to "
+            f"{measured[1]:.3g} only; nothing is said outside"
+        )
+
+
 def climbing_ability(
     ground: Ground, front: StressBySlip, rear: StressBySlip, *, seed: int = 0
 ) -> Ability:
@@ -85,13 +102,7 @@ def climbing_ability(
     rear wheels was measured. References: Nagatani et al., section 7. Raises `FitError` where
     front and rear share no slips.
     """
-    lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
-    if not lowest < highest:
-        raise FitError(
-            f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
-            f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
-            "needed are slips that both had"
-        )
+    lowest, highest = shared_slips(front, rear)
     rng = np.random.default_rng(seed)
     slip = np.linspace(lowest, highest, SLIPS)
     pull, slope = [], []

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.climbing.ability import Ability, Band, band, climbing_ability
+from soilml.climbing.ability import Ability, Band, band, check_slip, climbing_ability, shared_slips
 from soilml.climbing.each import modulus_of_each
 from soilml.climbing.identify import Ground, identify_ground
 from soilml.climbing.rover_file import RoverFile
@@ -134,13 +134,13 @@ def climbing_report(
     file: RoverFile, driven: Driven, *, slip_limit: float | None = None, seed: int = 0
 ) -> Report:
     """Identify the ground, take stress against slip, and predict the climbs."""
+    front, rear = StressBySlip.of(driven.front), StressBySlip.of(driven.rear)
+    if slip_limit is not None:
+        check_slip(slip_limit, shared_slips(front, rear))
     ground = identify_ground(
         file.rover, driven.climbs, given=file.given, prior=file.prior, noise=file.noise, seed=seed
     )
-    front, rear = StressBySlip.of(driven.front), StressBySlip.of(driven.rear)
     ability = climbing_ability(ground, front, rear, seed=seed)
-    if slip_limit is not None:
-        ability.steepest_within(slip_limit)
     cohesion, friction, _ = ground.shear
     each = {
         error: modulus_of_each(
