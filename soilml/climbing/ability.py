@@ -107,7 +107,7 @@ def climbing_ability(
     slip = np.linspace(lowest, highest, SLIPS)
     pull, slope = [], []
     for _ in range(REDRAWN):
-        soils = ground.draws[rng.integers(len(ground.draws), size=SOILS)]
+        soils = ground.as_read[rng.integers(len(ground.as_read), size=SOILS)]
         off = 1.0 + ground.noise.front_load * rng.normal(size=SOILS)
         share = np.clip((ground.rover.front_share or 0.5) * off, 0.05, 0.95)
         profiles = [w.redrawn(rng).profiles(slip) for w in (front, rear)]

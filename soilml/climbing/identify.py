@@ -32,10 +32,15 @@ USUAL = {
 
 @dataclass(frozen=True)
 class Ground:
-    """What climbs tell of the ground, and how each of them fits."""
+    """What climbs tell of the ground, and how each of them fits.
+
+    `as_read` are draws that go with the stresses as they were read: an error of the entry angles
+    which all runs share is in the stresses and in k_x, and hardly changes the pull of both.
+    """
 
     fit: Fit
     draws: Floats  # (n, 3): c (Pa), phi (rad), k_x (m); what is given is the same in all
+    as_read: Floats  # (n, 3)
     rover: Rover  # with the loads of its wheels, given or found
     noise: Uncertainty
     names: tuple[str, ...]  # of the climbs
@@ -86,6 +91,7 @@ def identify_ground(
     return Ground(
         fit=_fit(found, ranges, len(climbs), slopes, assumed=[n for n in ranges if n not in prior]),
         draws=found.draws,
+        as_read=found.as_read,
         rover=with_loads(rover, climbs, (float(shear[0]), float(shear[1]), float(shear[2]))),
         noise=noise,
         names=tuple(climb.name for climb in climbs),

@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 #: Values of k_x, even in the logarithm, between which forces are straight lines.
 KNOTS = 256
+#: Share of the weight below which no standard deviation of a balance is believed.
+LEAST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -51,5 +53,6 @@ class Balances:
         """(L, std): L @ off has unit noise (climbs, climbs); std of each climb, N, (climbs,)."""
         found = np.asarray([spread(self.rover, c, shear, noise) for c in self.climbs])
         shared = found[:, 1:]
-        covariance = np.diag(found[:, 0] ** 2) + shared @ shared.T
+        least = LEAST * self.rover.weight
+        covariance = np.diag(found[:, 0] ** 2 + least**2) + shared @ shared.T
         return np.linalg.inv(np.linalg.cholesky(covariance)), np.sqrt(np.diag(covariance))

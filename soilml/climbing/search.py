@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.climbing.climb import Uncertainty
-from soilml.climbing.ensemble import WALKERS, ensemble
 from soilml.climbing.likelihood import Balances
 from soilml.climbing.spread import Shear
 from soilml.errors import FitError, InputError
+from soilml.identification.population import population
 from soilml.prior import Prior
 from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
-#: Soils looked at first, steps of each walker, and rounds in which the noise is taken anew.
-LOOKS, STEPS, ROUNDS = 2048, 100, 3
+#: Soils looked at first, draws in the end, and rounds in which the noise is taken anew.
+LOOKS, DRAWS, ROUNDS = 2048, 6000, 2
 #: Standard deviations by which a climb must miss every soil of the range to be refused.
 BEYOND = 6.0
 #: Misfit, in standard deviations of the noise, at which climbs contradict each other.
@@ -33,6 +33,7 @@ class Found:
 
     u: Floats  # (n, p), fractions of the ranges
     draws: Floats  # (n, 3): c (Pa), phi (rad), k_x (m)
+    as_read: Floats  # (n, 3), had the entry angles no error that all runs share
     off: Floats  # (climbs,) N, pull less weight down the slope at the mean
     off_std: Floats  # (climbs,) N
     misfit: float  # mean square of what noise should make 1, per degree of freedom
@@ -68,39 +69,40 @@ class Search:
         p = len(self.ranges)
         u = np.vstack([rng.random((LOOKS, p)), _corners(p)])
         off = self.off(u)
-        start, centre, widened = u, self.soils(np.full((1, p), 0.5))[0], 1.0
+        centre, widened = self.soils(np.full((1, p), 0.5))[0], 1.0
         for _ in range(ROUNDS):
             whitener, std = self.balances.whitener(_shear(centre), self.noise)
-            start = u[np.argsort(((off @ whitener.T) ** 2).sum(axis=1), kind="stable")]
-            centre = self.soils(start[:1])[0]
+            best = int(np.argmin(((off @ whitener.T) ** 2).sum(axis=1)))
+            centre = self.soils(u[best : best + 1])[0]
         self._refuse_unexplained(off, std)
-        start = np.clip(start[:WALKERS], 1e-3, 1.0 - 1e-3)
-        start = np.clip(start + rng.normal(0.0, 1e-4, start.shape), 1e-4, 1.0 - 1e-4)
-        for _ in range(ROUNDS if p else 1):
-            u = self._drawn(start, whitener / widened, rng)
-            start = u[-WALKERS:]
+        for _ in range(ROUNDS):
+            u = self._drawn(whitener / widened, rng)
             centre = self.soils(u).mean(axis=0)
             whitener, std = self.balances.whitener(_shear(centre), self.noise)
             misfit = self._misfit(centre, whitener)
             widened = float(np.sqrt(misfit)) if misfit > self._expected else 1.0
         self._refuse_contradiction(centre, std, widened)
+        unshared, _ = self.balances.whitener(_shear(centre), replace(self.noise, entry_angle=0.0))
         return Found(
             u=u,
             draws=self.soils(u),
+            as_read=self.soils(self._drawn(unshared / widened, rng)),
             off=self.balances.off(centre[None])[0],
             off_std=std,
             misfit=misfit,
             widened=widened,
         )
 
-    def _drawn(self, start: Floats, whitener: Floats, rng: np.random.Generator) -> Floats:
+    def _drawn(self, whitener: Floats, rng: np.random.Generator) -> Floats:
+        """Draws (n, p) of fractions, with all noise Gaussian and as `whitener` has it."""
         if not self.ranges:
-            return np.zeros((LOOKS, 0))
+            return np.zeros((DRAWS, 0))
 
         def log_density(u: Floats) -> Floats:
             return np.asarray(-0.5 * ((self.off(u) @ whitener.T) ** 2).sum(axis=1))
 
-        return ensemble(log_density, start, STEPS, rng)
+        found = population(log_density, len(self.ranges), int(rng.integers(2**31)))
+        return found.u[rng.choice(len(found.u), DRAWS, p=found.weights)]
 
     @property
     def _freedom(self) -> int:
@@ -141,7 +143,7 @@ class Search:
         raise FitError(
             f"no one soil within the ranges explains these climbs: they miss their balance by "
             f"{widened:.0f} times what the noise allows, run {self.balances.climbs[i].name} by "
-            f"{off[i]:+.3g} N; check its slope_rad, slip and stress"
+            f"{off[i]:+.3g} N; check its slope_rad, slip and stress, and [noise]"
         )
 
 
