@@ -1,6 +1,8 @@
 """Pull against slip on ground not yet driven."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -126,3 +128,11 @@ def test_a_profile_keeps_its_shape_whatever_its_height():
     )
     at = np.asarray([0.2])
     np.testing.assert_allclose(low.profiles(at)[0].normal, high.profiles(at)[0].normal, atol=1e-9)
+
+
+def test_the_lines_on_the_page_run():
+    page = (Path(__file__).parents[3] / "docs/papers/nagatani_climbing.md").read_text()
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    best = band(names["ability"].steepest)
+    assert best.lower < names["true"].steepest < best.upper
