@@ -122,7 +122,9 @@ def _misnamed(name: str) -> str:
     for quantity in COLUMNS.values():
         if name == quantity.name:
             return f"the unit is missing, name it {quantity.column}"
-        if name.startswith(f"{quantity.name}_") and len(quantity.name) > 2:
+        if quantity.unit == "-" or len(quantity.name) <= 2:
+            continue
+        if name.startswith(f"{quantity.name}_"):
             return (
                 f"{quantity.name.replace('_', ' ')} is read in {quantity.unit}; "
                 f"convert it and name the column {quantity.column}"
