@@ -14,6 +14,7 @@ from soilml.climbing.identify import Ground, identify_ground
 from soilml.climbing.rover_file import RoverFile
 from soilml.climbing.stress_by_slip import StressBySlip
 from soilml.climbing.tables import Driven
+from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
@@ -72,14 +73,14 @@ class Report:
             if not all(lowest - 0.02 <= wheel.slip <= highest + 0.02 for wheel in c.wheels)
         ]
         if outside:
-            said.append(f"slip outside the curve in run {', '.join(outside)}")
-        steepest = float(np.quantile(self.ability.steepest, 0.05))
-        for climb in self.driven.climbs:
-            if climb.slope > float(np.quantile(self.ability.steepest, 0.95)):
-                said.append(
-                    f"run {climb.name} climbed {climb.slope:.3g} rad, steeper than is predicted "
-                    f"({steepest:.3g} or more): stress or slip of it disagree with the others"
-                )
+            said.append(f"the curve does not reach the slip of run {', '.join(outside)}")
+        most = float(band(self.ability.steepest).upper)
+        said += [
+            f"run {climb.name} climbed {climb.slope:.3g} rad, more than is predicted ({most:.3g} "
+            "at most): it disagrees with the others"
+            for climb in self.driven.climbs
+            if climb.slope > most
+        ]
         return tuple(said)
 
     def as_json(self) -> dict[str, Any]:
@@ -87,7 +88,7 @@ class Report:
         fit = self.ground.fit.as_json()
         fit["given"] = {
             name: float(self.ground.draws[0, i])
-            for i, name in enumerate(("cohesion", "friction_angle", "shear_modulus"))
+            for i, name in enumerate(SHEAR)
             if name not in self.ground.fit.names
         }
         content: dict[str, Any] = {

@@ -60,9 +60,8 @@ class Rover:
             F_{zr} = \tfrac12 m g ((1 - a) \cos\alpha + h \sin\alpha)
 
         with a the front's share on the flat and h the height of the centre of mass over the
-        wheelbase: moments about the contacts of a rover that does not accelerate. The moment of
-        the wheels' own torques on the body is in it, as they act between body and wheel; where
-        a wheel's forces act in front of its axle is not.
+        wheelbase: moments about the wheels' contacts, of a rover that does not accelerate. That
+        the forces on a wheel act somewhat in front of its axle is left out.
         """
         if self.front_share is None or self.height_ratio is None:
             raise InputError("the loads of the wheels need front_share and height_ratio")

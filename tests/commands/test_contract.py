@@ -153,7 +153,17 @@ def test_soils_and_effects_list_their_catalogues(capsys):
 
 @pytest.mark.parametrize(
     "command",
-    ["simulate", "generate", "train", "estimate", "identify", "compare", "soils", "effects"],
+    [
+        "simulate",
+        "generate",
+        "train",
+        "estimate",
+        "identify",
+        "compare",
+        "soils",
+        "effects",
+        "climb",
+    ],
 )
 def test_help_teaches_with_an_example(command, capsys):
     with pytest.raises(SystemExit) as done:
