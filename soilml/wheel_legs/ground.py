@@ -1,0 +1,44 @@
+"""Ground under a wheel-leg: normal stress that grows in a straight line with depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, final
+
+from soilml.arrays import Real
+from soilml.parameters import Parameter
+
+#: Depth at which the paper lumps the normal stiffness, m.
+LUMPED_AT = 0.01
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Ground:
+    r"""Normal stress under a flat plate pushed straight down, in SI.
+
+    .. math:: \sigma(z) = \sigma_0 + \alpha_z z, \qquad \sigma_1 = \sigma_0 + \alpha_z \cdot 1 cm
+
+    References: Comin and Saaj 2017, eq. 3 and table I. Terradynamics, eq. 4, leaves the offset
+    out: its stress is proportional to depth.
+    """
+
+    stiffness: Annotated[Real, Parameter("N/m^3", 1.0, 1e9, "alpha_z(0, pi/2)")]
+    offset: Annotated[Real, Parameter("Pa", 0.0, 1e7, "sigma_0, normal stress at the surface")] = (
+        0.0
+    )
+    friction_angle: Annotated[Real, Parameter("rad", 0.0, 1.4, "phi")] = 0.6
+
+    @property
+    def normal_stiffness(self) -> Real:
+        """sigma_1, the normal stress one centimetre deep, Pa."""
+        return self.offset + self.stiffness * LUMPED_AT
+
+
+#: The four soils of the tests, prepared by raking (Comin and Saaj 2017, table I).
+GROUNDS: dict[str, Ground] = {
+    "SSC-1": Ground(stiffness=0.29e6, offset=8400.0, friction_angle=0.7381),
+    "SSC-2": Ground(stiffness=1.05e6, offset=13100.0, friction_angle=0.746477),
+    "SSC-3": Ground(stiffness=0.70e6, offset=2900.0, friction_angle=0.507891),
+    "ES-3": Ground(stiffness=1.70e6, offset=5000.0, friction_angle=0.625351),
+}
