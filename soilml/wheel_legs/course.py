@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.wheel_legs.reaction import Batch
-from soilml.wheel_legs.stepping import Drive, Hub, Step
+from soilml.wheel_legs.stepping import Drive, Hub, Step, some
 
 
 class WalkStatus(IntEnum):
@@ -38,52 +38,46 @@ _REASONS: dict[WalkStatus, str] = {
 }
 
 
-def nearest_attack(angle: Array, legs: Array) -> Array:
-    """Attack angle, rad, of the leg nearest to straight down; pi/2 where it hangs straight.
-
-    `angle`: what the wheel has turned since a leg hung straight down.
-    """
-    pitch = 2.0 * np.pi / legs
-    return 0.5 * np.pi + angle - pitch * np.round(angle / pitch)
-
-
 @dataclass(frozen=True)
 class Course:
     """Cases that can walk, and how their steps are taken."""
 
     given: Batch
     drive: Drive
-    legs: Array  # (cases,)
     turn: float  # rad to a step
     step: Step
 
     def walked(self, count: int, height: float | None) -> tuple[Array, Array]:
         """Status, (cases,), and x, z, vx, vz, torque at `count` instants, (5, instants, cases).
 
-        A case that stops leaves NaN behind it, and its hub stays where it was.
+        A case that stops leaves NaN behind it and is no longer computed.
         """
-        solid, legs = self.given.area > 0.0, (self.given.area > 0.0) & (self.given.turns > 0.0)
-        pose, still = self.given.at(0.0), np.zeros(self.legs.size)
-        lowest = np.where(solid, -pose.z, -np.inf).max(axis=0)
-        hub = Hub(still, lowest if height is None else still + height, still, still)
-        history = np.full((5, count, self.legs.size), np.nan)
-        history[:, 0] = hub.x, hub.z, hub.vx, hub.vz, still
-        status, touched = np.full(self.legs.size, int(WalkStatus.OK)), np.zeros_like(still, bool)
+        cases = self.drive.mass.size
+        status, touched = np.full(cases, int(WalkStatus.OK)), np.zeros(cases, bool)
+        history = np.full((5, count, cases), np.nan)
+        going, given, drive = np.arange(cases), self.given, self.drive
+        hub = self._start(height)
+        history[:, 0] = hub.x, hub.z, hub.vx, hub.vz, 0.0 * hub.x
         for i in range(1, count):
-            pose, attack = self.given.at(i * self.turn), nearest_attack(i * self.turn, self.legs)
-            target = (1.0 - self.drive.slip) * self.drive.pace * np.sin(attack)
-            moved, found, balanced = self.step(
-                self.given, pose, hub, self.drive, target, self.turn / self.given.speed
-            )
-            going = status == WalkStatus.OK
-            status[going & (moved.z <= 0.0)] = WalkStatus.SUNK
-            status[going & ~balanced] = WalkStatus.NOT_CONVERGED
-            going = status == WalkStatus.OK
-            if not np.any(going):
-                break
-            hub = moved.where(going, hub)
-            touched |= np.any(legs & (pose.z + hub.z < 0.0), axis=0)
+            angle = i * self.turn
+            hub, found, balanced = self.step(given, drive, hub, angle - self.turn, angle)
+            low = given.at(angle).z + hub.z < 0.0
+            touched[going] |= np.any(low & (given.area > 0.0) & (given.turns > 0.0), axis=0)
+            status[going[~balanced]] = WalkStatus.NOT_CONVERGED
+            status[going[balanced & (hub.z <= 0.0)]] = WalkStatus.SUNK
+            kept = balanced & (hub.z > 0.0)
             now = np.array([hub.x, hub.z, hub.vx, hub.vz, found.torque])
-            history[:, i] = np.where(going, now, np.nan)
+            history[:, i, going[kept]] = now[:, kept]
+            if not np.all(kept):
+                going, given = going[kept], given.of(kept)
+                drive, hub = some(drive, kept), some(hub, kept)
+                if not going.size:
+                    break
         status[(status == WalkStatus.OK) & ~touched] = WalkStatus.NO_CONTACT
         return status, history
+
+    def _start(self, height: float | None) -> Hub:
+        """At rest, the lowest point on the ground or the hub at `height`, m."""
+        lowest = np.where(self.given.area > 0.0, -self.given.at(0.0).z, -np.inf).max(axis=0)
+        still = np.zeros_like(lowest)
+        return Hub(still, lowest if height is None else still + height, still, still)

@@ -78,8 +78,8 @@ class WheelLeg:
     mass: float = 3.75  # kg
     speed: float = 0.3  # rad/s
     leg: Section = Section(10, 0.016, 0.18, 0.03)
-    clearance: float = 0.05  # m, assumed
-    body_area: float = 0.02  # m^2, assumed
+    clearance: float = 0.02  # m, assumed
+    body_area: float = 0.04  # m^2, assumed
 
     @property
     def flaw(self) -> str:

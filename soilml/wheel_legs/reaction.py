@@ -91,7 +91,7 @@ def batch(wheel_legs: Sequence[WheelLeg], grounds: Sequence[Ground]) -> Batch:
 
 
 def reaction(
-    given: Batch, pose: Pose, height: Array, ahead: Array, up: Array, v0: float
+    given: Batch, pose: Pose, height: Array, ahead: Array, up: Array, v0: Array
 ) -> Reaction:
     r"""Sum of the stresses of all plates (Comin and Saaj 2017, eq. 7).
 

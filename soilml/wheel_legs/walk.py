@@ -9,11 +9,11 @@ import numpy as np
 
 from soilml.arrays import Array, Real
 from soilml.errors import InputError
-from soilml.wheel_legs.course import Course, WalkStatus, nearest_attack
+from soilml.wheel_legs.course import Course, WalkStatus
 from soilml.wheel_legs.feet import WheelLeg
 from soilml.wheel_legs.ground import Ground
 from soilml.wheel_legs.reaction import batch
-from soilml.wheel_legs.stepping import FADING, Drive, Step, implicit
+from soilml.wheel_legs.stepping import FADING, Drive, Step, implicit, nearest_attack
 
 
 @dataclass(frozen=True)
@@ -108,11 +108,11 @@ def walk(
         drive = Drive(
             mass=np.array([w.mass for w in able]),
             pace=np.array([w.speed * w.leg.length for w in able]),
+            legs=np.array([w.legs for w in able]),
             slip=slips[going],
-            fading=fading,
+            fading=np.full(going.size, fading),
         )
-        spokes = np.array([w.legs for w in able])
-        course = Course(batch(able, under), drive, spokes, 2.0 * np.pi / steps, step)
+        course = Course(batch(able, under), drive, 2.0 * np.pi / steps, step)
         status[going], history[:, :, going] = course.walked(count, height)
     angle = 2.0 * np.pi / steps * np.arange(count)
     speed = np.array([w.speed for w in legs_])

@@ -45,7 +45,7 @@ def test_a_plate_square_to_its_motion_feels_more_than_one_edge_on():
     for gamma in (np.pi / 6, np.pi / 4, np.pi / 3):
         square = np.hypot(*stress_gains(np.pi / 2 - gamma, gamma))
         edge_on = np.hypot(*stress_gains(-gamma, gamma))
-        assert square > 1.5 * edge_on
+        assert square > 1.2 * edge_on
 
 
 def test_the_form_without_angles_is_the_same_law():
