@@ -16,7 +16,7 @@ class WalkStatus(IntEnum):
     """Why a case of a batch has, or has not, a walk."""
 
     OK = 0
-    NO_WHEEL_LEG = 1
+    UNSOUND = 1
     NO_CONTACT = 2
     SUNK = 3
     NOT_CONVERGED = 4
@@ -29,8 +29,8 @@ class WalkStatus(IntEnum):
 
 _REASONS: dict[WalkStatus, str] = {
     WalkStatus.OK: "ok",
-    WalkStatus.NO_WHEEL_LEG: "no walk: number of legs, mass, speed or a section's size is not "
-    "one of a wheel-leg, or the ground is not one that carries",
+    WalkStatus.UNSOUND: "no walk: the wheel-leg, the ground or the commanded slip is not one "
+    "that can be",
     WalkStatus.NO_CONTACT: "no walk: no leg ever reaches the ground; the legs are shorter than the "
     "clearance of the body, or the start was too high for the time simulated",
     WalkStatus.SUNK: "stopped: the ground is too soft, the hub reaches its surface",
@@ -61,8 +61,9 @@ class Course:
         for i in range(1, count):
             angle = i * self.turn
             hub, found, balanced = self.step(given, drive, hub, angle - self.turn, angle)
-            low = given.at(angle).z + hub.z < 0.0
-            touched[going] |= np.any(low & (given.area > 0.0) & (given.turns > 0.0), axis=0)
+            if not np.all(touched[going]):
+                low = (given.at(angle).z + hub.z < 0.0) & (given.area > 0.0)
+                touched[going] |= np.any(low & (given.turns > 0.0), axis=0)
             status[going[~balanced]] = WalkStatus.NOT_CONVERGED
             status[going[balanced & (hub.z <= 0.0)]] = WalkStatus.SUNK
             kept = balanced & (hub.z > 0.0)

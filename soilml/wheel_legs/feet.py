@@ -87,12 +87,14 @@ class WheelLeg:
         sections = [s for s in (self.leg, self.foot.tip, self.foot.heel) if s is not None]
         if not 1 <= self.legs <= MOST_LEGS:
             return f"{self.legs} legs; the model is for 1 to {MOST_LEGS}"
-        if not self.mass > 0.0:
+        if not 0.0 < self.mass < np.inf:
             return f"a mass of {self.mass:g} kg; it must be positive"
-        if not self.speed > 0.0:
+        if not 0.0 < self.speed < np.inf:
             return f"a speed of {self.speed:g} rad/s; it must be positive, forwards"
         if any(s.segments < 1 or not s.width > 0 or not s.length > 0 for s in sections):
             return "a section without segments, width or length"
+        if not (self.clearance >= 0.0 and self.body_area >= 0.0):
+            return "a body above the hub or of negative area"
         return ""
 
     def plates(self) -> Plates:

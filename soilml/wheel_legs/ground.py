@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, final
 
-from soilml.arrays import Real
+import numpy as np
+
 from soilml.parameters import Parameter
 
 #: Depth at which the paper lumps the normal stiffness, m.
@@ -23,16 +24,24 @@ class Ground:
     out: its stress is proportional to depth.
     """
 
-    stiffness: Annotated[Real, Parameter("N/m^3", 1.0, 1e9, "alpha_z(0, pi/2)")]
-    offset: Annotated[Real, Parameter("Pa", 0.0, 1e7, "sigma_0, normal stress at the surface")] = (
-        0.0
-    )
-    friction_angle: Annotated[Real, Parameter("rad", 0.0, 1.4, "phi")] = 0.6
+    stiffness: Annotated[float, Parameter("N/m^3", 1.0, 1e9, "alpha_z(0, pi/2)")]
+    offset: Annotated[float, Parameter("Pa", 0.0, 1e7, "sigma_0, stress at the surface")] = 0.0
+    friction_angle: Annotated[float, Parameter("rad", 0.0, 1.4, "phi; no walk depends on it")] = 0.6
 
     @property
-    def normal_stiffness(self) -> Real:
+    def normal_stiffness(self) -> float:
         """sigma_1, the normal stress one centimetre deep, Pa."""
         return self.offset + self.stiffness * LUMPED_AT
+
+    @property
+    def flaw(self) -> str:
+        """What makes it no ground, or nothing."""
+        carries = np.isfinite(self.stiffness) and self.stiffness > 0.0
+        if not carries:
+            return f"a stiffness of {self.stiffness:g} N/m^3; it must be positive"
+        if not (np.isfinite(self.offset) and self.offset >= 0.0):
+            return f"an offset of {self.offset:g} Pa; it must be 0 or more"
+        return ""
 
 
 #: The four soils of the tests, prepared by raking (Comin and Saaj 2017, table I).

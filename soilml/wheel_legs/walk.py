@@ -62,6 +62,11 @@ class Walk:
         step = self.angle[1] - self.angle[0]
         return np.abs(self.attack - 0.5 * np.pi) <= 0.5001 * step
 
+    def at_midstance(self, values: Array) -> Array:
+        """Mean over the midstances of values at every instant, (instants, cases) -> (cases,)."""
+        there = self.midstance
+        return np.sum(np.where(there, values, 0.0), axis=0) / np.sum(there, axis=0)
+
     def after(self, angle: float) -> Walk:
         """The walk from when the wheel has turned by `angle`, rad."""
         late = self.angle >= angle - 1e-9
@@ -78,7 +83,7 @@ def walk(
     *,
     slip: Real | None = None,
     turns: float = 2.0,
-    steps: int = 2000,
+    steps: int = 1000,
     height: float | None = None,
     fading: float = FADING,
     step: Step = implicit,
@@ -99,7 +104,7 @@ def walk(
             "to a turn, and turns and fading above 0"
         )
     legs_, grounds_, slips = _cases(wheel_legs, grounds, slip)
-    status = np.array([_status(w, g) for w, g in zip(legs_, grounds_, strict=True)])
+    status = np.array([_status(*case) for case in zip(legs_, grounds_, slips, strict=True)])
     count = round(turns * steps) + 1
     history = np.full((5, count, len(legs_)), np.nan)
     going = np.flatnonzero(status == WalkStatus.OK)
@@ -115,9 +120,9 @@ def walk(
         course = Course(batch(able, under), drive, 2.0 * np.pi / steps, step)
         status[going], history[:, :, going] = course.walked(count, height)
     angle = 2.0 * np.pi / steps * np.arange(count)
-    speed = np.array([w.speed for w in legs_])
+    speed = np.array([np.nan if w.flaw else w.speed for w in legs_])
     return Walk(
-        time=angle[:, None] / np.where(speed > 0, speed, np.nan),
+        time=angle[:, None] / speed,
         angle=angle,
         x=history[0],
         z=history[1],
@@ -153,7 +158,7 @@ def _cases(
     )
 
 
-def _status(wheel_leg: WheelLeg, ground: Ground) -> WalkStatus:
-    finite = np.isfinite(wheel_leg.mass) and np.isfinite(ground.stiffness)
-    sound = not wheel_leg.flaw and ground.stiffness > 0.0 and ground.offset >= 0.0 and finite
-    return WalkStatus.OK if sound else WalkStatus.NO_WHEEL_LEG
+def _status(wheel_leg: WheelLeg, ground: Ground, slip: float) -> WalkStatus:
+    told = not np.isnan(slip)
+    flaw = wheel_leg.flaw or ground.flaw or (told and not -1.0 <= slip <= 1.0)
+    return WalkStatus.UNSOUND if flaw else WalkStatus.OK
