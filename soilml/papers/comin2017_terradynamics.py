@@ -1,8 +1,81 @@
-"""What comin2017_terradynamics prints, computed."""
+"""What Comin and Saaj 2017 print of walks by resistive forces, computed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from soilml.arrays import Array
+from soilml.wheel_legs.ground import Ground
+from soilml.wheel_legs.sinkage import Simulated, SinkageFit, fitted_to, simulated
+from soilml.wheel_legs.terradynamics import stress_gains
+from soilml.wheel_legs.trends import FeetCompared, Gait, falls_until, feet_compared, legs_compared
+
+#: Ground on which numbers of legs are compared, the middle of the paper's range; not printed.
+MIDDLE = Ground(stiffness=0.7e6)
+
+
+@cache
+def _legs() -> Gait:
+    return legs_compared(MIDDLE)
+
+
+@cache
+def _feet() -> FeetCompared:
+    return feet_compared()
+
+
+@cache
+def _soils() -> Simulated:
+    return simulated()
+
+
+@cache
+def _fit() -> SinkageFit:
+    return fitted_to(_soils())
+
+
+def _rank(values: Array, foot: str) -> float:
+    """Place of a foot, from 1, by value from the least; NaN where grounds disagree."""
+    rows = values.reshape(len(_feet().feet), -1)
+    places = 1 + np.argsort(np.argsort(rows, axis=0), axis=0)[_feet().feet.index(foot)]
+    return float(places[0]) if np.ptp(places) == 0 else float("nan")
+
+
+def _slope(values: Array) -> Array:
+    return _feet().sensitivity(values)[0]
+
 
 #: By key of the CSV file of the same name.
-COMPUTED: dict[str, Callable[[], float]] = {}
+COMPUTED: dict[str, Callable[[], float]] = {
+    "alpha_z_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[1]),
+    "alpha_x_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[0]),
+    "rms_slip_legs": lambda: falls_until(_legs().rms_slip),
+    "rms_slip_to_five": lambda: falls_until(_legs().rms_slip[:5]) - 1,
+    "rms_sinkage_legs": lambda: falls_until(-_legs().rms_sinkage),
+    "max_sinkage_drop": lambda: 2 + int(np.argmax(_drop() >= 0.05)),
+    "rms_sinkage_six": lambda: 5 + int(np.argmin(_legs().rms_sinkage[4:])),
+    "max_sinkage_six": lambda: 5 + int(np.argmin(_legs().most_sinkage[4:])),
+    "rank_sinkage_none": lambda: _rank(_feet().sinkage, "none"),
+    "rank_sinkage_cif": lambda: _rank(_feet().sinkage, "CIF"),
+    "rank_slip_none": lambda: _rank(_feet().slip, "none"),
+    "rank_slip_cif": lambda: _rank(_feet().slip, "CIF"),
+    "rank_sinkage_slope_ltf": lambda: _rank(_slope(_feet().sinkage), "LTF"),
+    "rank_sinkage_slope_cif": lambda: _rank(_slope(_feet().sinkage), "CIF"),
+    "rank_slip_slope_none": lambda: _rank(_slope(_feet().slip), "none"),
+    "rank_slip_slope_ltf": lambda: _rank(_slope(_feet().slip), "LTF"),
+    "rank_slip_slope_cif": lambda: _rank(_slope(_feet().slip), "CIF"),
+    "s_sigma": lambda: _fit().s_sigma / 100.0,
+    "s_sigma_r2": lambda: _fit().stiffness_r2,
+    "s_i": lambda: _fit().s_i,
+    "s_z": lambda: _fit().s_z / 100.0,
+    "s_phi_r2": lambda: _fit().friction_r2,
+}
+
+
+def _drop() -> Array:
+    """Share by which each added leg lowers the largest sinkage."""
+    most = _legs().most_sinkage
+    return 1.0 - most[1:] / most[:-1]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.wheel_legs.reaction import Batch
-from soilml.wheel_legs.stepping import Drive, Hub, Step, some
+from soilml.wheel_legs.reaction import Batch, reaction
+from soilml.wheel_legs.stepping import GRAVITY, Drive, Hub, Step, some
+
+#: Halvings of the interval in which the hub's height at the start is sought.
+HALVINGS = 40
 
 
 class WalkStatus(IntEnum):
@@ -78,7 +81,13 @@ class Course:
         return status, history
 
     def _start(self, height: float | None) -> Hub:
-        """At rest, the lowest point on the ground or the hub at `height`, m."""
-        lowest = np.where(self.given.area > 0.0, -self.given.at(0.0).z, -np.inf).max(axis=0)
-        still = np.zeros_like(lowest)
-        return Hub(still, lowest if height is None else still + height, still, still)
+        """At rest, pushed straight down until the ground carries it; or at `height`, m."""
+        pose, still = self.given.at(0.0), np.zeros(self.drive.mass.size)
+        high = np.where(self.given.area > 0.0, -pose.z, -np.inf).max(axis=0)
+        low, pressed = still, replace(self.given, speed=still)
+        for _ in range(HALVINGS if height is None else 0):
+            middle = 0.5 * (low + high)
+            found = reaction(pressed, pose, middle, still, still - 1.0, self.drive.fading)
+            carries = found.up > self.drive.mass * GRAVITY
+            low, high = np.where(carries, middle, low), np.where(carries, high, middle)
+        return Hub(still, low if height is None else still + height, still, still)

@@ -19,8 +19,10 @@ BALANCED = 1e-6
 MOST_NEWTON_STEPS, MOST_HALVINGS = 25, 8
 #: Largest change of velocity that a Newton step may make, as a share of the leg end's.
 LARGEST_CHANGE = 0.3
-#: How often a step that is not found is cut in two.
-MOST_CUTS = 8
+#: How often a step that is not found is cut in two, and one in which the hub falls or strikes.
+MOST_CUTS, MOST_FINE_CUTS = 8, 5
+#: Change of the hub's velocity that counts as a fall or a blow, as a share of the leg end's.
+ABRUPT = 0.2
 
 Cases = TypeVar("Cases", "Hub", "Drive", Reaction)
 
@@ -83,11 +85,13 @@ def implicit(
 
     .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
 
-    by Newton steps in both velocities, each as long as lowers the imbalance; cases for which that
-    fails take the step in two halves. A commanded case takes its horizontal velocity as told.
+    by Newton steps in both velocities, each as long as lowers the imbalance. Cases for which that
+    fails, or whose velocity changes abruptly, take the step in two halves: a fall is resolved. A
+    commanded case takes its horizontal velocity as told.
     """
     moved, found, balanced = _solved(given, drive, hub, start, stop)
-    hard = np.flatnonzero(~balanced)
+    abrupt = np.abs(moved.vz - hub.vz) > ABRUPT * drive.pace
+    hard = np.flatnonzero(~balanced | (abrupt & (cuts < MOST_FINE_CUTS)))
     if hard.size and cuts < MOST_CUTS:
         part, under, behind = given.of(hard), some(drive, hard), some(hub, hard)
         middle = 0.5 * (start + stop)

@@ -95,8 +95,8 @@ def walk(
     solved for the hub's velocity at the end of each step (implicit, `steps` to a turn): the ground
     answers to the direction of motion and not to its speed, so that the equation is stiff. The
     wheels roll freely, or with the commanded `slip` (a number, or one for each case, NaN where it
-    rolls freely). The hub starts so that the lowest point touches the ground, or at `height`, m.
-    Cases that fail carry a status. Raises `InputError` for settings of no simulation.
+    rolls freely). The hub starts where the ground carries it when pushed straight down, or at
+    `height`, m. Cases that fail carry a status. Raises `InputError` for settings of no simulation.
     """
     if not steps >= 100 or not turns > 0.0 or not fading > 0.0:
         raise InputError(

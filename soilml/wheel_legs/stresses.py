@@ -1,0 +1,49 @@
+"""Stress of the ground on every plate of a wheel-leg at one instant of its walk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from soilml.arrays import Array
+from soilml.wheel_legs.feet import WheelLeg
+from soilml.wheel_legs.ground import Ground
+from soilml.wheel_legs.reaction import SKIN, batch
+from soilml.wheel_legs.stepping import FADING
+from soilml.wheel_legs.terradynamics import resistance
+from soilml.wheel_legs.walk import Walk
+
+
+@dataclass(frozen=True)
+class PlateStress:
+    """Where the plates are (m, x along the walk, z up from the surface), and their stress (Pa).
+
+    Arrays (plates,): leg by leg, leg, tip and heel; the body last. `ahead` and `up` are the
+    stress on the plate; 0 above the ground.
+    """
+
+    x: Array
+    z: Array
+    ahead: Array
+    up: Array
+    area: Array  # m^2
+
+
+def stresses(
+    walked: Walk, instant: int, wheel: WheelLeg, ground: Ground, case: int = 0
+) -> PlateStress:
+    """Stress on every plate at an instant of a case of a walk (Comin and Saaj 2017, eq. 4)."""
+    given = batch([wheel], [ground])
+    pose = given.at(float(walked.angle[instant]))
+    x, z, vx, vz = (
+        float(part[instant, case]) for part in (walked.x, walked.z, walked.vx, walked.vz)
+    )
+    turning = given.speed * given.turns
+    across, upwards = vx + turning * pose.z, vz - turning * pose.x
+    pace = np.sqrt(across**2 + upwards**2 + FADING**2)
+    sx, sz = resistance(pose.c2, pose.s2, across / pace, upwards / pace)
+    depth = np.maximum(-(z + pose.z), 0.0)
+    pressure = ground.stiffness * depth + ground.offset * (1.0 - np.exp(-depth / SKIN))
+    parts = (x + pose.x, z + pose.z, pressure * sx, pressure * sz, given.area)
+    return PlateStress(*(part[:, 0] for part in parts))
