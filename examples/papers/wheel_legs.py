@@ -164,7 +164,8 @@ def compared(axes, feet):
             fontsize=9,
         )
     axes.axhline(0, color="#cccccc", lw=0.8, zorder=0)
-    axes.set(xlabel="sinkage, mean of a turn, cm", ylabel="slip, mean of a turn", xlim=(0, 17.5))
+    axes.set(xlabel="sinkage, mean of a turn, cm", ylabel="slip, mean of a turn")
+    axes.set(xlim=(0, 17.5), ylim=(-0.05, 0.23))
     axes.set_title(
         "Larger feet sink and slip less\n(dots: $\\alpha_z$ 0.4 to 1.0 N/cm$^3$)",
         fontsize=10,

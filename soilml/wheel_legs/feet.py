@@ -91,8 +91,10 @@ class WheelLeg:
             return f"a mass of {self.mass:g} kg; it must be positive"
         if not 0.0 < self.speed < np.inf:
             return f"a speed of {self.speed:g} rad/s; it must be positive, forwards"
-        if any(s.segments < 1 or not s.width > 0 or not s.length > 0 for s in sections):
+        if not all(s.segments >= 1 and s.width > 0 and s.length > 0 for s in sections):
             return "a section without segments, width or length"
+        if not all(np.isfinite([s.width, s.length, s.arc]).all() for s in sections):
+            return "a section of no finite size"
         if not (self.clearance >= 0.0 and self.body_area >= 0.0):
             return "a body above the hub or of negative area"
         return ""

@@ -12,15 +12,15 @@ from soilml.arrays import Array
 from soilml.wheel_legs.reaction import Batch, Reaction, reaction
 
 GRAVITY = 9.81
-#: Speed below which the direction of motion fades, m/s; a leg's end turns at 0.054 m/s.
-FADING = 0.001
+#: Speed below which the direction of motion fades, as a share of the leg end's: 1 mm/s.
+FADING = 0.02
 #: A step is found when the forces balance to this share of the weight.
 BALANCED = 1e-6
 MOST_NEWTON_STEPS, MOST_HALVINGS = 25, 8
 #: Largest change of velocity that a Newton step may make, as a share of the leg end's.
 LARGEST_CHANGE = 0.3
 #: How often a step that is not found is cut in two, and one in which the hub falls or strikes.
-MOST_CUTS, MOST_FINE_CUTS = 8, 5
+MOST_CUTS, MOST_FINE_CUTS = 16, 5
 #: Change of the hub's velocity that counts as a fall or a blow, as a share of the leg end's.
 ABRUPT = 0.2
 
@@ -93,12 +93,14 @@ def implicit(
     abrupt = np.abs(moved.vz - hub.vz) > ABRUPT * drive.pace
     hard = np.flatnonzero(~balanced | (abrupt & (cuts < MOST_FINE_CUTS)))
     if hard.size and cuts < MOST_CUTS:
-        part, under, behind = given.of(hard), some(drive, hard), some(hub, hard)
-        middle = 0.5 * (start + stop)
-        half, _, first = implicit(part, under, behind, start, middle, cuts + 1)
-        end, felt, second = implicit(part, under, half, middle, stop, cuts + 1)
-        balanced[hard] = first & second
-        moved, found = merged(moved, end, hard), merged(found, felt, hard)
+        middle, part, told = 0.5 * (start + stop), given.of(hard), some(drive, hard)
+        half, _, first = implicit(part, told, some(hub, hard), start, middle, cuts + 1)
+        balanced[hard] = False
+        able, kept = hard[first], np.flatnonzero(first)
+        if able.size:
+            ahead = (part.of(kept), some(told, kept), some(half, kept))
+            end, felt, balanced[able] = implicit(*ahead, middle, stop, cuts + 1)
+            moved, found = merged(moved, end, able), merged(found, felt, able)
     return moved, found, balanced
 
 

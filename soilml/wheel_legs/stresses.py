@@ -41,7 +41,8 @@ def stresses(
     )
     turning = given.speed * given.turns
     across, upwards = vx + turning * pose.z, vz - turning * pose.x
-    pace = np.sqrt(across**2 + upwards**2 + FADING**2)
+    fading = FADING * wheel.speed * wheel.leg.length
+    pace = np.sqrt(across**2 + upwards**2 + fading**2)
     sx, sz = resistance(pose.c2, pose.s2, across / pace, upwards / pace)
     depth = np.maximum(-(z + pose.z), 0.0)
     pressure = ground.stiffness * depth + ground.offset * (1.0 - np.exp(-depth / SKIN))

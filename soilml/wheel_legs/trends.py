@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from soilml.arrays import Array
+from soilml.errors import InputError
 from soilml.wheel_legs.feet import FEET, MOST_LEGS, wheel_leg
 from soilml.wheel_legs.ground import Ground
 from soilml.wheel_legs.walk import Walk, walk
@@ -34,7 +35,11 @@ class Gait:
 
 
 def gait(walked: Walk) -> Gait:
-    """Figures of the last full turn of a walk, at least one turn long."""
+    """Figures of the last full turn of a walk; `InputError` where it is shorter than a turn."""
+    if walked.angle[-1] < TURN - 1e-9:
+        raise InputError(
+            f"a walk of {walked.angle[-1] / TURN:.2g} turns; a gait needs one full turn or more"
+        )
     last = walked.after(float(walked.angle[-1]) - TURN)
     sinkage, slip = last.sinkage, last.slip
     propelled = slip < 1.0

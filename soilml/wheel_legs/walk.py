@@ -96,13 +96,16 @@ def walk(
     answers to the direction of motion and not to its speed, so that the equation is stiff. The
     wheels roll freely, or with the commanded `slip` (a number, or one for each case, NaN where it
     rolls freely). The hub starts where the ground carries it when pushed straight down, or at
-    `height`, m. Cases that fail carry a status. Raises `InputError` for settings of no simulation.
+    `height`, m. `fading` is a share of the leg end's speed, see `reaction`. Cases that fail carry
+    a status. Raises `InputError` for settings of no simulation.
     """
-    if not steps >= 100 or not turns > 0.0 or not fading > 0.0:
+    if not (steps >= 100 and turns > 0.0 and fading > 0.0):
         raise InputError(
             f"steps {steps}, turns {turns:g}, fading {fading:g}: a walk needs at least 100 steps "
             "to a turn, and turns and fading above 0"
         )
+    if height is not None and not np.isfinite(height):
+        raise InputError(f"a height of {height:g} m to start from; it must be a number")
     legs_, grounds_, slips = _cases(wheel_legs, grounds, slip)
     status = np.array([_status(*case) for case in zip(legs_, grounds_, slips, strict=True)])
     count = round(turns * steps) + 1
@@ -115,7 +118,7 @@ def walk(
             pace=np.array([w.speed * w.leg.length for w in able]),
             legs=np.array([w.legs for w in able]),
             slip=slips[going],
-            fading=np.full(going.size, fading),
+            fading=np.array([fading * w.speed * w.leg.length for w in able]),
         )
         course = Course(batch(able, under), drive, 2.0 * np.pi / steps, step)
         status[going], history[:, :, going] = course.walked(count, height)

@@ -10,7 +10,7 @@ from soilml.wheel_legs.course import WalkStatus
 from soilml.wheel_legs.feet import FEET, Section, WheelLeg, wheel_leg
 from soilml.wheel_legs.ground import GROUNDS, Ground
 from soilml.wheel_legs.reaction import batch, reaction
-from soilml.wheel_legs.stepping import explicit
+from soilml.wheel_legs.stepping import FADING, explicit
 from soilml.wheel_legs.stresses import stresses
 from soilml.wheel_legs.trends import gait
 from soilml.wheel_legs.walk import walk
@@ -18,6 +18,7 @@ from soilml.wheel_legs.walk import walk
 SAND = Ground(stiffness=0.7e6)
 WEIGHT = 3.75 * 9.81
 STRIDE = 2 * np.pi / 5
+FADES = np.array([FADING * 0.3 * 0.18])
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_the_ground_carries_the_weight_over_a_stride():
     fine = walk(wheel_leg("LTF"), SAND, turns=1, steps=1000)
     given = batch([wheel_leg("LTF")], [SAND])
     up = [
-        reaction(given, given.at(a), z, vx, vz, np.array([1e-3])).up
+        reaction(given, given.at(a), z, vx, vz, FADES).up
         for a, z, vx, vz in zip(fine.angle, fine.z, fine.vx, fine.vz, strict=True)
     ]
     assert np.mean(up[-200:]) == pytest.approx(WEIGHT, rel=1e-3)
@@ -151,7 +152,9 @@ def test_a_start_too_high_for_the_time_never_touches_the_ground():
     [
         (lambda: walk(WheelLeg(), SAND, steps=10), "at least 100 steps"),
         (lambda: walk(WheelLeg(), SAND, turns=0.0), "above 0"),
+        (lambda: walk(WheelLeg(), SAND, height=np.nan), "height"),
         (lambda: walk(WheelLeg(), []), "no case"),
+        (lambda: gait(walk(WheelLeg(), SAND, turns=0.1)), "one full turn"),
         (lambda: walk([WheelLeg()] * 2, [SAND] * 3), "2 wheel-legs for 3 cases"),
     ],
 )
@@ -172,7 +175,15 @@ def test_stresses_on_the_plates_add_up_to_the_reaction(soft_to_firm):
     found = stresses(soft_to_firm, 640, wheel, ground, case=1)
     given = batch([wheel], [ground])
     state = (part[640, [1]] for part in (soft_to_firm.z, soft_to_firm.vx, soft_to_firm.vz))
-    total = reaction(given, given.at(soft_to_firm.angle[640]), *state, np.array([1e-3]))
+    total = reaction(given, given.at(soft_to_firm.angle[640]), *state, FADES)
     assert np.sum(found.area * found.up) == pytest.approx(total.up[0])
     assert np.sum(found.area * found.ahead) == pytest.approx(total.ahead[0])
     assert np.all(found.up[found.z > 0] == 0)
+
+
+def test_a_walk_at_a_tenth_of_the_speed_leaves_the_same_track():
+    quick, slow = (
+        walk(wheel_leg("LTF", speed=speed), SAND, turns=0.6, steps=500) for speed in (0.3, 0.03)
+    )
+    np.testing.assert_allclose(slow.z[50:], quick.z[50:], atol=1e-3)
+    assert slow.x[-1, 0] == pytest.approx(quick.x[-1, 0], rel=0.01)
