@@ -61,8 +61,8 @@ def figures(legs, feet, soils, fit):
     print(
         f"  sunk 5.0 +- 0.5 cm: sigma_1 {told.normal_stiffness / 1e4:.1f} +- "
         f"{told.normal_stiffness_std / 1e4:.1f} N/cm2, phi {told.friction_angle:.2f} +- "
-        f"{told.friction_angle_std:.2f} rad: no better than the spread of the soils, "
-        f"{np.std(soils.friction_angle):.2f}"
+        f"{told.friction_angle_std:.2f} rad, "
+        f"where the soils themselves spread by {np.std(soils.friction_angle):.2f}"
     )
 
 

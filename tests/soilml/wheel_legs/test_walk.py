@@ -1,6 +1,8 @@
 """Wheel-legs walking: what carries, what propels, and what stops."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -187,3 +189,11 @@ def test_a_walk_at_a_tenth_of_the_speed_leaves_the_same_track():
     )
     np.testing.assert_allclose(slow.z[50:], quick.z[50:], atol=1e-3)
     assert slow.x[-1, 0] == pytest.approx(quick.x[-1, 0], rel=0.01)
+
+
+def test_the_lines_on_the_page_run():
+    page = (Path(__file__).parents[3] / "docs/papers/comin2017.md").read_text()
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    assert np.all(names["walked"].status == 0)
+    assert names["gait"](names["walked"]).mean_slip[1] == pytest.approx(0.25)
