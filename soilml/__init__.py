@@ -43,6 +43,7 @@ _HOME = {
     "Estimate": "soilml.estimate",
     "GEARS": "soilml.gears",
     "LinearWheel": "soilml.gears",
+    "Midstance": "soilml.gears",
     "Wheel": "soilml.gears",
     "METHODS": "soilml.identification",
     "identify": "soilml.identification",

@@ -27,6 +27,7 @@ class Contact:
     ahead: Array  # m^2, that area, projected on the direction of travel
     lever: Array  # m, lever arm of the shear stress about the axle
     width: Real  # m, the smaller dimension of the contact patch
+    normal_lever: Real = None  # m, of the normal stress, where it misses the axle
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,17 @@ def integrate(stress: Stress) -> tuple[Array, Array, Array]:
     .. math::
         W = \int (\sigma \cos\theta + \tau \sin\theta) dA, \quad
         DP = \int (\tau \cos\theta - \sigma \sin\theta) dA, \quad
-        T = \int \tau R \, dA
+        T = \int (\tau R + \sigma R_n) dA
 
-    References: Wong and Reece 1967, eqs. of equilibrium of a driven rigid wheel.
+    where R_n is the lever arm of the normal stress, nothing where the surface is an arc about the
+    axle. References: Wong and Reece 1967, eqs. of equilibrium of a driven rigid wheel; Comin and
+    Saaj 2017, eq. 17, for a surface that is not.
     """
     xp, contact = namespace(stress.normal), stress.contact
     load = xp.sum(stress.normal * contact.up + stress.shear * contact.ahead, axis=0)
     pull = xp.sum(stress.shear * contact.up - stress.normal * contact.ahead, axis=0)
-    torque = xp.sum(stress.shear * contact.lever * contact.area, axis=0)
+    turning = stress.shear * contact.lever
+    if contact.normal_lever is not None:
+        turning = turning + stress.normal * contact.normal_lever
+    torque = xp.sum(turning * contact.area, axis=0)
     return load, pull, torque

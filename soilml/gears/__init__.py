@@ -2,6 +2,7 @@
 
 from soilml.gears.base import Gear
 from soilml.gears.linear_wheel import LinearWheel
+from soilml.gears.midstance import Midstance
 from soilml.gears.wheel import Wheel
 
 #: Gear by the name that `[gear] type` takes in a model file.
@@ -10,7 +11,8 @@ GEARS: dict[str, type[Gear]] = {
     for gear in (
         Wheel,
         LinearWheel,
+        Midstance,
     )
 }
 
-__all__ = ["GEARS", "Gear", "LinearWheel", "Wheel"]
+__all__ = ["GEARS", "Gear", "LinearWheel", "Midstance", "Wheel"]
