@@ -1,0 +1,162 @@
+"""Stick-slip of a leg past midstance: a rotating spring whose foot sticks and slides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.parameters import Parameter, check
+
+Floats = NDArray[np.float64]
+Real = float | Floats
+
+GRAVITY = 9.81
+#: Steps in the period of the lighter of foot and hub on the spring: amplitudes to about 1 %.
+STEPS_PER_PERIOD = 60
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SpringLeg:
+    """One leg of a wheel-leg as a spring between hub and foot; numbers, or arrays of one shape.
+
+    Length, mass, speed and number of legs are those of Comin and Saaj 2017, table III; they print
+    neither the foot's mass, nor the leg's stiffness across itself, nor its damping.
+    """
+
+    stiffness: Annotated[Real, Parameter("N/m", 50.0, 1e6, "k_S, along the leg")]
+    length: Annotated[Real, Parameter("m", 0.01, 5.0, "l_S, from hub to foot, unloaded")] = 0.1855
+    hub_mass: Annotated[Real, Parameter("kg", 0.01, 1e4, "M_H")] = 3.75
+    foot_mass: Annotated[Real, Parameter("kg", 1e-3, 1e3, "m_F")] = 0.25
+    bending: Annotated[Real, Parameter("1", 0.0, 1.0, "stiffness across the leg over k_S")] = 0.3
+    damping: Annotated[Real, Parameter("1", 0.0, 1.0, "of the hub on the leg, over critical")] = 0.1
+    turning: Annotated[Real, Parameter("rad/s", 1e-3, 100.0, "omega, of the motor")] = 0.3
+    legs: Annotated[Real, Parameter("1", 3.0, 12.0, "legs of the wheel-leg")] = 5.0
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A leg from midstance until the next one takes over, arrays (times, ...)."""
+
+    time: Floats  # s
+    acceleration: Floats  # m/s^2, of the hub, upward
+    slid: Floats  # m, how far the foot has slid back
+    normal: Floats  # N, on the ground
+
+
+def stance(leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real) -> Stance:
+    r"""One stance from midstance on, at a constant slip; inputs broadcast to shape (...).
+
+    .. math::
+        F_S = k_S (l_S - L), \quad Q = \kappa k_S L (\omega t - \beta), \quad
+        L^2 = z_H^2 + (x_H - x_C)^2, \quad \tan\beta = (x_H - x_C) / z_H
+
+        M_H \ddot z_H = N - M_H g, \quad N = F_S \cos\beta - Q \sin\beta, \quad
+        m_F \ddot x_C = \mu_D N - (F_S \sin\beta + Q \cos\beta)
+
+    The foot sticks while F_E = F_S sin(beta) + Q cos(beta) <= N tan(phi_S) and slides against
+    N tan(phi_D), phi_D = phi_S - `increment`, until it stands still again (rad). References: Comin
+    and Saaj 2017, eqs. 20-23, in which Q is missing: they do not print how slip enters. Here the
+    hub advances by x_H = (1 - i) l sin(omega t), l the length under load (their eq. 11), while the
+    motor turns the leg at omega: a foot that sticks makes the leg lag, and bends it by Q. Without
+    Q no leg of a five-legged wheel-leg slips where phi_S > 36 degrees. Not for the blow of the
+    next leg.
+    """
+    rows = list(_marched(leg, slip, friction_angle, increment))
+    return Stance(*(np.stack(values) for values in zip(*rows, strict=True)))
+
+
+def amplitude(leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real) -> Floats:
+    r"""Delta a (m/s^2): the largest acceleration of the hub, up or down, during one stance.
+
+    .. math:: \Delta a = \max_t |\ddot z_H + l_S \omega^2 \cos\omega t|
+
+    what the hub of a leg that neither slips nor bends would feel taken off. Inputs as `stance`.
+    """
+    largest = np.zeros(())
+    for time, acceleration, _, _ in _marched(leg, slip, friction_angle, increment):
+        slow = leg.length * leg.turning**2 * np.cos(leg.turning * time)
+        largest = np.maximum(largest, np.abs(acceleration + slow))
+    return largest
+
+
+def _marched(
+    leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real
+) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
+    """(time, acceleration, slid, normal) of a stance step by step: midpoint rule, events within.
+
+    A foot that comes to a stand within a step stops there, and sticks or turns at the next one.
+    """
+    check(leg)
+    slip, static, gap, k, length, M, m, kappa, zeta, omega, legs = (
+        np.array(v, dtype=np.float64)
+        for v in np.broadcast_arrays(
+            slip, friction_angle, increment, leg.stiffness, leg.length, leg.hub_mass,
+            leg.foot_mass, leg.bending, leg.damping, leg.turning, leg.legs,
+        )
+    )  # fmt: skip
+    _believable(slip, static, gap)
+    mu_s, mu_d = np.tan(static), np.tan(static - gap)
+    standing, dashpot = length - M * GRAVITY / k, 2.0 * zeta * np.sqrt(k * M)
+    if not (standing > 0.5 * length).all():
+        raise InputError(
+            f"stiffness is {k.min():g} N/m: the leg gives way by more than half its length; it "
+            f"must be above {2.0 * (M * GRAVITY / length).max():g} N/m"
+        )
+
+    def forces(t: Floats, z: Floats, w: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Normal force, and the force that pushes the foot back."""
+        angle = omega * t
+        reach = (1.0 - slip) * standing * np.sin(angle) - x
+        rate = (1.0 - slip) * standing * omega * np.cos(angle) - v
+        span = np.hypot(z, reach)
+        cos, sin = z / span, reach / span
+        axial = np.maximum(k * (length - span) - dashpot * (w * cos + rate * sin), 0.0)
+        across = kappa * k * span * (angle - np.arctan2(reach, z))
+        return np.maximum(axial * cos - across * sin, 0.0), axial * sin + across * cos
+
+    lasts, fastest = math.pi / legs / omega, np.sqrt(k / np.minimum(m, M))
+    count = int(np.ceil(np.max(lasts * fastest) * STEPS_PER_PERIOD / (2.0 * math.pi)))
+    dt = lasts / count
+    half = 0.5 * dt
+    z, w, x, v = standing, np.zeros_like(k), np.zeros_like(k), np.zeros_like(k)
+    heading = np.zeros_like(k)  # of the foot that slides, 0 where it sticks
+    for step in range(count + 1):
+        t = step * dt
+        normal, push = forces(t, z, w, x, v)
+        a = normal / M - GRAVITY
+        yield t, a, -x, normal
+        breaks = (heading == 0.0) & (np.abs(push) > mu_s * normal)
+        heading = np.where(breaks, -np.sign(push), heading)
+        slides = heading != 0.0
+        c = np.where(slides, (-heading * mu_d * normal - push) / m, 0.0)
+        normal, push = forces(t + half, z + half * w, w + half * a, x + half * v, v + half * c)
+        a = normal / M - GRAVITY
+        c = np.where(slides, (-heading * mu_d * normal - push) / m, 0.0)
+        z, w = z + dt * (w + half * a), w + dt * a
+        after = v + dt * c
+        stops = slides & (after * heading <= 0.0) & (v * heading > 0.0)
+        share = np.where(stops, v / np.where(stops, v - after, 1.0), 1.0)
+        v, before = np.where(stops, 0.0, after), v
+        x = x + dt * share * 0.5 * (before + v)
+        heading = np.where(stops, 0.0, heading)
+
+
+def _believable(slip: Floats, static: Floats, gap: Floats) -> None:
+    """Raise `InputError` for slip or angles that the spring is not for."""
+    for name, value, low, high in (
+        ("slip", slip, 0.0, 1.0),
+        ("friction_angle", static, 0.0, 1.4),
+        ("increment", gap, 0.0, 1.4),
+        ("friction_angle - increment", static - gap, 0.0, 1.4),
+    ):
+        bad = ~((value >= low) & (value <= high))
+        if bad.any():
+            wrong = value[bad].flat[0]
+            raise InputError(f"{name} is {wrong:g}; it must lie between {low:g} and {high:g}")
