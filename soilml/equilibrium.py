@@ -33,7 +33,7 @@ def loaded(scene: Scene, sinkage: Array, *, rough: bool = False) -> Force:
     """Forces on a gear that stands this deep (m) in the soil, whatever load that carries."""
     xp = namespace(sinkage)
     soil = scene.soil
-    shape, stresses = _stressed(scene, sinkage, rough=rough)
+    shape, stresses = stressed(scene, sinkage, rough=rough)
     load, pull, torque = integrate(stresses)
     flaw = scene.gear.flaw(shape)
     bearing = soil.kc / stresses.contact.width + soil.kphi + 0.0 * load
@@ -49,7 +49,7 @@ def loaded(scene: Scene, sinkage: Array, *, rough: bool = False) -> Force:
     return through(scene.effects, "on_force", force, scene)
 
 
-def _stressed(scene: Scene, sinkage: Array, *, rough: bool) -> tuple[Any, Stress]:
+def stressed(scene: Scene, sinkage: Array, *, rough: bool = False) -> tuple[Any, Stress]:
     """The gear's shape this deep (m) in the soil, and the stresses on it."""
     gear, soil, at, effects = scene.gear, scene.soil, scene.at, scene.effects
     shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
@@ -118,7 +118,7 @@ def _reached_before(scene: Scene, force: Force, slope: Array) -> Array:
     xp = namespace(slope)
     if not scene.effects and not bool(xp.any(scene.at.slip < 0)):
         return xp.zeros_like(slope, dtype=xp.bool)
-    _, stresses = _stressed(scene, force.sinkage, rough=True)
+    _, stresses = stressed(scene, force.sinkage, rough=True)
     lift = stresses.shear * stresses.contact.ahead
     down = xp.sum(xp.maximum(-lift, xp.zeros_like(lift)), axis=0)
     doubted = down > SMALL * scene.at.load
