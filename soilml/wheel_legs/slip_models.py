@@ -1,0 +1,175 @@
+"""Straight lines from what a wheel-leg feels to its slip, and from those lines to the soil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+
+Floats = NDArray[np.float64]
+Real = float | Floats
+
+#: Pa in N/cm^2, N/m in kN/m, m/s^2 in g: the units of the printed coefficients.
+PRESSURE, STIFFNESS, GRAVITY = 1e4, 1e3, 9.81
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class TorqueSlip:
+    r"""Slip from the motor's torque in midstance, i_T = a + b T, and what a and b say of the soil.
+
+    .. math::
+        \varphi = c_\tau + b_\tau b + a_\tau a, \quad \sigma_1 = c_\sigma + b_\sigma b + a_\sigma a
+
+    Coefficients in rad, N/cm^2 and N m as printed; functions take and give SI. sigma_1 is the
+    linearised normal stress 1 cm deep, sigma_0 + alpha_z (1 cm). With `intercept` a is the same
+    on all soils, and sigma_1 follows from b as well. References: Comin and Saaj 2017, eqs. 18, 19
+    and 27, table IV. For a five-legged wheel-leg with load testing feet and a load like theirs.
+    """
+
+    friction: tuple[float, float, float]  # c_tau, b_tau, a_tau
+    stiffness: tuple[float, float, float]  # c_sigma, b_sigma, a_sigma
+    slip_std: float  # standard error of the slip it gives
+    intercept: float | None = None
+
+    @property
+    def matrix(self) -> Floats:
+        """Phi (2, 3): (a, b) = Phi (1, phi in rad, sigma_1 in N/cm^2), eq. 19, inverted exactly."""
+        c_tau, b_tau, a_tau = self.friction
+        if self.intercept is not None:
+            return np.asarray([[self.intercept, 0, 0], [-c_tau / b_tau, 1 / b_tau, 0]])
+        c_sigma, b_sigma, a_sigma = self.stiffness
+        inverse = np.linalg.inv([[a_tau, b_tau], [a_sigma, b_sigma]])
+        return np.column_stack([-inverse @ [c_tau, c_sigma], inverse])
+
+    def line(self, friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
+        """Intercept a and slope b (1/(N m)) on a soil of this angle (rad) and stiffness (Pa)."""
+        return _line(self.matrix, friction_angle, np.asarray(normal_stiffness) / PRESSURE)
+
+    def slip(self, torque: Real, friction_angle: Real, normal_stiffness: Real) -> Floats:
+        """Slip at a torque (N m) on a known soil."""
+        a, b = self.line(friction_angle, normal_stiffness)
+        return np.asarray(a + b * torque)
+
+    def soil(self, intercept: Real, slope: Real) -> tuple[Floats, Floats]:
+        """(friction angle in rad, normal stiffness in Pa) of a soil with this line, eq. 27."""
+        rows = np.asarray([self.friction, self.stiffness]) * [[1.0], [PRESSURE]]
+        angle, stiffness = (
+            c + b * np.asarray(slope) + a * np.asarray(intercept) for c, b, a in rows
+        )
+        return angle, stiffness
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class VibrationSlip:
+    r"""Slip from the hub's vibration after midstance, i_V = a + b \Delta a.
+
+    .. math:: a = c_I + c_\mu \Delta\varphi + c_K k_S, \quad b = a_\mu + b_\mu \Delta\varphi
+
+    with the drop of friction in degrees, k_S in kN/m and the vibration in g; functions take and
+    give SI. References: Comin and Saaj 2017, eqs. 24, 25 and 27, table V. It prints `rad^-1`; in
+    radians the drop of friction would not matter for the slip. With c_K = 0 the line tells
+    nothing of k_S, which is then `assumed`.
+    """
+
+    c_i: float
+    c_mu: float  # 1/degree
+    c_k: float  # m/kN
+    a_mu: float  # 1/g
+    b_mu: float  # 1/(g degree)
+    slip_std: float
+    assumed: float | None = None  # N/m, k_S where c_K = 0
+
+    @property
+    def matrix(self) -> Floats:
+        """Phi (2, 3): (a, b) = Phi (1, drop of friction in degrees, k_S in kN/m), eq. 25."""
+        return np.asarray([[self.c_i, self.c_mu, self.c_k], [self.a_mu, self.b_mu, 0.0]])
+
+    def line(self, increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
+        """Intercept a and slope b (s^2/m) for a drop of friction (rad) and k_S (N/m)."""
+        a, b = _line(self.matrix, np.rad2deg(increment), np.asarray(stiffness) / STIFFNESS)
+        return a, b / GRAVITY
+
+    def slip(self, vibration: Real, increment: Real, stiffness: Real) -> Floats:
+        """Slip at a vibration (m/s^2), for a known drop of friction (rad) and k_S (N/m)."""
+        a, b = self.line(increment, stiffness)
+        return np.asarray(a + b * vibration)
+
+    def spring(self, intercept: Real, slope: Real) -> tuple[Floats, Floats]:
+        """(drop of friction in rad, k_S in N/m) that have this line, eq. 27."""
+        if self.assumed is not None:
+            raise InputError("a model without c_K cannot tell k_S from a line; take the planar one")
+        drop = (np.asarray(slope) * GRAVITY - self.a_mu) / self.b_mu
+        stiffness = (np.asarray(intercept) - self.c_i - self.c_mu * drop) / self.c_k
+        return np.deg2rad(drop), stiffness * STIFFNESS
+
+    def drop(self, vibration: Real, slip: Real) -> Floats:
+        """Drop of friction (rad) from one vibration (m/s^2) and slip, where c_K = 0."""
+        if self.assumed is None:
+            raise InputError("one pair cannot tell both k_S and the drop; take the linear model")
+        shaken = np.asarray(vibration) / GRAVITY
+        over = np.asarray(slip) - self.c_i - self.a_mu * shaken
+        return np.asarray(np.deg2rad(over / (self.c_mu + self.b_mu * shaken)))
+
+
+def spring_soil(increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
+    r"""(friction angle in rad, normal stiffness in Pa) from drop of friction (rad) and k_S (N/m).
+
+    .. math::
+        \varphi_V = -0.76 + 0.35 k_S + 0.03 \Delta\varphi, \quad
+        \sigma_{1,V} = -0.2 - 0.81 k_S' + 13.45 \Delta\varphi'
+
+    with k_S in kN/m and the drop in degrees in the first, k_S' in N/cm and the drop in radians in
+    the second: t_K is printed in cm^-1 and t_tau in N/cm^2/rad. Only so do all four soils have a
+    spring (0.78 to 0.96 kN/m, 33 to 40 degrees), and one whose line of slip lies between 0 and 0.5
+    for vibrations of some tenths of g. References: Comin and Saaj 2017, eq. 28, table VII.
+    """
+    k, drop = np.asarray(stiffness), np.asarray(increment)
+    angle = -0.76 + 0.35 * k / 1e3 + 0.03 * np.rad2deg(drop)
+    return angle, (-0.2 - 0.81 * k / 100.0 + 13.45 * drop) * PRESSURE
+
+
+def soil_spring(friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
+    """(drop of friction in rad, k_S in N/m) of a soil: `spring_soil` the other way, exactly."""
+    rows = np.asarray([[0.03 * 180.0 / np.pi, 0.35 / 1e3], [13.45, -0.81 / 100.0]])
+    inverse = np.linalg.inv(rows)
+    angle = np.asarray(friction_angle) + 0.76
+    stiffness = np.asarray(normal_stiffness) / PRESSURE + 0.2
+    drop, spring = (row[0] * angle + row[1] * stiffness for row in inverse)
+    return drop, spring
+
+
+def _line(matrix: Floats, first: Real, second: Real) -> tuple[Floats, Floats]:
+    a, b = (c + p * np.asarray(first) + q * np.asarray(second) for c, p, q in matrix)
+    return a, b
+
+
+_SHEAR, _NORMAL = (1.0, -0.58, 0.0), (-0.7, 20.928, 15.997)
+
+#: Table IV, with the variances of slip of table VI.
+TORQUE_SLIP: dict[str, TorqueSlip] = {
+    "terramechanics": TorqueSlip(
+        friction=(0.661, -0.466, -0.377), stiffness=(-0.356, 1.434, 0.0), slip_std=0.074**0.5
+    ),
+    "empirical": TorqueSlip(friction=_SHEAR, stiffness=_NORMAL, slip_std=0.005**0.5),
+    "simplified": TorqueSlip(
+        friction=_SHEAR, stiffness=_NORMAL, slip_std=0.018**0.5, intercept=-0.33
+    ),
+}
+
+#: Table V, with the variances of slip of table VI. Without c_K the intercept is that of the
+#: planar model at one stiffness, c_I' = c_I + c_K k_S.
+VIBRATION_SLIP: dict[str, VibrationSlip] = {
+    "planar": VibrationSlip(
+        c_i=-1.434, c_mu=0.022, c_k=0.789, a_mu=6.609, b_mu=-0.156, slip_std=0.015**0.5
+    ),
+    "linear": VibrationSlip(
+        c_i=-0.882, c_mu=0.022, c_k=0.0, a_mu=6.609, b_mu=-0.156, slip_std=0.020**0.5,
+        assumed=(1.434 - 0.882) / 0.789 * STIFFNESS,
+    ),
+}  # fmt: skip
