@@ -1,8 +1,160 @@
-"""What comin2017_slip prints, computed."""
+"""What Comin and Saaj 2017 print of slip, soil from slip, fusion and mobility, computed.
+
+Torque-slip: `FOOT` in midstance under `LOAD` on the four soils at the five commanded slips.
+Vibration-slip: legs of 3 to 6 kN/m on a soil of 40 degrees whose friction drops by 4 to 20 degrees
+when it slips, at the four slips above zero. Pull efficiency: a wheel 0.18 m wide at a slip of 0.2.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.fusion import Fused, inverse_variance, pairwise
+from soilml.gears import Wheel
+from soilml.mobility import pull_efficiency
+from soilml.model import Model
+from soilml.operating import Operating
+from soilml.soils import soil
+from soilml.wheel_legs.slip_fits import (
+    Fitted,
+    fit_torque_slip,
+    fit_vibration_slip,
+)
+from soilml.wheel_legs.slip_models import (
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
+    TorqueSlip,
+    VibrationSlip,
+)
+from soilml.wheel_legs.stances import SLIPS, four_soils, torques
+from soilml.wheel_legs.stick_slip import GRAVITY, SpringLeg, amplitude
+
+Floats = NDArray[np.float64]
+
+#: Width (m) and slip of the rover's wheel, neither printed.
+WIDTH, SLIP = 0.18, 0.2
+#: Springs that the vibration-slip models are fitted to: N/m, rad, and the soil's friction angle.
+STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
+DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
+FRICTION = math.radians(40.0)
+#: Standard deviations (%) of the errors of torque, vibration and sinkage, table VIII, all soils.
+STD = {"friction": (14.0, 14.0, 9.0), "stiffness": (54.0, 27.0, 24.0)}
+
+
+@cache
+def torque_fit() -> Fitted[TorqueSlip]:
+    """The terramechanics form of table IV, on the four soils."""
+    known = four_soils()
+    return fit_torque_slip(
+        torques(known), SLIPS, known.soil.friction_angle, known.normal_stiffness, "terramechanics"
+    )
+
+
+@cache
+def vibrations() -> tuple[Floats, Floats, Floats]:
+    """(vibration in m/s^2 (slips, springs), drop of friction, stiffness) of all springs."""
+    stiffness, drop = (v.ravel() for v in np.meshgrid(STIFFNESSES, DROPS))
+    felt = amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
+    return felt, drop, stiffness
+
+
+@cache
+def vibration_fit(planar: bool) -> Fitted[VibrationSlip]:
+    """Table V fitted to the rotating spring."""
+    felt, drop, stiffness = vibrations()
+    return fit_vibration_slip(felt, SLIPS[1:], drop, stiffness, planar)
+
+
+def fused_slip(torque: str, vibration: str) -> Fused:
+    """Slips from torque and vibration joined, of errors as table VI prints them (in %)."""
+    std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
+    return inverse_variance(np.zeros(2), std)
+
+
+def fused_soil(name: str) -> Fused:
+    """Three estimates of a property joined by eq. 30, of errors as table VIII prints them (%)."""
+    return pairwise(np.zeros(3), np.asarray(STD[name]))
+
+
+@cache
+def efficiency(name: str) -> float:
+    """Pull efficiency (%) of a wheel of the 300 kg rover, one of six, on a soil of table I."""
+    at = Operating(slip=SLIP, load=50.0 * GRAVITY)
+    wheel = Model(Wheel(radius=0.15, width=WIDTH))
+    return 100.0 * float(pull_efficiency(wheel, soil(f"comin2017/{name}"), at))
+
+
+def constant_intercept() -> float:
+    """Mean intercept of the empirical model over the four soils of table I."""
+    known = four_soils()
+    a, _ = TORQUE_SLIP["empirical"].line(known.soil.friction_angle, known.normal_stiffness)
+    return float(a.mean())
+
+
+def _torque(part: str, index: int) -> float:
+    coefficients: tuple[float, float, float] = getattr(torque_fit().law, part)
+    return coefficients[index]
+
+
+def _weight(torque: str, vibration: str) -> float:
+    return float(fused_slip(torque, vibration).weights[0])
+
+
+def _slip_gain(torque: str, vibration: str, index: int) -> float:
+    alone = (TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std)[index]
+    return float(fused_slip(torque, vibration).std) - 100.0 * alone
+
+
+def _soil_weight(name: str, index: int) -> float:
+    return float(fused_soil(name).weights[index])
+
+
+def _soil_gain(name: str, index: int) -> float:
+    return float(fused_soil(name).std) - STD[name][index]
+
+
+def _vibration(planar: bool, name: str) -> float:
+    return float(getattr(vibration_fit(planar).law, name))
+
+
+def _goodness(fit: Callable[[], Fitted[TorqueSlip] | Fitted[VibrationSlip]], part: str) -> float:
+    return fit().goodness[part]
+
 
 #: By key of the CSV file of the same name.
-COMPUTED: dict[str, Callable[[], float]] = {}
+COMPUTED: dict[str, Callable[[], float]] = {
+    "t4_tt_c_tau": partial(_torque, "friction", 0),
+    "t4_tt_b_tau": partial(_torque, "friction", 1),
+    "t4_tt_a_tau": partial(_torque, "friction", 2),
+    "t4_tt_gof_tau": partial(_goodness, torque_fit, "friction"),
+    "t4_tt_c_sigma": partial(_torque, "stiffness", 0),
+    "t4_tt_b_sigma": partial(_torque, "stiffness", 1),
+    "t4_tt_gof_sigma": partial(_goodness, torque_fit, "stiffness"),
+    "eq19_intercept": constant_intercept,
+    "t5_p_gof": partial(_goodness, partial(vibration_fit, True), "intercept"),
+    "t5_l_gof": partial(_goodness, partial(vibration_fit, False), "intercept"),
+    "t5_gof_b": partial(_goodness, partial(vibration_fit, True), "slope"),
+    "t5_a_mu": partial(_vibration, True, "a_mu"),
+    "t5_b_mu": partial(_vibration, True, "b_mu"),
+}
+for _name, _key in (("c_i", "c_i"), ("c_mu", "c_mu"), ("c_k", "c_k")):
+    COMPUTED[f"t5_p_{_key}"] = partial(_vibration, True, _name)
+for _name in ("c_i", "c_mu"):
+    COMPUTED[f"t5_l_{_name}"] = partial(_vibration, False, _name)
+for _t, _torque_name in zip("tes", TORQUE_SLIP, strict=True):
+    for _v, _vibration_name in zip("pl", VIBRATION_SLIP, strict=True):
+        _key = f"t6_{_t}{_v}"
+        COMPUTED[f"{_key}_weight"] = partial(_weight, _torque_name, _vibration_name)
+        COMPUTED[f"{_key}_std_t"] = partial(_slip_gain, _torque_name, _vibration_name, 0)
+        COMPUTED[f"{_key}_std_v"] = partial(_slip_gain, _torque_name, _vibration_name, 1)
+for _name in STD:
+    for _index, _sense in enumerate("tvs"):
+        COMPUTED[f"t9_{_sense}_{_name}_weight"] = partial(_soil_weight, _name, _index)
+        COMPUTED[f"t9_{_sense}_{_name}_std"] = partial(_soil_gain, _name, _index)
+for _soil in ("ssc-1", "ssc-2", "ssc-3", "es-3"):
+    COMPUTED[f"t10_true_{_soil}"] = partial(efficiency, _soil)

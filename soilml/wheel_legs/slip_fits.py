@@ -33,7 +33,8 @@ def lines(felt: Floats, slip: Floats) -> tuple[Floats, Floats, Floats]:
     """Intercepts, slopes and R^2 (soils,) of slip (slips,) on what is felt (slips, soils)."""
     slips = np.broadcast_to(np.asarray(slip, float)[:, None], felt.shape)
     x, y = felt - felt.mean(axis=0), slips - slips.mean(axis=0)
-    slope = (x * y).sum(axis=0) / (x * x).sum(axis=0)
+    with np.errstate(invalid="ignore"):  # what is felt the same at every slip has no line: NaN
+        slope = (x * y).sum(axis=0) / (x * x).sum(axis=0)
     left = ((y - slope * x) ** 2).sum(axis=0)
     return (
         slips.mean(axis=0) - slope * felt.mean(axis=0),
