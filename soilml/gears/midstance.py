@@ -161,24 +161,30 @@ def _cut(sole: Sole, at: Operating, count: int) -> Contact:
 
 
 def _along(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
-    """Contact at these angles (rad), each standing for `arc` (rad); arrays (points, batch)."""
+    """Contact at these angles (rad), each standing for `arc` (rad); arrays (points, batch).
+
+    Sines and cosines follow from the tangents of half the angles passed since entry, and their
+    differences do not cancel.
+    """
     xp = namespace(angle)
-    mirrored = sole.entry - angle / sole.peak * (sole.entry - sole.peak)
-    at_pressure = xp.where(angle < sole.peak, mirrored, angle)
-    # cos a - cos b as a product keeps the digits that a small arc would lose
-    depth = 2.0 * xp.sin(0.5 * (sole.entry + at_pressure))
-    depth = sole.radius * depth * xp.sin(0.5 * (sole.entry - at_pressure))
+    sin_entry, cos_entry = xp.sin(sole.entry), xp.cos(sole.entry)
     passed = sole.entry - angle
-    gone = 2.0 * xp.cos(0.5 * (sole.entry + angle)) * xp.sin(0.5 * passed)
+    mirrored = angle * ((sole.entry - sole.peak) / sole.peak)
+    t = xp.tan(0.5 * xp.where(angle < sole.peak, mirrored, passed))
+    depth = 2.0 * sole.radius * t / (1.0 + t * t) * (sin_entry - t * cos_entry)
+    t = xp.tan(0.5 * passed)
+    double = 2.0 * t / (1.0 + t * t)
+    sin_gone = double * (cos_entry + t * sin_entry)
+    sin, cos = sin_entry - sin_gone, cos_entry + double * (sin_entry - t * cos_entry)
     area = sole.radius * sole.width * arc
     return Contact(
         depth=xp.maximum(depth, xp.zeros_like(depth) + NO_DEPTH),
-        sheared=sole.radius * (passed - (1.0 - at.slip) * gone),
+        sheared=sole.radius * (passed - (1.0 - at.slip) * sin_gone),
         rolled=sole.radius * passed,
         area=area,
-        up=area * xp.cos(angle),
-        ahead=area * xp.sin(angle),
-        lever=sole.radius + sole.raised * xp.cos(angle),
-        normal_lever=-sole.raised * xp.sin(angle),
+        up=area * cos,
+        ahead=area * sin,
+        lever=sole.radius + sole.raised * cos,
+        normal_lever=-sole.raised * sin,
         width=sole.width,
     )
