@@ -8,7 +8,21 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import qmc
 
-from soilml import EFFECTS, Midstance, Model, Operating, Soil, Status, identify, read_case, soil
+from datagen.engine import generate
+from datagen.recipe import read_recipe
+from soilml import (
+    EFFECTS,
+    Midstance,
+    Model,
+    Operating,
+    Soil,
+    Status,
+    identify,
+    read_case,
+    read_table,
+    soil,
+)
+from soilml.cli import main
 from soilml.contact import integrate, stress
 from soilml.effects.base import suits
 from soilml.errors import InputError
@@ -196,3 +210,23 @@ def test_a_model_file_of_a_foot_identifies_its_soil(tmp_path):
     assert fit["kphi"] == pytest.approx(4e5, rel=1e-3)
     with pytest.raises(InputError, match="take nonlinear"):
         identify(case, Table(columns), method="linear")
+
+
+def test_a_model_file_of_a_foot_makes_synthetic_data(tmp_path):
+    recipe = (
+        "rows = 64\nseed = 1\n" + MODEL + "[operating]\nslip = [0.0, 0.5]\nload_N = [4.0, 40.0]\n"
+    )
+    (tmp_path / "recipe.toml").write_text(recipe)
+    generate(read_recipe(tmp_path / "recipe.toml"), tmp_path / "foot.parquet")
+    made = read_table(tmp_path / "foot.parquet")
+    assert len(made) == 64
+    assert (np.isfinite(made["torque_Nm"]) == made.answered).all()
+    assert made.answered.mean() > 0.8 and (made["torque_Nm"][made.answered] > 0).mean() > 0.95
+
+
+def test_a_foot_is_simulated_from_the_command_line(tmp_path):
+    (tmp_path / "foot.toml").write_text(MODEL)
+    out = tmp_path / "out.csv"
+    driven = ["--slip", "0.1,0.3", "--load", "12,90", "--out", str(out)]
+    assert main(["simulate", str(tmp_path / "foot.toml"), *driven]) == 0
+    assert out.read_text().count(",ok") == 2
