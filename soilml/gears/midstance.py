@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, ClassVar, final
@@ -76,16 +77,17 @@ class Midstance:
     tip_height: Annotated[Real, Parameter("m", 0.0, 5.0, "h_T, of the foot below the leg")]
 
     @classmethod
-    def of_foot(cls, length: float, height: float, width: float, leg_length: float) -> Midstance:
+    def of_foot(cls, length: Real, height: Real, width: Real, leg_length: Real) -> Midstance:
         r"""A foot that runs `length` (m) ahead of the leg's end and rises by `height` (m) there.
 
         .. math:: R = (l_T^2 + h_T^2) / (2 h_T), \quad \theta_{1w} = 2 \arctan(h_T / l_T)
         """
-        xp = namespace(length, height)
+        rise = height / length
+        plain = isinstance(rise, float)
         return cls(
             radius=(length**2 + height**2) / (2.0 * height),
             width=width,
-            arc=2.0 * xp.atan(height / length),
+            arc=2.0 * (math.atan(rise) if plain else namespace(rise).atan(rise)),
             leg_length=leg_length,
             tip_height=height,
         )

@@ -2,8 +2,10 @@
 
 from itertools import pairwise
 
+import array_api_strict as strict
 import numpy as np
 import pytest
+import torch
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import qmc
@@ -26,6 +28,7 @@ from soilml.cli import main
 from soilml.contact import integrate, stress
 from soilml.effects.base import suits
 from soilml.errors import InputError
+from soilml.parameters import with_values
 from soilml.quantities import column
 from soilml.table import Table
 
@@ -230,3 +233,31 @@ def test_a_foot_is_simulated_from_the_command_line(tmp_path):
     driven = ["--slip", "0.1,0.3", "--load", "12,90", "--out", str(out)]
     assert main(["simulate", str(tmp_path / "foot.toml"), *driven]) == 0
     assert out.read_text().count(",ok") == 2
+
+
+@pytest.mark.parametrize("make", [strict.asarray, torch.from_numpy])
+def test_a_foot_gives_the_same_in_another_array_library(make):
+    slip, load = np.asarray([-0.3, 0.0, 0.2, 0.5]), np.asarray([8.0, 20.0, 45.0, 300.0])
+    expected = Model(FOOT)(SAND, Operating(slip=slip, load=load))
+    found = Model(FOOT)(SAND, Operating(slip=make(slip), load=make(load)))
+    for name in ("torque", "drawbar_pull", "sinkage", "status"):
+        np.testing.assert_allclose(
+            np.asarray(getattr(found, name)), getattr(expected, name), rtol=1e-12
+        )
+
+
+@pytest.mark.parametrize("name", ["friction_angle", "shear_modulus", "kphi", "n"])
+def test_gradients_flow_through_the_foot(name):
+    slip, load = np.asarray([0.05, 0.3]), np.asarray([5.0, 30.0])
+    at = Operating(slip=torch.from_numpy(slip), load=torch.from_numpy(load))
+
+    def value(x):
+        force = Model(FOOT)(with_values(SAND, {name: x}), at)
+        return force.torque.sum() + 50.0 * force.sinkage.sum()
+
+    reference = float(getattr(SAND, name))
+    x = torch.tensor(reference, dtype=torch.float64, requires_grad=True)
+    value(x).backward()
+    h = 1e-5 * reference
+    expected = float(value(reference + h) - value(reference - h)) / (2 * h)
+    assert float(x.grad) == pytest.approx(expected, rel=1e-4)
