@@ -17,7 +17,7 @@ from soilml.soils.base import Soil
 from soilml.status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.
-NODES, ROUGH_NODES = 24, 5
+NODES, ROUGH_NODES = 16, 5
 #: Stands for no depth, where the stress is zero: log(0) has no derivative.
 NO_DEPTH = 1e-300
 
