@@ -1,4 +1,4 @@
-"""An estimate of soil parameters with its uncertainty, and several of one soil as one."""
+"""An estimate with its uncertainty, and several of one soil as one."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LEAST_GAIN = 0.05
 
 @dataclass(frozen=True)
 class Estimate:
-    """Mean, standard deviation and covariance of the parameters `names`, in SI units.
+    """Mean, standard deviation and covariance of the quantities `names`, in SI units.
 
     Arrays have the shape of the readings with (q,) or (q, q) behind. `low` and `high` hold 90 % of
     the truths. `in_range` is false where the readings are unlike all that the model was trained
-    on: believe nothing then. `prior_std` is the width before anything was measured.
+    on: believe nothing then. `prior` is what was known before anything was measured.
     """
 
     names: tuple[str, ...]
@@ -35,10 +35,15 @@ class Estimate:
     low: Floats
     high: Floats
     in_range: NDArray[np.bool_]
-    prior_std: Floats
+    prior: Known
+
+    @property
+    def prior_std(self) -> Floats:
+        """The width before anything was measured, (q,)."""
+        return self.prior.std
 
     def __getitem__(self, name: str) -> tuple[Floats, Floats]:
-        """(mean, std) of one parameter."""
+        """(mean, std) of one quantity."""
         i = self.names.index(name)
         return self.mean[..., i], self.std[..., i]
 

@@ -23,6 +23,7 @@ READABLE: dict[str, tuple[float, float]] = {
     "load": (0.0, np.inf),
     "drawbar_pull": (-np.inf, np.inf),
     "sinkage": (-np.inf, np.inf),
+    "vibration": (-np.inf, np.inf),
 }
 
 

@@ -47,6 +47,7 @@ class Estimator:
     inputs: tuple[str, ...]
     names: tuple[str, ...]
     units: tuple[str, ...]
+    per_row: tuple[str, ...]  # those of the names that differ from row to row of a run
     metadata: dict[str, str]
     prior: Known
     together: Together
@@ -80,6 +81,7 @@ class Estimator:
                 inputs=tuple(entry["name"] for entry in inputs),
                 names=tuple(entry["name"] for entry in outputs),
                 units=tuple(entry["unit"] for entry in outputs),
+                per_row=tuple(e["name"] for e in outputs if e.get("per_row", False)),
                 metadata=metadata,
                 prior=Known(
                     *(_column(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper"))
@@ -125,8 +127,13 @@ class Estimator:
         Rows of nearly the same slip and load count as one. Rows out of range are left out, up to a
         tenth of them. Where there are more, or where the rows contradict each other as rows of one
         soil hardly ever do, `in_range` is false and the answer is the prior. Raises `InputError` as
-        a call does, and where there is no row.
+        a call does, where there is no row, and where the rows of a run have no one value: slip.
         """
+        if self.per_row:
+            raise InputError(
+                f"{self.path} estimates {self.per_row[0]}, which differs from row to row: rows of "
+                "a run cannot be joined; estimate each by itself"
+            )
         flat, _ = readings(self.inputs, measured)
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
@@ -168,7 +175,7 @@ class Estimator:
             low=np.clip(mean - half, self.prior.lower, self.prior.upper),
             high=np.clip(mean + half, self.prior.lower, self.prior.upper),
             in_range=in_range,
-            prior_std=self.prior.std,
+            prior=self.prior,
         )
 
 

@@ -97,6 +97,15 @@ def together(
     )
 
 
+def unjoined(
+    mean: Floats, covariance: Floats, data: Dataset, prior: Known, driven: Driven
+) -> Together:
+    """The same for quantities that differ from row to row: there is nothing to join."""
+    rows = groups_of(data.runs(), 1)[:, 0]
+    reach = _reach(mean[rows], covariance[rows], data.targets[rows], prior)
+    return Together(driven, (), reach, np.full(2, NO_DOUBT))
+
+
 @dataclass(frozen=True)
 class _Measured:
     """What groups of rows joined so show: an entry of a `Kind`, and the loss to choose it by."""

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from training.score import Score
 from training.train import Trained
+
+WORTH = (
+    "One reading brings one equation for all these unknowns: the estimate is mostly the prior, "
+    "and its standard deviation says so. Use several readings of one soil together "
+    "(`soilml estimate --by run`, `Estimator.run`)."
+)
+PER_ROW_WORTH = (
+    "Slip differs from row to row: each reading is estimated by itself. How much of the answer is "
+    "the prior depends on how well the soil is known, and the standard deviation says it."
+)
+TOGETHER = (
+    "Several readings of one soil together (`run`), by what the run varied: what came of them "
+    "on runs that joining was not fitted to. Rows of nearly the same slip and load count as "
+    "one, and a run between these kinds is taken between them."
+)
 
 
 def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
@@ -16,7 +31,7 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
     inputs = json.loads(metadata["inputs"])
     recipe = json.loads(metadata["recipe"])
     gear = ", ".join(f"{k} {v}" for k, v in json.loads(metadata["gear"]).items())
-    kinds = ", ".join(_described(m.regressor) for m in trained.members)
+    kinds = ", ".join(_described(m.regressor.machine, m.regressor.kind) for m in trained.members)
     parts = trained.parts
     fused = len(trained.members) > 1
     lines = [
@@ -26,14 +41,12 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
         f"{_list(i['name'] for i in inputs)}. Regressors: {kinds}."
         + (f" Joined by the rule `{trained.spec.rule}`." if fused else ""),
         "",
-        "One reading brings one equation for all these unknowns: the estimate is mostly the prior, "
-        "and its standard deviation says so. Use several readings of one soil together "
-        "(`soilml estimate --by run`, `Estimator.run`).",
+        PER_ROW_WORTH if trained.spec.per_row else WORTH,
         "",
         "## Valid for",
         "",
         f"- gear: {gear or 'not recorded'}",
-        f"- soil outside the estimated parameters: {_soil(recipe)}",
+        f"- soil outside the estimated parameters: {_soil(recipe, trained.spec.targets)}",
         *[f"- effect: {json.dumps(e)}" for e in recipe.get("effect", [])],
         f"- noise: {json.dumps(recipe.get('noise', {}))}; bias per run: "
         f"{json.dumps(recipe.get('bias', {}))}",
@@ -63,12 +76,7 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
         "",
         *_scores(trained.scores, [o["name"] for o in outputs]),
         "",
-        "Several readings of one soil together (`run`), by what the run varied: what came of them "
-        "on runs that joining was not fitted to. Rows of nearly the same slip and load count as "
-        "one, and a run between these kinds is taken between them.",
-        "",
-        *_together(trained, [o["name"] for o in outputs]),
-        "",
+        *([] if trained.spec.per_row else _together(trained, [o["name"] for o in outputs])),
         "## Made by",
         "",
         f"- rows: {len(parts.train)} learned from, {len(parts.choose)} to stop and choose by, "
@@ -84,7 +92,7 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
     return "\n".join(lines)
 
 
-def _described(regressor: Any) -> str:
+def _described(regressor: Any, kind: str) -> str:
     details = ""
     if hasattr(regressor, "centres_"):
         details = (
@@ -94,7 +102,7 @@ def _described(regressor: Any) -> str:
     if hasattr(regressor, "history_"):
         layers = " x ".join(str(h) for h in regressor.hidden)
         details = f" (hidden {layers}, {len(regressor.history_)} epochs)"
-    return f"{regressor.kind}{details}"
+    return f"{kind}{details}"
 
 
 def _list(words: Any) -> str:
@@ -102,12 +110,10 @@ def _list(words: Any) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def _soil(recipe: Mapping[str, Any]) -> str:
+def _soil(recipe: Mapping[str, Any], targets: Sequence[str]) -> str:
     soil = dict(recipe.get("soil", {}))
     prior = soil.pop("prior", {})
-    unknown = {
-        k: v for k, v in prior.items() if k not in ("cohesion", "friction_angle", "shear_modulus")
-    }
+    unknown = {k: v for k, v in prior.items() if k not in targets}
     text = json.dumps(soil) if soil else "not recorded"
     return f"{text}; varied and not estimated: {json.dumps(unknown)}" if unknown else text
 
@@ -126,11 +132,12 @@ def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
 
 def _together(trained: Trained, names: list[str]) -> list[str]:
     head = " | ".join(f"{what} {n}" for what in ("error", "90 %") for n in names)
-    lines = [f"| run | rows | sets | {head} |", "|---|---:|---:|" + "---:|" * (2 * len(names))]
+    lines = [TOGETHER, "", f"| run | rows | sets | {head} |"]
+    lines.append("|---|---:|---:|" + "---:|" * (2 * len(names)))
     for kind, scores in trained.sets.items():
         for rows, score in scores.items():
             cells = [f"{v:.3f}" for v in score.relative] + [f"{v:.1%}" for v in score.cover90]
             lines.append(f"| {kind} | {rows} | {score.rows} | {' | '.join(cells)} |")
         if not scores:
             lines.append(f"| {kind} | | 0 |{' |' * (2 * len(names))}")
-    return lines
+    return [*lines, ""]

@@ -14,6 +14,7 @@ from soilml.errors import InputError, TableError
 from soilml.features import computed, inputs_of
 from soilml.quantities import QUANTITIES, column
 from soilml.reading import read_table
+from training.targets import check_measured, prior_of
 
 Floats = NDArray[np.float64]
 
@@ -104,8 +105,9 @@ def read_dataset(
     if float(np.ptp(truth, axis=0).min()) <= 0.0:
         raise InputError(f"{path}: a target does not vary; it cannot be learned")
     recipe = table.metadata.get("soilml_recipe", "{}")
-    prior = json.loads(recipe).get("soil", {}).get("prior", {})
-    ends = [_ends(prior.get(name), truth[:, i]) for i, name in enumerate(targets)]
+    content = json.loads(recipe)
+    check_measured(targets, content, str(path))
+    ends = [_ends(prior_of(name, content), truth[:, i]) for i, name in enumerate(targets)]
     return Dataset(
         measured=measured,
         features=computed(features, measured),

@@ -19,6 +19,7 @@ from soilml.onboard import DRIVEN, FORMAT, KIND, behind, checksum
 from soilml.quantities import QUANTITIES
 from soilml.saving import replacing
 from training.graph import IR_VERSION, OPSET, Graph
+from training.targets import PER_ROW
 from training.train import Trained
 
 Floats = NDArray[np.float64]
@@ -113,6 +114,7 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
             "upper": float(data.upper[k]),
             "prior_mean": float(trained.prior.mean[k]),
             "prior_std": float(trained.prior.std[k]),
+            **({"per_row": True} if name in PER_ROW else {}),
         }
         for k, name in enumerate(spec.targets)
     ]

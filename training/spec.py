@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from datagen.recipe import located
+from soilml.errors import InputError
 from soilml.features import inputs_of
 from soilml.fusion import RULES
-from soilml.parameters import declared
 from soilml.quantities import SHEAR
 from soilml.settings import Settings, read_settings
-from soilml.soils import Soil
 from training.fixed_size import FixedSizeLSSVM
 from training.linear import LinearGaussian
 from training.lssvm import LSSVM
 from training.mlp import GaussianMLP
+from training.reader import Reader
+from training.targets import PER_ROW, check_targets
 
 #: Regressor by the name that `[[regressor]] type` takes: one new file and one line here.
 REGRESSORS: dict[str, type] = {
@@ -42,9 +43,14 @@ class Spec:
     seed: int
     features: tuple[str, ...]
     targets: tuple[str, ...]
-    regressors: tuple[Any, ...]
+    regressors: tuple[Reader, ...]
     rule: str
     text: str
+
+    @property
+    def per_row(self) -> bool:
+        """Whether a target differs from row to row of a run."""
+        return any(name in PER_ROW for name in self.targets)
 
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:
@@ -54,21 +60,27 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     features = _words(settings, "features", ["slip", "torque/load", "load"])
     inputs_of(features)  # names the first that cannot be read
     targets = _words(settings, "targets", list(SHEAR))
-    for name in targets:
-        if name not in declared(Soil):
-            settings.fail(f"targets: {name!r} is no soil parameter: {', '.join(declared(Soil))}")
+    try:
+        check_targets(targets, features)
+    except InputError as error:
+        settings.fail(str(error))
     seed = int(settings.take("seed", int, SEED, 0))
     if not 0 <= seed < 2**32:
         settings.fail(f"seed is {seed}; needed is {SEED}")
     rule = settings.text("rule", "best-linear")
     if rule not in RULES:
         settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
-    regressors = tuple(_regressor(entry, seed) for entry in settings.tables("regressor"))
+    regressors: list[Reader] = []
+    for entry in settings.tables("regressor"):
+        regressors.append(_reader(entry, seed, features, [r.kind for r in regressors]))
     if not regressors:
         settings.fail("[[regressor]] is missing; give one or more")
+    read = {k for r in regressors for k in r.columns or range(len(features))}
+    for k in set(range(len(features))) - read:
+        settings.fail(f"features: no regressor reads {features[k]!r}; leave it out")
     settings.finish()
     text = json.dumps(settings.content, sort_keys=True)
-    return Spec(file.stem, seed, tuple(features), tuple(targets), regressors, rule, text)
+    return Spec(file.stem, seed, tuple(features), tuple(targets), tuple(regressors), rule, text)
 
 
 def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
@@ -80,7 +92,21 @@ def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
     return [str(word) for word in words]
 
 
-def _regressor(settings: Settings, seed: int) -> Any:
+def _reader(settings: Settings, seed: int, features: list[str], taken: list[str]) -> Reader:
+    """A regressor and what it reads; two that would have one name are numbered."""
+    own = _words(settings, "features", features)
+    for name in own:
+        if name not in features:
+            settings.fail(f"features: {name!r} is none of the spec's: {', '.join(features)}")
+    machine = _machine(settings, seed)
+    kind, columns = machine.kind, None
+    if own != features:
+        kind, columns = f"{kind} of {', '.join(own)}", tuple(features.index(name) for name in own)
+    alike = sum(name == kind or name.startswith(f"{kind} #") for name in taken)
+    return Reader(f"{kind} #{alike + 1}" if alike else kind, machine, columns)
+
+
+def _machine(settings: Settings, seed: int) -> Any:
     kind = settings.text("type")
     if kind not in REGRESSORS:
         settings.fail(f"type is {kind!r}; there are: {', '.join(REGRESSORS)}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +23,12 @@ from training.calibrate import (
     measured_of,
     runs_that,
     together,
+    unjoined,
 )
 from training.dataset import Dataset, Split, split
 from training.fused import Fused, fused
 from training.mlp import GaussianMLP
+from training.reader import Reader
 from training.score import NINETY, Score, scored
 from training.spec import Spec
 from training.support import Support
@@ -98,8 +99,9 @@ def train(
         seen = parts.calibrate.thinned()
         estimator = calibrated(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
     scores["estimator"] = _scored(estimator, third, prior.std)
-    driven = driven_of(parts.train)
-    joint = _together(estimator, parts.calibrate.rows(~unseen), prior, driven)
+    joint = _together(
+        estimator, parts.calibrate.rows(~unseen), prior, driven_of(parts.train), spec.per_row
+    )
     return Trained(
         spec=spec,
         estimator=estimator,
@@ -125,20 +127,21 @@ def _check_enough(data: Dataset, calibrate: Dataset) -> None:
         )
 
 
-def _fit(regressor: Any, parts: Split, progress: Callable[[int, int], None]) -> None:
+def _fit(reader: Reader, parts: Split, progress: Callable[[int, int], None]) -> None:
     progress(0, 1)
-    if isinstance(regressor, GaussianMLP):
-        held_out = (parts.choose.features, parts.choose.targets)
-        regressor.fit(
-            parts.train.features,
+    machine, shown = reader.machine, reader.read(parts.train.features)
+    if isinstance(machine, GaussianMLP):
+        held_out = (reader.read(parts.choose.features), parts.choose.targets)
+        machine.fit(
+            shown,
             parts.train.targets,
             held_out=held_out,
-            progress=lambda epoch: progress(epoch, regressor.epochs),
+            progress=lambda epoch: progress(epoch, machine.epochs),
         )
     else:
-        regressor.fit(parts.train.features, parts.train.targets)
-    if not np.isfinite(regressor.predict(parts.choose.features)).all():
-        raise InputError(f"{regressor.kind} did not converge: change its settings in the spec")
+        machine.fit(shown, parts.train.targets)
+    if not np.isfinite(reader.predict(parts.choose.features)).all():
+        raise InputError(f"{reader.kind} did not converge: change its settings in the spec")
     progress(1, 1)
 
 
@@ -150,9 +153,13 @@ def _thirds(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
     return data.rows(place == 0), data.rows(place == 1), data.rows(place == 2)
 
 
-def _together(estimator: Calibrated, data: Dataset, prior: Known, driven: Driven) -> Together:
+def _together(
+    estimator: Calibrated, data: Dataset, prior: Known, driven: Driven, per_row: bool
+) -> Together:
+    """What joining rows takes; where they have no one value, the interval of one row alone."""
     mean, std = estimator.predict(data.features)
-    return together(mean, covariances(std, estimator.correlation), data, prior, driven)
+    covariance = covariances(std, estimator.correlation)
+    return (unjoined if per_row else together)(mean, covariance, data, prior, driven)
 
 
 def _set_scores(

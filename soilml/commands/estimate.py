@@ -181,7 +181,7 @@ def _stacked(estimates: list[Estimate]) -> Estimate:
         key: np.stack([getattr(e, key) for e in estimates])
         for key in ("mean", "std", "covariance", "low", "high", "in_range")
     }
-    return Estimate(names=first.names, units=first.units, prior_std=first.prior_std, **parts)
+    return Estimate(names=first.names, units=first.units, prior=first.prior, **parts)
 
 
 def _worth(estimate: Estimate, what: str, hint: str) -> list[str]:
