@@ -144,18 +144,21 @@ class Estimator:
             parts = (single.mean[0], single.covariance[0], single.std[0], sound[0])
             return self._estimate(*parts, self.together.alone)
         if sound.sum() < LEAST_SOUND * sound.size:
-            return self._unknown()
+            return self.unknown()
         rule = self.together.rule({name: values[sound] for name, values in measured.items()})
         joint = answered(single.mean[sound], single.covariance[sound], self.prior, rule)
         if bool((joint.doubt > self.together.doubt).any()):
-            return self._unknown()
+            return self.unknown()
         std = np.sqrt(np.diag(joint.covariance))
         return self._estimate(joint.mean, joint.covariance, std, np.asarray(True), rule.reach)
 
-    def _unknown(self) -> Estimate:
-        """The prior, flagged."""
-        mean, std = self.prior.mean, self.prior.std
-        return self._estimate(mean, np.diag(std**2), std, np.asarray(False), self.together.alone)
+    def unknown(self, *shape: int) -> Estimate:
+        """What is known where nothing was measured: the prior, flagged as out of range."""
+        prior, q = self.prior, len(self.names)
+        mean, std = (np.broadcast_to(x, (*shape, q)).copy() for x in (prior.mean, prior.std))
+        covariance = np.broadcast_to(np.diag(prior.std**2), (*shape, q, q)).copy()
+        flag = np.zeros(shape, dtype=bool)
+        return self._estimate(mean, covariance, std, flag, self.together.alone)
 
     def _estimate(
         self,

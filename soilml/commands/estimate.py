@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.combined import ACROSS_FILES, PRIOR_ONCE, fused_estimates
 from soilml.commands.identify import add_row_options, chosen_rows
 from soilml.commands.output import deliver
 from soilml.errors import InputError, TableError
@@ -18,26 +19,29 @@ from soilml.estimate import Estimate
 from soilml.needs import need
 from soilml.onboard import LEAST_SOUND, Estimator
 from soilml.quantities import QUANTITIES, column
-from soilml.reading import RUNS
+from soilml.reading import FILLED, RUNS
 from soilml.saving import named
 from soilml.table import Table
 
 #: Share of the prior's width above which an estimate is mostly the prior.
 VAGUE = 0.8
 
-HELP = "soil parameters from measured rows, by a trained model file"
+HELP = "soil parameters or slip from measured rows, by a trained model file"
 DESCRIPTION = """\
-Estimate soil parameters with MODEL.onnx, just as the onboard runtime does.
+Estimate soil parameters, or slip, with MODEL.onnx, just as the onboard runtime does.
 
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
+  soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Each row gets a mean, a standard deviation and a 90 % interval (_p05, _p95) of every parameter, and
 in_range: 0 where the readings are unlike anything that the model was trained on; the answer is then
 the prior. One row brings one equation for three unknowns, so its estimate is mostly the prior; with
 --by run, all rows of a run are joined, which can say far more; rows that contradict each other, or
 of which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
-estimate, and so does one whose status is not ok. Needs numpy and onnxruntime alone.
+estimate, and so does one whose status is not ok. --with fuses files that estimate the same from
+other sensors, row by row: a file whose reading is blank, or out of range, takes no part, and
+`files` says how many did. Slip differs from row to row: no --by. Needs numpy and onnxruntime alone.
 """
 
 
@@ -46,6 +50,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL.onnx")
     parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
     parser.add_argument("--by", metavar="run", help="one estimate for each value of this column")
+    parser.add_argument(
+        "--with", dest="others", metavar="OTHER.onnx", action="append", default=[], help="fuse with"
+    )
+    parser.add_argument("--rule", help=f"how --with fuses: {', '.join(ACROSS_FILES)}")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the estimates")
 
@@ -58,18 +66,23 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Estimate and deliver the table."""
     need("onnxruntime", "estimate")
-    estimator = Estimator.load(args.model)
-    table = chosen_rows(args, RUNS)
-    _same_wheel(estimator, table)
-    measured = np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0)
-    whole = measured & table.answered
-    if not whole.any():
-        needed = ", ".join(column(n) for n in estimator.inputs)
-        raise TableError(f"{table.source}: no row has all that this model reads: {needed}")
+    estimators = [Estimator.load(file) for file in (args.model, *args.others)]
+    _check_asked(args, estimators)
+    read = {name: column(name) for estimator in estimators for name in estimator.inputs}
+    needed = tuple(key for key in RUNS if key in ("run", *read.values()))
+    filled = [key for key in FILLED if key in needed]
+    table = chosen_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
+    for estimator in estimators:
+        _same_wheel(estimator, table)
+    each = [_measured(estimator, table) & table.answered for estimator in estimators]
+    measured = np.any([_measured(estimator, table) for estimator in estimators], axis=0)
+    if not np.any(each):
+        wanted = ", ".join(column(n) for n in estimators[0].inputs)
+        raise TableError(f"{table.source}: no row has all that this model reads: {wanted}")
     if args.by is None:
-        columns, said = _row_by_row(estimator, table, whole)
+        columns, said = _row_by_row(estimators, table, each, args.rule or PRIOR_ONCE)
     else:
-        columns, said = _by(estimator, table, whole, args.by)
+        columns, said = _by(estimators[0], table, each[0], args.by)
     deliver(columns, args.out)
     said += _left_out(table, ~measured, "lack a reading")
     said += _left_out(table, measured & ~table.answered, "have a status that is not ok")
@@ -86,24 +99,65 @@ def _left_out(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
     return [f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}"]
 
 
+def _check_asked(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` where the options do not go together."""
+    if args.rule is not None and not args.others:
+        raise InputError("--rule says how --with fuses; give --with OTHER.onnx")
+    if args.by is not None and args.others:
+        raise InputError("--with fuses row by row; leave out --by")
+    if args.by is not None and estimators[0].per_row:
+        raise InputError(
+            f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
+            "a run; leave out --by"
+        )
+
+
+def _measured(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
+    """Rows that have all that the model reads."""
+    return np.asarray(np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0))
+
+
 def _row_by_row(
-    estimator: Estimator, table: Table, whole: NDArray[np.bool_]
+    estimators: list[Estimator], table: Table, each: list[NDArray[np.bool_]], rule: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """A line for every row; blank where a reading is missing."""
-    estimate = estimator(**_readings(estimator, table.rows(whole)))
+    """A line for every row; blank where no model has all that it reads."""
+    estimates = [_of_rows(*parts, table) for parts in zip(estimators, each, strict=True)]
+    whole = np.any(each, axis=0)
+    inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
     columns: dict[str, Any] = {"run": table["run"]}
-    columns |= {column(name): table[column(name)] for name in estimator.inputs}
-    place = np.where(whole, np.cumsum(whole) - 1, 0)
+    columns |= {column(name): table[column(name)] for name in inputs}
+    estimate, files = estimates[0], None
+    if len(estimators) > 1:
+        combined = fused_estimates(estimates, rule)
+        estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in _answers(estimate).items():
-        columns[key] = np.where(whole, values[place], np.nan)
-    columns["in_range"] = whole & estimate.in_range[place]
-    said = _worth(estimate, "one row alone", "join rows with --by run")
-    outside = int(np.count_nonzero(~estimate.in_range))
+        columns[key] = np.where(whole, values, np.nan)
+    columns["in_range"] = whole & estimate.in_range
+    hint = "join rows with --by run"
+    if files is not None:
+        columns["files"] = files
+    if estimators[0].per_row:
+        hint = "measure with other sensors too, or train for soil that is better known,"
+    said = _worth(estimate, "one row alone", hint)
+    outside = int(np.count_nonzero(whole & ~estimate.in_range))
     if outside:
         said.append(
-            f"{outside} of {estimate.in_range.size} rows are out of range: theirs is the prior"
+            f"{outside} of {int(whole.sum())} rows are out of range: theirs is the prior"
+            if files is None
+            else f"{outside} of {int(whole.sum())} rows are out of range, or the files contradict "
+            "each other there: theirs is the prior"
         )
     return columns, said
+
+
+def _of_rows(estimator: Estimator, whole: NDArray[np.bool_], table: Table) -> Estimate:
+    """An estimate for every row: out of range where it is not whole."""
+    found = estimator.unknown(len(table))
+    if whole.any():
+        estimate = estimator(**_readings(estimator, table.rows(whole)))
+        for key in ("mean", "std", "covariance", "low", "high", "in_range"):
+            getattr(found, key)[whole] = getattr(estimate, key)
+    return found
 
 
 def _by(

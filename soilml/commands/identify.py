@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from soilml.case import read_case
@@ -14,7 +14,7 @@ from soilml.commands.output import put, watched
 from soilml.errors import FitError, InputError
 from soilml.identification.fit import Fit
 from soilml.needs import need
-from soilml.reading import RUNS, read_table
+from soilml.reading import FILLED, RUNS, read_table
 from soilml.saving import named, save_text
 from soilml.table import Table
 from soilml.writing import aligned
@@ -114,9 +114,11 @@ def _by(
     return found, failed
 
 
-def chosen_rows(args: argparse.Namespace, need_columns: tuple[str, ...]) -> Table:
+def chosen_rows(
+    args: argparse.Namespace, need_columns: tuple[str, ...], filled: Sequence[str] = FILLED
+) -> Table:
     """The rows of the table that `--where` leaves."""
-    table = read_table(args.runs, need_columns, ignore_extra=args.ignore_extra)
+    table = read_table(args.runs, need_columns, filled=filled, ignore_extra=args.ignore_extra)
     if args.where is None:
         return table
     name, equals, value = args.where.partition("=")
