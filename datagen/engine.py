@@ -11,13 +11,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datagen.recipe import Recipe
-from datagen.sample import drawn
+from datagen.recipe import VIBRATION, Recipe
+from datagen.sample import Drawn, drawn, of_runs
 from datagen.sensors import reported, true_values
+from datagen.stick_slip import HIDDEN, normal_stiffness
 from soilml.errors import InputError
 from soilml.operating import COVARIATES, Operating
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.saving import replacing
+from soilml.soils import Soil
 from soilml.status import Status
 
 #: Rows of a piece: one row group of the file.
@@ -82,6 +84,7 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
     force = case.model(case.soil, at)
     truth = true_values(rows.slip, rows.load, force)
+    felt = _felt(recipe, block, rows, case.soil, truth)
     readings = reported(recipe, block, np.arange(first, last), rows.run, truth)
     reasons = np.asarray([status.reason for status in Status])
     names = {path: QUANTITIES[path].column if path in QUANTITIES else path for path in rows.soil}
@@ -90,16 +93,31 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
         **readings,
         **{COVARIATES[field]: values for field, values in rows.covariates.items()},
         **{names[path]: values for path, values in rows.soil.items()},
+        **felt,
         "status": reasons[force.status],
     }
 
 
+def _felt(
+    recipe: Recipe, block: int, rows: Drawn, soil: Soil, truth: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Adds what a leg's hub feels to the truth; columns of what it depends on, (n,)."""
+    leg = recipe.stick_slip
+    if leg is None:
+        return {}
+    width = recipe.case.parameters()["gear.width"][1]
+    hidden = leg.hidden(soil, width, of_runs(recipe, block, rows.run, 2, 4))
+    truth[VIBRATION] = leg.vibration(soil, rows.slip, rows.load, hidden, recipe.load.lower)
+    stiffness = np.broadcast_to(normal_stiffness(soil, width), rows.slip.shape)
+    columns = {QUANTITIES["normal_stiffness"].column: stiffness}
+    return columns | {f"stick-slip.{name}": values for name, values in hidden.items()}
+
+
 def _schema(recipe: Recipe) -> pa.Schema:
     probe = piece(recipe, 0, 0, 1)
-    units = {
-        name: COLUMNS[name].unit if name in COLUMNS else recipe.case.parameters()[name][0].unit
-        for name in probe
-    }
+    own = {name: parameter.unit for name, (parameter, _) in recipe.case.parameters().items()}
+    own |= {f"stick-slip.{name}": unit for name, unit in HIDDEN.items()}
+    units = {name: COLUMNS[name].unit if name in COLUMNS else own[name] for name in probe}
     fields = [
         pa.field(
             name,

@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from datagen.stick_slip import StickSlip, take_stick_slip
 from soilml.case import Case, take_case
 from soilml.effects import EFFECTS, Effect
 from soilml.errors import InputError
@@ -23,7 +24,9 @@ from soilml.settings import Settings, read_settings
 #: Columns of [operating], in the order in which they are drawn.
 DRIVEN = ("slip", "load_N")
 #: Columns that a sensor of the rover fills, and that may have noise and bias.
-SENSED = ("slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
+SENSED = ("slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m", "vibration_m_s2")
+#: The sensor that [stick_slip] adds.
+VIBRATION = SENSED[-1]
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Recipe:
     slip: Prior
     load: Prior
     covariates: dict[str, Prior]
+    stick_slip: StickSlip | None
     bias: dict[str, Noise]
     blocks: tuple[Block, ...]
     rows: int
@@ -124,17 +128,25 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
             if field not in covariates:
                 operating.fail(f"{COVARIATES[field]} is missing; the effect {effect.name} needs it")
     operating.finish()
+    stick_slip = None
+    if "stick_slip" in settings:
+        stick_slip = take_stick_slip(settings.table("stick_slip"))
+        if slip.lower < 0.0:
+            operating.fail(f"slip begins at {slip.lower:g}; [stick_slip] is for driving legs")
     bias_settings = settings.table("bias")
     bias = {key: take_noise(bias_settings, key) for key in SENSED if key in bias_settings}
     bias_settings.knows(SENSED)
     bias_settings.finish()
     for key in case.noise.keys() - set(SENSED):
         settings.fail(f"[noise] {key}: no sensor of {COLUMNS[key].text} is simulated")
+    if VIBRATION in (*case.noise, *bias) and stick_slip is None:
+        settings.fail(f"[noise] {VIBRATION}: give [stick_slip], which says how a leg vibrates")
     return Recipe(
         case=case,
         slip=slip,
         load=load,
         covariates=covariates,
+        stick_slip=stick_slip,
         bias=bias,
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),

@@ -58,15 +58,22 @@ def _covariates(recipe: Recipe, block: int, run: NDArray[np.int64]) -> dict[str,
     """Speed, pass and slip angle where the recipe varies them: one draw for each run."""
     if not recipe.covariates:
         return {}
-    count = run[-1] - run[0] + 1
-    u = _sobol(len(recipe.covariates), (recipe.seed, block, 3), int(run[0]), int(count))
-    found = {
-        field: prior.at(u[run - run[0], i])
-        for i, (field, prior) in enumerate(recipe.covariates.items())
-    }
+    u = of_runs(recipe, block, run, len(recipe.covariates), 3)
+    found = {field: prior.at(u[:, i]) for i, (field, prior) in enumerate(recipe.covariates.items())}
     if "pass_number" in found:
         found["pass_number"] = np.round(found["pass_number"])
     return found
+
+
+def of_runs(recipe: Recipe, block: int, run: NDArray[np.int64], count: int, stream: int) -> Floats:
+    """Fractions (n, count), one draw for each run, that do not follow the soil's.
+
+    The same dimension of two scrambled sequences runs together: these take dimensions of their own.
+    """
+    taken = len(recipe.case.prior) + len(DRIVEN) + (stream - 3) * len(recipe.covariates)
+    runs = int(run[-1] - run[0] + 1)
+    u = _sobol(taken + count, (recipe.seed, block, stream), int(run[0]), runs)
+    return u[run - run[0], taken:]
 
 
 def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:

@@ -24,6 +24,8 @@ def reported(
     """
     found = {}
     for place, name in enumerate(SENSED):
+        if name not in truth:
+            continue
         true = truth[name]
         reading = true.copy()
         if name in recipe.case.noise:
