@@ -22,7 +22,9 @@ A recipe is a model file (see README) with, at the top, rows and seed, and
   slip = [0.05, 0.6]      torque_Nm = "1 %"         rows = 8      # rows on one soil
   load_N = [30, 120]      # one draw for each run   share = 1.0   # of all rows
 
-[soil.prior] says which parameters vary, and where. Same recipe and seed, same bytes.
+[soil.prior] says which parameters vary, and where. [stick_slip] adds the vibration of a wheel-leg:
+law ("spring" or "line"), turning (rad/s), foot_mass, ..., and ranges of stiffness (N/m) and
+increment (rad), which follow the soil where left out. Same recipe and seed, same bytes.
 """
 
 

@@ -239,3 +239,50 @@ def test_data_that_lack_a_channel_or_measure_slip_badly_are_refused(folder, tmp_
     generate(read_recipe(tmp_path / "r.toml"), tmp_path / "d.parquet")
     with pytest.raises(InputError, match=r"slip is to be learned, but its column has noise"):
         read_dataset(tmp_path / "d.parquet", ("torque", "load"), ("slip",))
+
+
+@pytest.fixture(scope="module")
+def leg_scores(tmp_path_factory):
+    """Figures of regressors that read one sensor of a wheel-leg each, and of one that reads all."""
+    folder = tmp_path_factory.mktemp("leg")
+    generate(read_recipe("wheel_leg").sized(4000), folder / "d.parquet")
+
+    def of(targets, *read):
+        names = list(dict.fromkeys(name for names in read for name in names.split()))
+        text = f"features = {json.dumps(names)}\ntargets = {json.dumps(targets)}\n"
+        text += "".join(f"{MACHINE}features = {json.dumps(names.split())}\n" for names in read)
+        (folder / "s.toml").write_text(text)
+        spec = read_spec(folder / "s.toml")
+        trained = train(spec, read_dataset(folder / "d.parquet", spec.features, spec.targets))
+        members = [trained.scores[m.regressor.kind].relative for m in trained.members]
+        return np.asarray([*members, trained.scores["estimator"].relative]).T
+
+    return of
+
+
+def test_torque_and_vibration_of_a_leg_say_more_of_slip_than_one_of_them(leg_scores):
+    one = "torque/load load", "vibration load"
+    (shares,) = leg_scores(["slip"], *one)
+    assert shares[-1] < shares[:2].min() < shares[:2].max() < 0.9
+    # what reads both at once tells slip from the soil; joined afterwards they cannot
+    (at_once,) = leg_scores(["slip"], "torque/load load vibration")
+    assert at_once[-1] < shares[-1]
+
+
+def test_sinkage_tells_stiffness_and_torque_and_vibration_tell_friction(leg_scores):
+    """Comin and Saaj 2017, section IV-B: sinkage for load bearing, slip models for shear."""
+    friction, stiffness = leg_scores(
+        ["friction_angle", "normal_stiffness"],
+        "slip load torque/load",
+        "slip load vibration",
+        "load sinkage",
+    )
+    assert friction[:2].max() < 0.85 < 0.95 < friction[2]
+    assert stiffness[2] < 0.4 < 0.8 < stiffness[:2].min()
+    assert friction[3] < friction[:3].min() and stiffness[3] < stiffness[:2].min()
+
+
+@pytest.mark.parametrize("name", ["slip", "slip_torque", "slip_vibration", "leg_soil"])
+def test_packaged_specs_are_found_by_name(name):
+    spec = read_spec(name)
+    assert spec.per_row == name.startswith("slip") and spec.regressors

@@ -14,17 +14,17 @@ DESCRIPTION = """\
 Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not learn from, export it.
 
   soilml train spec.toml data.parquet wheel.onnx
-  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear
+  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip, ...
 
 Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
 
   features = ["slip", "torque/load", "load"]     # measured quantities, or ratios of them
-  targets = ["cohesion", "friction_angle", "shear_modulus"]        # what the recipe varies
+  targets = ["cohesion", "friction_angle", "shear_modulus"]        # what the recipe varies, or slip
   rule = "best-linear"                           # or covariance-intersection, inverse-variance, ...
   seed = 0
   [[regressor]]                                  # one or more; several are fused
   type = "fixed-size-lssvm"                      # centres, gamma, width (chosen where left out)
-  centres = 150
+  centres = 150                                  # features = [...]: some of the spec's alone
   [[regressor]]
   type = "mlp"                                   # hidden = [64, 64], epochs, batch, patience, ...
   [[regressor]]
