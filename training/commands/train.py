@@ -14,7 +14,7 @@ DESCRIPTION = """\
 Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not learn from, export it.
 
   soilml train spec.toml data.parquet wheel.onnx
-  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip, ...
+  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip ...
 
 Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
 
