@@ -23,8 +23,8 @@ A recipe is a model file (see README) with, at the top, rows and seed, and
   load_N = [30, 120]      # one draw for each run   share = 1.0   # of all rows
 
 [soil.prior] says which parameters vary, and where. [stick_slip] adds the vibration of a wheel-leg:
-law ("spring" or "line"), turning (rad/s), foot_mass, ..., and ranges of stiffness (N/m) and
-increment (rad), which follow the soil where left out. Same recipe and seed, same bytes.
+ranges of stiffness (N/m) and of drop (share of the friction angle that sliding soil loses), turning
+(rad/s), foot_mass, ...; or law = "line" alone. Same recipe and seed, same bytes.
 """
 
 

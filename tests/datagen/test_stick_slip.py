@@ -12,6 +12,7 @@ from datagen.sample import drawn
 from datagen.stick_slip import normal_stiffness
 from soilml import read_table, soil
 from soilml.errors import InputError
+from soilml.wheel_legs.slip_models import spring_soil
 from soilml.wheel_legs.stick_slip import GRAVITY, SpringLeg, amplitude
 
 RECIPE = """\
@@ -38,8 +39,13 @@ kphi = [300e3, 900e3]
 slip = [0.0, 0.6]
 load_N = [15.0, 35.0]
 [stick_slip]
+stiffness = [3500, 4500]
+drop = [0.2, 0.3]
 turning = 3.0
 """
+STICK_SLIP = "[stick_slip]" + RECIPE.partition("[stick_slip]")[2]
+LINE = RECIPE.partition("stiffness =")[0] + 'law = "line"\n'
+LINE = LINE.replace("[0.5, 0.75]", "[0.5, 0.7]").replace("900e3", "600e3")
 
 
 def recipe(tmp_path, text=RECIPE, rows=400):
@@ -62,25 +68,26 @@ def test_the_hub_feels_what_the_spring_says(tmp_path):
 
 
 def test_the_line_of_the_tests_gives_its_slip_back(tmp_path):
-    """Comin and Saaj 2017, eq. 24 with the linear parameters of table V, a in g."""
-    made = piece(recipe(tmp_path, RECIPE + 'law = "line"\n'), 0, 0, 200)
-    a, drop = made["vibration_m_s2"] / GRAVITY, made["stick-slip.increment"]
+    """Comin and Saaj 2017, eq. 24 with the linear parameters of table V; degrees and g."""
+    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    a, drop = made["vibration_m_s2"] / GRAVITY, np.rad2deg(made["stick-slip.increment"])
     slip = -0.882 + 0.022 * drop + (6.609 - 0.156 * drop) * a
     np.testing.assert_allclose(slip, made["slip"], atol=1e-9)
 
 
-def test_leg_and_drop_of_friction_follow_the_soil(tmp_path):
-    """Comin and Saaj 2017, eq. 28 with table VII, in kN/m and N/cm^2."""
-    made = piece(recipe(tmp_path, RECIPE + "scatter = 0.0\n"), 0, 0, 200)
-    k, drop = made["stick-slip.stiffness"] / 1e3, made["stick-slip.increment"]
-    free = drop < 0.94 * made["friction_angle_rad"]
-    assert free.mean() > 0.9
-    angle, sigma = -0.76 + 0.35 * k + 0.03 * drop, -0.2 - 0.81 * k + 13.45 * drop
-    np.testing.assert_allclose(angle[free], made["friction_angle_rad"][free], rtol=1e-9)
-    np.testing.assert_allclose(1e4 * sigma[free], made["normal_stiffness_Pa"][free], rtol=1e-9)
-    loose = piece(recipe(tmp_path, RECIPE + "scatter = 0.1\n"), 0, 0, 400)
-    factor = loose["stick-slip.stiffness"][:200] / made["stick-slip.stiffness"] - 1.0
-    assert factor.std() == pytest.approx(0.1, rel=0.1)
+def test_with_the_line_leg_and_drop_of_friction_follow_the_soil(tmp_path):
+    """Comin and Saaj 2017, eq. 28 with table VII."""
+    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    found = spring_soil(made["stick-slip.increment"], made["stick-slip.stiffness"])
+    np.testing.assert_allclose(found[0], made["friction_angle_rad"], rtol=1e-9)
+    np.testing.assert_allclose(found[1], made["normal_stiffness_Pa"], rtol=1e-9)
+
+
+def test_a_line_without_slope_is_refused(tmp_path):
+    steep = LINE.replace("[0.5, 0.7]", "[0.5, 0.9]").replace("600e3", "900e3")
+    with pytest.raises(InputError, match="slip no longer follows vibration"):
+        generate(recipe(tmp_path, steep), tmp_path / "d.parquet")
+    assert not (tmp_path / "d.parquet").exists()
 
 
 def test_stiffness_a_centimetre_deep_is_that_of_the_catalogue_s_soils():
@@ -90,18 +97,17 @@ def test_stiffness_a_centimetre_deep_is_that_of_the_catalogue_s_soils():
         assert float(sigma) / 1e4 == pytest.approx(printed, rel=0.25)
 
 
-def test_ranges_of_one_s_own_are_kept_and_do_not_follow_the_soil(tmp_path):
-    own = RECIPE + "stiffness = [3000, 5000]\nincrement = [0.1, 0.3]\n"
-    made = piece(recipe(tmp_path, own, 2000), 0, 0, 2000)
-    for key, low, high in (("stiffness", 3000, 5000), ("increment", 0.1, 0.3)):
-        values = made[f"stick-slip.{key}"]
+def test_what_is_unknown_of_a_leg_fills_its_range_and_does_not_follow_the_soil(tmp_path):
+    made = piece(recipe(tmp_path, rows=2000), 0, 0, 2000)
+    drop = made["stick-slip.increment"] / made["friction_angle_rad"]
+    for values, low, high in ((made["stick-slip.stiffness"], 3500, 4500), (drop, 0.2, 0.3)):
         assert low <= values.min() < low + 0.01 * (high - low) and values.max() <= high
         for other in ("friction_angle_rad", "kphi_SI", "slip", "load_N"):
             assert abs(np.corrcoef(values, made[other])[0, 1]) < 0.05
 
 
 def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
-    for text in (RECIPE, RECIPE + "stiffness = [2000, 9000]\nincrement = [0.1, 0.3]\n"):
+    for text in (RECIPE, RECIPE.replace("[3500, 4500]", "[1500, 9000]"), LINE):
         made = recipe(tmp_path, text)
         whole, part = piece(made, 0, 0, 200), piece(made, 0, 150, 163)
         np.testing.assert_allclose(
@@ -131,14 +137,16 @@ def test_speed_and_other_draws_of_a_run_do_not_follow_the_soil(tmp_path):
     ("old", "new", "said"),
     [
         ("turning = 3.0", 'law = "magic"', "law is 'magic'; there are: spring, line"),
-        ("turning = 3.0", "stiffness = [3000, 5000]", "give both stiffness and increment"),
+        ("drop = [0.2, 0.3]", "", "drop is missing"),
+        ("drop = [0.2, 0.3]", "drop = [20, 30]", "shares of the friction angle"),
+        ("stiffness = [3500, 4500]", "stiffness = [5, 4500]", "stiffness is 5"),
+        ("turning = 3.0", 'law = "line"', "unknown key 'stiffness'"),
         ("turning = 3.0", "turn = 3.0", "did you mean 'turning'"),
         ("turning = 3.0", "turning = -1.0", "turning is -1"),
-        ("turning = 3.0", "scatter = 2.0", "share between 0 and 0.5"),
         ("turning = 3.0", "hub_mass = 3.0", "unknown key 'hub_mass'"),
         ("slip = [0.0, 0.6]", "slip = [-0.1, 0.6]", "is for driving legs"),
-        ("[stick_slip]\nturning = 3.0", "[noise]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
-        ("[stick_slip]\nturning = 3.0", "[bias]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
+        (STICK_SLIP, "[noise]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
+        (STICK_SLIP, "[bias]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
     ],
 )
 def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
