@@ -13,8 +13,10 @@ from soilml.case import Case
 from soilml.errors import FitError, InputError
 from soilml.identification import CLOSED_FORM, METHODS, identify
 from soilml.onboard import Estimator
+from soilml.parameters import declared
 from soilml.prior import Prior
 from soilml.quantities import CHANNELS, column
+from soilml.soils import Soil
 from soilml.table import Table
 from training.score import HALF
 
@@ -75,6 +77,12 @@ def compare(
     for label, estimator in estimators.items():
         if estimator.names != names:
             raise InputError(f"{label} estimates {estimator.names}, {first.path} {names}")
+    for name in names:
+        if name not in declared(Soil):
+            raise InputError(
+                f"{first.path} estimates {name}, which no analytic method finds; compare is for "
+                f"{', '.join(declared(Soil))}"
+            )
     prior = [case.prior.get(n) or Prior(lo, hi) for n, lo, hi in _ranges(first)]
     table = _usable(table, names)
     lines = []

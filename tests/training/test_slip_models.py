@@ -190,6 +190,16 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     assert "column drawbar_pull_N is missing" in capsys.readouterr().err
 
 
+def test_slip_is_not_compared_with_methods_that_find_soil(trained, folder, tmp_path, capsys):
+    model = RECIPE.format(rows=1, seed=1, soil=KNOWN).partition("[operating]")[0]
+    (tmp_path / "m.toml").write_text(model.replace("rows = 1\nseed = 1\n", ""))
+    command = ["compare", str(tmp_path / "m.toml"), str(folder / "known.parquet")]
+    command += [str(trained(TORQUE + MACHINE)[1]), "--out", str(tmp_path / "o")]
+    assert main(command) == 2
+    assert "estimates slip, which no analytic method finds" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
+
+
 def test_soil_can_be_learned_without_slip_and_is_joined_over_the_load_alone(folder, tmp_path):
     blocks = "[[runs]]\nrows = 1\nshare = 0.6\n[[runs]]\nrows = 8\nshare = 0.4\n"
     (tmp_path / "r.toml").write_text(RECIPE.format(rows=3000, seed=4, soil=UNKNOWN) + blocks)
