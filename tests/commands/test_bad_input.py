@@ -84,7 +84,10 @@ OTHERS = {
         ["simulate", "model.toml", "--slip", "0.1", "--load", "9", "--out", "o.parquet"],
         "name it ....csv",
     ),
-    "no such spec": (["train", "fusd", "good.parquet", "o.onnx"], "fused, linear, lssvm, mlp"),
+    "no such spec": (
+        ["train", "fusd", "good.parquet", "o.onnx"],
+        "fused, leg_soil, linear, lssvm, mlp, slip",
+    ),
     "misspelt key": (["simulate", "typo.toml", "--slip", "0.1", "--load", "9"], "'raduis'"),
     "another wheel": (
         ["compare", "small.toml", "good.parquet", "good.onnx", "--out", "o"],
