@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.case import Case
 from soilml.effects import EFFECTS
+from soilml.effects.base import suits
 from soilml.gap.cells import cells_of
 from soilml.gap.predict import linearised, predicted, soil_axis
 from soilml.gap.signatures import signatures
@@ -19,7 +20,8 @@ from soilml.table import Table
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     """The effect that each baseline names, '' where it sees no gap."""
     cells = cells_of(case, table)
-    known, _ = signatures(soil_only, cells, EFFECTS)
+    effects = {name: e for name, e in EFFECTS.items() if suits(e, case.model.gear)}
+    known, _ = signatures(soil_only, cells, effects)
     y = predicted(soil_only, [], np.zeros((1, 0)), cells)[0]
     r = (cells.reading - y) / cells.std
     g = np.stack([s.column for s in known], axis=1) / cells.std[:, None]

@@ -40,9 +40,8 @@ class Model:
         if any(effect.name == other.name for other in self.effects):
             raise InputError(f"the model has the effect {effect.name!r} already")
         if not suits(effect, self.gear):
-            raise InputError(
-                f"the effect {effect.name} is one of rigid wheels, not of {self.gear.name}"
-            )
+            kind = "tracks" if effect.about.track else "rigid wheels"
+            raise InputError(f"the effect {effect.name} is one of {kind}, not of {self.gear.name}")
         return replace(self, effects=(*self.effects, effect))
 
     def __call__(self, soil: Soil, at: Operating) -> Force:

@@ -12,6 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Array, namespace
+
 Nodes = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -34,3 +36,13 @@ def gauss(count: int) -> Nodes:
     """Fractions in (0, 1) and weights of Gauss-Legendre."""
     x, weight = np.polynomial.legendre.leggauss(count)
     return (x + 1.0) / 2.0, weight / 2.0
+
+
+def columns(nodes: Nodes, like: Array) -> tuple[Array, Array]:
+    """Nodes and weights as columns (count, 1) of the array library of `like`."""
+    xp = namespace(like)
+    x, weight = nodes
+    return (
+        xp.asarray(x[:, None], dtype=like.dtype, device=like.device),
+        xp.asarray(weight[:, None], dtype=like.dtype, device=like.device),
+    )

@@ -24,6 +24,7 @@ from soilml.effects.small_wheel_stiffness import SmallWheelStiffness
 from soilml.effects.stress_shift import StressShift
 from soilml.effects.torque_gain import TorqueGain
 from soilml.effects.torque_offset import TorqueOffset
+from soilml.effects.track_grousers import TrackGrousers
 from soilml.effects.wheel_flexibility import WheelFlexibility
 
 #: Effect by the name that `[[effect]] name` takes in a model file.
@@ -32,6 +33,7 @@ EFFECTS: dict[str, type[Effect]] = {
     for effect in (
         SlipSinkage,
         Grousers,
+        TrackGrousers,
         Bulldozing,
         ExitAngle,
         StressShift,
@@ -84,5 +86,6 @@ __all__ = [
     "StressShift",
     "TorqueGain",
     "TorqueOffset",
+    "TrackGrousers",
     "WheelFlexibility",
 ]

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 from soilml.arrays import Array
 from soilml.errors import InputError
 from soilml.gears.rim import RigidWheel
+from soilml.gears.track import Track
 from soilml.operating import COVARIATES
 
 T = TypeVar("T")
@@ -57,6 +58,8 @@ class EffectCard:
     isolate: str
     #: it changes the arc of a rigid wheel, or needs its radius: for no other gear
     wheel: bool = False
+    #: it sits on the belt of a track: for no other gear
+    track: bool = False
     #: fields of `Operating` that must be given, and must vary for the effect to be found
     needs: tuple[str, ...] = ()
     #: what the runs of one model cannot vary, and a search for missing effects thus cannot test
@@ -73,7 +76,11 @@ class EffectCard:
 
 def suits(effect: Any, gear: Any) -> bool:
     """Whether an effect, or its class, means something for this gear."""
-    return isinstance(gear, RigidWheel) or not effect.about.wheel
+    about = getattr(effect, "about", None)
+    if about is None:
+        return True
+    rigid, track = isinstance(gear, RigidWheel), isinstance(gear, Track)
+    return (rigid or not about.wheel) and (track or not about.track)
 
 
 def covariate(scene: Any, field: str, effect: str) -> Array:

@@ -3,6 +3,7 @@
 from soilml.gears.base import Gear
 from soilml.gears.linear_wheel import LinearWheel
 from soilml.gears.midstance import Midstance
+from soilml.gears.track import Track
 from soilml.gears.wheel import Wheel
 
 #: Gear by the name that `[gear] type` takes in a model file.
@@ -12,7 +13,8 @@ GEARS: dict[str, type[Gear]] = {
         Wheel,
         LinearWheel,
         Midstance,
+        Track,
     )
 }
 
-__all__ = ["GEARS", "Gear", "LinearWheel", "Midstance", "Wheel"]
+__all__ = ["GEARS", "Gear", "LinearWheel", "Midstance", "Track", "Wheel"]

@@ -11,7 +11,7 @@ from soilml.contact import Contact
 from soilml.gears.reversal import reversals
 from soilml.gears.rim import NO_DEPTH, RigidWheel, Rim
 from soilml.operating import Operating
-from soilml.quadrature import Nodes, crowded_ends, crowded_start
+from soilml.quadrature import columns, crowded_ends, crowded_start
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
 #: quadrature.
@@ -69,7 +69,7 @@ class Wheel(RigidWheel):
 def _halves(rim: Rim, at: Operating, count: int) -> Contact:
     """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
     xp = namespace(rim.entry)
-    x, weight = _columns(crowded_start(count), rim.entry)
+    x, weight = columns(crowded_start(count), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
     passed = xp.concat([x * front, (rim.entry - rim.exit) - x * rear], axis=0)
     depth = depth_along(rim, x * front)  # nodes stand alike in both parts: the same pressures
@@ -83,7 +83,7 @@ def _braking(rim: Rim, at: Operating) -> Contact:
     Three of them, or four where the rim reaches behind the axle and it may do so twice.
     """
     xp = namespace(rim.entry)
-    x, weight = _columns(crowded_ends(BRAKING_NODES), rim.entry)
+    x, weight = columns(crowded_ends(BRAKING_NODES), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
     turn, turns = reversals(rim.entry, rim.exit, at.slip)
     halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
@@ -136,14 +136,4 @@ def contact_along(rim: Rim, at: Operating, passed: Array, depth: Array, arc: Arr
         ahead=area * (sin_entry - sin_gone),
         lever=rim.lever,
         width=rim.width,
-    )
-
-
-def _columns(nodes: Nodes, like: Array) -> tuple[Array, Array]:
-    """Nodes and weights as columns of the array library of `like`."""
-    xp = namespace(like)
-    x, weight = nodes
-    return (
-        xp.asarray(x[:, None], dtype=like.dtype, device=like.device),
-        xp.asarray(weight[:, None], dtype=like.dtype, device=like.device),
     )

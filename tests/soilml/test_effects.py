@@ -8,7 +8,7 @@ import pytest
 from conftest import input_box, solved
 
 from soilml import EFFECTS, GEARS, Model, Operating, Status, Wheel, soil
-from soilml.effects.base import KINDS, STAGES
+from soilml.effects.base import KINDS, STAGES, suits
 from soilml.effects.shaped import Shaped
 from soilml.equilibrium import prepared
 from soilml.errors import InputError
@@ -24,10 +24,10 @@ AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0, **KNOWN)
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
 FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
-WHEELS = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
-
-every = pytest.mark.parametrize("name", EFFECTS)
-shaped = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if issubclass(c, Shaped)])
+RIGID = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
+OF_WHEELS = [name for name, effect in EFFECTS.items() if suits(effect, WHEEL.gear)]
+every = pytest.mark.parametrize("name", OF_WHEELS)
+shaped = pytest.mark.parametrize("name", [n for n in OF_WHEELS if issubclass(EFFECTS[n], Shaped)])
 needy = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if c.about.needs])
 
 
@@ -54,7 +54,7 @@ def plain(gear):
     return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
 
 
-@pytest.mark.parametrize("gear", WHEELS)
+@pytest.mark.parametrize("gear", RIGID)
 @every
 def test_neutral_changes_nothing_to_the_last_bit(name, gear):
     box = input_box(128, seed=4)
@@ -64,7 +64,7 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
-@pytest.mark.parametrize("gear", WHEELS)
+@pytest.mark.parametrize("gear", RIGID)
 @every
 def test_finite_over_the_whole_box_or_flagged(name, gear):
     box, known = input_box(512, seed=8), known_to(512)
@@ -117,7 +117,7 @@ def test_answers_change_smoothly_with_the_size(name):
     assert np.abs((coarse - fine) / scale).max() < 1e-4
 
 
-@every
+@pytest.mark.parametrize("name", EFFECTS)
 def test_is_described(name):
     cls = EFFECTS[name]
     card, parameters = cls.about, declared(cls)

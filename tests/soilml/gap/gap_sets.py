@@ -11,6 +11,7 @@ import numpy as np
 from datagen.hidden import draw, matrix
 from soilml.case import Case, read_case
 from soilml.effects import EFFECTS
+from soilml.effects.base import suits
 from soilml.gap import gap
 from soilml.gap.analysis import SCATTER
 from soilml.gap.candidate import Bench
@@ -83,7 +84,8 @@ def bench_of(case, table, scatter=(0.0, 0.0)) -> Bench:
         1e6,
     )
     axes = tuple(soil_axis(f) for f in chosen(case, None))
-    return Bench(case, axes, cells, assembled(cells, columns, known), EFFECTS, {})
+    effects = {name: e for name, e in EFFECTS.items() if suits(e, case.model.gear)}
+    return Bench(case, axes, cells, assembled(cells, columns, known), effects, {})
 
 
 #: The first of its kind in the list of plans, whatever becomes of it: tier, cause, size, noise
