@@ -50,7 +50,7 @@ def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
     x = _clean(signal, "signal", MIRRORED + 1)
     if not (rate > 0.0 and 0.0 < cutoff < 0.5 * rate):
         raise InputError(
-            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie between 0 and half of it"
+            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie between 0 and half that"
         )
     before = 2.0 * x[0] - x[MIRRORED:0:-1]
     after = 2.0 * x[-1] - x[-2 : -MIRRORED - 2 : -1]
@@ -118,7 +118,7 @@ def slip_of_displacements(track: ArrayLike, robot: ArrayLike, span: int) -> Floa
 
 
 def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: float) -> Floats:
-    r"""Sinkage (m) of the rear wheel from two laser distances (m) and the robot's inclination (rad).
+    r"""Sinkage (m) of the rear wheel from two laser distances (m) and the inclination (rad).
 
     .. math:: z_r = l_r + L \sin\delta - l_f
 
@@ -146,8 +146,8 @@ def rut_mean(crest: ArrayLike, bottom: ArrayLike, crest_length: float, pitch: fl
     _alike(crest=upper, bottom=lower)
     if not 0.0 <= crest_length <= pitch or pitch <= 0.0:
         raise InputError(
-            f"crest_length is {crest_length:g} m with a pitch of {pitch:g} m; it must lie between 0 "
-            "and the pitch"
+            f"crest_length is {crest_length:g} m with a pitch of {pitch:g} m; it must lie between "
+            "0 and the pitch"
         )
     share = crest_length / pitch
     return np.asarray(share * upper + (1.0 - share) * lower)

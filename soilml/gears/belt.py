@@ -10,6 +10,8 @@ from soilml.gears.rim import NO_DEPTH
 from soilml.operating import Operating
 from soilml.quadrature import Nodes, columns
 
+#: Share of the peak pressure about which unloaded soil lets go of the belt (see `held`).
+LETTING_GO = 0.05
 #: The three arcs of the line.
 FRONT, MIDDLE, REAR = range(3)
 
@@ -95,6 +97,20 @@ def sprung(belt: Belt, deepest: Array, height: Array) -> Array:
     return deepest * xp.exp(xp.log(xp.maximum(share, xp.full_like(share, NO_DEPTH))) / belt.n)
 
 
+def held(belt: Belt, deepest: Array, height: Array) -> Array:
+    r"""Share of the shear displacement that soil unloaded by this height still has.
+
+    .. math:: 1 - e^{-\sigma / (0.05 \sigma_u)}
+
+    1 but for the last few per cent of the pressure, 0 where the belt does not touch: without it
+    cohesion would end all at once there, and the pull would have no derivative where the belt is
+    about to lift off. Ours.
+    """
+    xp = namespace(height)
+    share = 1.0 - height / (belt.rebound * deepest)
+    return -xp.expm1(-xp.maximum(share, xp.zeros_like(share)) / LETTING_GO)
+
+
 def stretch(
     belt: Belt,
     at: Operating,
@@ -113,8 +129,12 @@ def stretch(
     start, end = ends
     inclination = start + (end - start) * x
     height = raised(belt, arc, inclination)
+    along, ahead = gone(belt, arc, inclination)
+    sheared = along - (1.0 - at.slip) * ahead
     if deepest is not None:
-        depth = sprung(belt, deepest, height - (belt.sinkage - deepest))
+        risen = height - (belt.sinkage - deepest)
+        depth = sprung(belt, deepest, risen)
+        sheared = sheared * held(belt, deepest, risen)
     elif arc == FRONT:  # as a product: near the entry a difference would lose its digits
         sin_half = xp.sin(0.5 * (belt.entry - inclination)) * xp.sin(
             0.5 * (belt.entry + inclination)
@@ -123,10 +143,9 @@ def stretch(
     else:
         depth = belt.sinkage - height
     area = belt.width * arc_radius(belt, arc) * xp.abs(end - start) * weight
-    along, ahead = gone(belt, arc, inclination)
     return Contact(
         depth=xp.maximum(depth, xp.full_like(depth, NO_DEPTH)),
-        sheared=along - (1.0 - at.slip) * ahead,
+        sheared=sheared,
         rolled=along,
         area=area,
         up=area * xp.cos(inclination),

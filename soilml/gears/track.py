@@ -10,11 +10,11 @@ import numpy as np
 from soilml.arrays import Array, Real, namespace, to_numpy
 from soilml.contact import Contact
 from soilml.errors import InputError
-from soilml.gears.belt import FRONT, MIDDLE, REAR, Belt, gone, raised, sprung, stretch, top
+from soilml.gears.belt import FRONT, MIDDLE, REAR, Belt, gone, held, raised, sprung, stretch, top
 from soilml.gears.rim import NO_DEPTH
 from soilml.operating import Operating
 from soilml.parameters import Parameter
-from soilml.quadrature import columns, crowded_ends, crowded_start, gauss
+from soilml.quadrature import crowded_ends, crowded_start, gauss
 from soilml.soils.base import Soil
 
 #: Nodes of the arc that enters the soil, of the middle arc, and of each short stretch; their
@@ -39,13 +39,14 @@ class Track:
     with alpha the inclination of the belt. The soil is loaded along k z^n under the front wheel as
     far as z_1, springs back and is loaded again along k_u (`belt.sprung`), and follows k z^n again
     where the rear wheel presses it deeper. Where the belt rises so far that no pressure is left it
-    does not touch, and there is no shear either. References: Wang, Yan and Du, J. Terramechanics
-    77, 2018, eqs. 1-9; Okello, Watany and Crolla, J. agric. Engng Res. 69, 1998. The load that a
-    row gives is that of one track. The trim angle comes from the balance of displacements, so that
-    the robot's centre of mass and its hitch are those which that trim needs; tensions at the joints
+    does not touch, and there is no shear either (`belt.held`). Load and forces are those of one
+    track. References: Wang, Yan and Du, J. Terramechanics 77, 2018, eqs. 1-9; Okello, Watany and
+    Crolla, J. agric. Engng Res. 69, 1998. The trim angle comes from the balance of displacements,
+    so that the centre of mass and the hitch are those which that trim needs; tensions at the joints
     are inner forces, and the middle arc's tension is the one that its pressure and radius ask for
-    (`soilml.tracked`). Not for belts stiff in bending, road wheels between the end wheels, turning,
-    or soils that a second pass leaves as it is (R_1f = 0 then, and the robot stands level).
+    (`soilml.tracked.robot.balance`). While it brakes, shear turns at places that the nodes do not
+    know: then to about a part in a thousand. Not for belts stiff in bending, road wheels between
+    the end wheels, or turning.
     """
 
     name: ClassVar[str] = "track"
@@ -54,7 +55,7 @@ class Track:
     base: Annotated[Real, Parameter("m", 0.011, 20.0, "L, distance between the axles")]
     leaving: Annotated[
         Real, Parameter("1", 0.001, 0.5, "A_12, angle at which the belt leaves / entry angle")
-    ] = 0.05
+    ] = 0.1
     rear_leaving: Annotated[
         Real, Parameter("1", 0.0, 1.0, "A_22, exit angle of the rear wheel / its entry angle")
     ] = 1.0
@@ -155,15 +156,14 @@ class Track:
         behind = (way >= joints[1]) & (inclination < 0.0)
         before = (way < joints[0]) & (inclination >= 0.0)
         deepest = xp.where(behind, shape.rear + 0.0 * way, shape.sinkage + 0.0 * way)
-        pressed = xp.where(
-            before | (depth > deepest), depth, sprung(shape, deepest, deepest - depth)
-        )
-        touches = pressed > 1e-9 * deepest
+        virgin, risen = before | (depth > deepest), deepest - depth
+        pressed = xp.where(virgin, depth, sprung(shape, deepest, risen))
         sheared = joined(*(a - (1.0 - at.slip) * b for a, b in (gone(shape, *p) for p in parts)))
+        sheared = xp.where(virgin, sheared, sheared * held(shape, deepest, risen))
         none = xp.zeros_like(way)
         return inclination, Contact(
-            depth=xp.where(touches, pressed, none + NO_DEPTH),
-            sheared=xp.where(touches, sheared, none),
+            depth=xp.maximum(pressed, none + NO_DEPTH),
+            sheared=sheared,
             rolled=way,
             area=none,
             up=none,
@@ -191,7 +191,7 @@ def _touching(belt: Belt, at: Operating, entry: int, middle: int, short: int) ->
         (FRONT, (belt.entry, zero), None, crowded_start(entry)),
         (FRONT, (zero, -let_go), first, gauss(short)),
         (MIDDLE, (-belt.leave, -off), first, crowded_ends(middle)),
-        (MIDDLE, (on, anew), first, gauss(middle)),
+        (MIDDLE, (on, anew), first, crowded_ends(middle)),
         (MIDDLE, (anew, belt.meet), None, gauss(short)),
         (REAR, (met, pressed), first, gauss(short)),
         (REAR, (pressed, zero), None, gauss(short)),

@@ -1,8 +1,66 @@
-"""What wang2018 prints, computed."""
+"""What Wang, Yan and Du 2018 print of their tracked robot, computed."""
 
 from __future__ import annotations
 
+import csv
+import math
 from collections.abc import Callable
+from functools import cache, partial
+from importlib import resources
+
+import numpy as np
+
+from soilml.soils import soil
+from soilml.tracked.regression import points_behind
+from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018
+
+#: Slips over which a curve of drawbar pull counts as level.
+LEVEL = np.linspace(0.5, 0.9, 9)
+
+
+@cache
+def plateau(ground: str, *, grousers: bool) -> float:
+    """Mean drawbar pull (N) of the robot over the slips at which its curve is level."""
+    effects = (*((GROUSERS,) if grousers else ()), *BEYOND_PEAK[ground])
+    return float(WANG2018.pull(soil(f"wang2018/{ground}"), LEVEL, effects).mean())
+
+
+@cache
+def printed() -> dict[str, float]:
+    """The numbers of the paper's table of numbers, by key."""
+    text = resources.files("soilml.papers").joinpath("wang2018.csv").read_text("utf-8")
+    return {row["key"]: float(row["published"]) for row in csv.DictReader(text.splitlines())}
+
+
+def averaged(name: str) -> float:
+    """Mean of one parameter over the eight groups as Table 1 prints them, angles in rad."""
+    groups = [
+        v for key, v in printed().items() if key.startswith("table1_") and key.endswith(f"_{name}")
+    ]
+    mean = sum(groups) / len(groups)
+    return math.radians(mean) if name == "friction_angle" else mean
+
+
+def variance_ratio() -> float:
+    """F of a straight line with the printed r2 through the number of points that both imply."""
+    r2 = printed()["regression_r2"]
+    points = round(points_behind(r2, printed()["regression_f"]))
+    return r2 / (1.0 - r2) * (points - 2)
+
+
+def gain(ground: str) -> float:
+    """What grousers add to the plateau, N."""
+    return plateau(ground, grousers=True) - plateau(ground, grousers=False)
+
 
 #: By key of the CSV file of the same name.
-COMPUTED: dict[str, Callable[[], float]] = {}
+COMPUTED: dict[str, Callable[[], float]] = {
+    **{
+        f"sand_{name}": partial(averaged, name)
+        for name in ("n", "friction_angle", "kp", "shear_modulus", "cohesion")
+    },
+    "regression_f": variance_ratio,
+    **{f"{g}_bare": partial(plateau, g, grousers=False) for g in ("sand", "clay")},
+    **{f"{g}_grousers": partial(plateau, g, grousers=True) for g in ("sand", "clay")},
+    **{f"{g}_gain": partial(gain, g) for g in ("sand", "clay")},
+}

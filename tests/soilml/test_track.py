@@ -53,7 +53,9 @@ def walked(track, ground, slip, sinkage, count=100_001):
     peak = k * deepest**ground.n
     away = (deepest - depth) / (track.rebound * np.maximum(deepest, 1e-12))
     sigma = np.maximum(peak * (1.0 - away), 0.0)
-    tau = (ground.cohesion + sigma * np.tan(ground.friction_angle)) * (sigma > 0.0)
+    left = sigma / np.maximum(peak, 1e-9)
+    sheared = np.where(left < 1.0, sheared * (1.0 - np.exp(-left / 0.05)), sheared)
+    tau = ground.cohesion + sigma * np.tan(ground.friction_angle)
     tau = tau * (1.0 - np.exp(-np.abs(sheared) / ground.shear_modulus)) * np.where(slip < 0, -1, 1)
 
     def integral(f):

@@ -1,0 +1,110 @@
+"""A robot on two tracks: its pull, and what holds each track in balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from soilml.effects import Effect, ShearSoftening, TrackGrousers
+from soilml.gears import Track
+from soilml.gears.belt import FRONT, MIDDLE, REAR, gone
+from soilml.model import Model
+from soilml.operating import Operating
+from soilml.soils import Soil
+
+Floats = NDArray[np.float64]
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Two equal track units that carry a mass (kg) together."""
+
+    track: Track
+    mass: float
+
+    @property
+    def load(self) -> float:
+        """What one track carries, N."""
+        return 0.5 * self.mass * GRAVITY
+
+    def pull(self, soil: Soil, slip: ArrayLike, effects: tuple[Effect, ...] = ()) -> Floats:
+        """Drawbar pull (N) of both tracks at these slips; NaN where the soil does not carry."""
+        at = Operating(slip=np.asarray(slip, dtype=np.float64), load=self.load)
+        return np.asarray(2.0 * Model(self.track, effects)(soil, at).drawbar_pull)
+
+
+#: The robot of Wang, Yan and Du 2018: mass as printed. Its tracks are not printed, nor what the
+#: belt and soil do when unloaded; with round numbers that fit into 0.820 m x 0.589 m they are: end
+#: wheels of 0.1 m radius 0.6 m apart, belts 0.08 m wide, and the defaults of `Track`.
+WANG2018 = Robot(Track(radius=0.1, width=0.08, base=0.6), mass=130.0)
+#: Its grousers: 12 mm high as printed, tips on a fifth of the pitch as assumed.
+GROUSERS = TrackGrousers(spacing=0.8, height=0.012)
+#: How the paper's soils shear beyond the peak: eq. 6 has its peak at the printed modulus; loose
+#: sand has no peak, firm clay falls to the usual residual. The ratio is not printed.
+BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
+    "sand": (),
+    "clay": (ShearSoftening(share=1.0, residual=0.7, peak=1.0),),
+}
+
+
+@dataclass(frozen=True)
+class Balance:
+    """How one track stands; arrays of the operating points' shape."""
+
+    front: Any  # share of the load under the front wheel
+    middle: Any  # share under the belt between the wheels
+    rear: Any  # share under the rear wheel
+    trim: Any  # rad, psi, tail down
+    arc_radius: Any  # m, R_t
+    tension: Any  # N, mean tension that the middle arc's pressure and radius ask for
+    gained: Any  # N, what shear adds to the tension from one end of the middle arc to the other
+    centre: Any  # m, centre of pressure behind the middle of the base
+
+
+def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Balance:
+    r"""Shares of the load, tension and centre of pressure of a track at rest.
+
+    .. math::
+        T = b R_t \bar\sigma, \quad \Delta T = b \int \tau \, ds, \quad
+        x = \frac{1}{W} \int (X - x) \, dW
+
+    A belt without stiffness that takes a circular arc has the tension b R_t sigma at every point:
+    with a pressure that changes along the arc no one tension fits, and the mean is given. The trim
+    comes from the balance of displacements; a robot whose centre of mass stands behind the middle
+    of its base by `centre` less (hitch height) DP / W has it. References: Wang et al. 2018,
+    eqs. 3, 8 and 9, in which the tensions at the joints cancel. Raises `InputError` as a model.
+    """
+    assert isinstance(model.gear, Track)
+    track, force = model.gear, model(soil, at)
+    belt = track.shape(force.sinkage, soil, at)
+    profile = model.profile(soil, at, points)
+    ends = [gone(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
+    step = gone(belt, REAR, -belt.exit)[0] / (points - 1)
+    way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
+    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
+    front, rear = way < ends[0][0], way > ends[1][0]
+    middle = ~front & ~rear
+    weight = np.full_like(way, 1.0) * step
+    weight[[0, -1]] *= 0.5
+    load = np.sum(lift * weight, axis=0)
+    ahead = np.cumsum(np.cos(profile.angle) * weight, axis=0)  # behind the entry
+    below_front = track.radius * np.sin(belt.entry)
+    centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
+    length = belt.arc_radius * (belt.leave + belt.meet)
+    return Balance(
+        front=np.sum(lift * weight * front, axis=0) / load,
+        middle=np.sum(lift * weight * middle, axis=0) / load,
+        rear=np.sum(lift * weight * rear, axis=0) / load,
+        trim=belt.trim,
+        arc_radius=belt.arc_radius,
+        tension=track.width
+        * belt.arc_radius
+        * np.sum(profile.normal * weight * middle, axis=0)
+        / length,
+        gained=track.width * np.sum(profile.shear * weight * middle, axis=0),
+        centre=centre - 0.5 * track.base * np.cos(belt.trim),
+    )
