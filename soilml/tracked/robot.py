@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -91,7 +91,8 @@ def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Bala
     weight = np.full_like(way, 1.0) * step
     weight[[0, -1]] *= 0.5
     load = np.sum(lift * weight, axis=0)
-    ahead = np.cumsum(np.cos(profile.angle) * weight, axis=0)  # behind the entry
+    level = np.cos(profile.angle) * step
+    ahead = np.cumsum(level, axis=0) - 0.5 * (level + level[:1])  # behind the entry
     below_front = track.radius * np.sin(belt.entry)
     centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
     length = belt.arc_radius * (belt.leave + belt.meet)
@@ -108,3 +109,34 @@ def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Bala
         gained=track.width * np.sum(profile.shear * weight * middle, axis=0),
         centre=centre - 0.5 * track.base * np.cos(belt.trim),
     )
+
+
+def settled_by_moments(
+    model: Model, soil: Soil, at: Operating, *, behind: float = 0.0, hitch: float = 0.0
+) -> Floats:
+    r"""Settling R_1f at which moments balance about the belt below the middle of the base.
+
+    .. math:: W x(R_{1f}) = W x_m + h \, DP
+
+    with x the centre of pressure, x_m `behind` (m) that of mass behind the middle, h `hitch` (m)
+    the height above the belt at which the payload pulls back. By bisection, to a hundred-thousandth; the shape is
+    that of the operating point, NaN where no settling between 0 and 0.5 balances: a robot whose
+    nose digs in. The trim then follows from the load instead of a constant of the soil. Own
+    derivation; Wang et al. 2018 print no balance of moments.
+    """
+    shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
+    driven = replace(at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape))
+
+    def excess(settling: Floats) -> Floats:
+        assert isinstance(model.gear, Track)
+        there = replace(model, gear=replace(model.gear, settling=settling))
+        need = behind + hitch * there(soil, driven).drawbar_pull / driven.load
+        return np.asarray(balance(there, soil, driven, points=801).centre - need)
+
+    low, high = np.zeros(shape), np.full(shape, 0.5)
+    found = (excess(low) <= 0.0) & (excess(high) >= 0.0)
+    for _ in range(16):
+        middle = 0.5 * (low + high)
+        short = excess(middle) < 0.0
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.where(found, 0.5 * (low + high), np.nan)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from soilml import Model, Operating, soil
-from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance
+from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance, settled_by_moments
 
 SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
 SLIP = np.linspace(0.5, 0.9, 5)
@@ -63,3 +63,18 @@ def test_a_tail_that_settles_moves_the_pressure_back():
         balance(Model(replace(WANG2018.track, settling=s)), SAND, at) for s in (0.0, 0.4)
     )
     assert down.centre > level.centre + 0.01 and down.rear > level.rear
+
+
+def test_a_pull_above_the_ground_sets_the_tail_down():
+    """Sec. 4.1.3: the more it pulls, the more the robot inclines and sinks."""
+    model = Model(WANG2018.track)
+    at = Operating(slip=np.asarray([0.02, 0.1, 0.5]), load=WANG2018.load)
+    level = settled_by_moments(model, SAND, at, behind=0.01)
+    pulled = settled_by_moments(model, SAND, at, behind=0.01, hitch=0.03)
+    assert (pulled > level).all() and (np.diff(pulled) > 0).all()
+    trimmed = Model(replace(WANG2018.track, settling=pulled))
+    force, stands = trimmed(SAND, at), balance(trimmed, SAND, at)
+    expected = 0.01 + 0.03 * force.drawbar_pull / WANG2018.load
+    np.testing.assert_allclose(stands.centre, expected, atol=2e-4)
+    assert (np.diff(force.sinkage * (1.0 + pulled)) > 0).all()
+    assert np.isnan(settled_by_moments(model, SAND, at, behind=-0.3)).all()
