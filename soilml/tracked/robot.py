@@ -119,10 +119,10 @@ def settled_by_moments(
     .. math:: W x(R_{1f}) = W x_m + h \, DP
 
     with x the centre of pressure, x_m `behind` (m) that of mass behind the middle, h `hitch` (m)
-    the height above the belt at which the payload pulls back. By bisection, to a hundred-thousandth; the shape is
-    that of the operating point, NaN where no settling between 0 and 0.5 balances: a robot whose
-    nose digs in. The trim then follows from the load instead of a constant of the soil. Own
-    derivation; Wang et al. 2018 print no balance of moments.
+    the height above the belt at which the payload pulls back. By bisection, to a
+    hundred-thousandth; the shape is that of the operating point, NaN where no settling between 0
+    and 0.5 balances: a robot whose nose digs in. The trim then follows from the load instead of a
+    constant of the soil. Own derivation; Wang et al. 2018 print no balance of moments.
     """
     shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
     driven = replace(at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape))
