@@ -69,18 +69,21 @@ class Groups:
         return tuple(name for name, share in self.left.items() if share > HARDLY)
 
 
-def identified(case: Case, tables: Sequence[Table], free: Sequence[str] = FIVE) -> Groups:
-    """Least squares of each table (`slip`, `load_N`, `drawbar_pull_N`), and of all rows at once.
+def identified(
+    case: Case, tables: Sequence[Table], free: Sequence[str] = FIVE, method: str = "nonlinear"
+) -> Groups:
+    """A fit of each table (`slip`, `load_N`, `drawbar_pull_N`), and one of all rows at once.
 
-    References: Wang et al. 2018, section 4.2, eight groups averaged. Raises `InputError` for fewer
-    than two groups, `FitError` where rows cannot be fitted.
+    `method` is `nonlinear`, least squares as the source has it, or `posterior`. References: Wang
+    et al. 2018, section 4.2. Raises `InputError` for fewer than two groups, `FitError` where rows
+    cannot be fitted.
     """
     if len(tables) < 2:
         raise InputError(f"{len(tables)} groups of data are given; an average needs two or more")
-    fits = tuple(identify(case, table, free) for table in tables)
+    fits = tuple(identify(case, table, free, method) for table in tables)
     names = [name for name in tables[0].columns if all(name in table for table in tables)]
     rows = {name: np.concatenate([table[name] for table in tables]) for name in names}
-    return Groups(fits, identify(case, Table(rows), free))
+    return Groups(fits, identify(case, Table(rows), free, method))
 
 
 def driven(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> Table:

@@ -1,6 +1,8 @@
 """The robot on two tracks: plateaus, balance, tension."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,3 +80,12 @@ def test_a_pull_above_the_ground_sets_the_tail_down():
     np.testing.assert_allclose(stands.centre, expected, atol=5e-5)
     assert (np.diff(stands.trim) > 0).all()
     assert np.isnan(settled_by_moments(model, SAND, at, behind=-0.3)).all()
+
+
+def test_the_lines_on_the_page_run(capsys):
+    page = (Path(__file__).parents[3] / "docs/papers/wang2018.md").read_text()
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    assert np.all(names["force"].status == 0)
+    assert names["stands"].middle > names["stands"].front > names["stands"].rear
+    assert capsys.readouterr().out
