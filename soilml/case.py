@@ -109,7 +109,10 @@ def _filled(cls: type, settings: Settings) -> Any:
         if f.name in settings or f.default is MISSING
     }
     settings.knows(declared(cls))
-    made = cls(**given)
+    try:
+        made = cls(**given)
+    except InputError as error:
+        settings.fail(str(error))
     check(made, f"{settings.where}: ")
     return made
 

@@ -1,0 +1,66 @@
+"""A track in a model file: solved, generated, identified and refused like any gear."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from soilml.cli import main
+
+MODEL = """\
+[gear]
+type = "track"
+radius = 0.1
+width = 0.08
+base = 0.6
+[soil]
+name = "wang2018/clay"
+[soil.prior]
+friction_angle = [0.3, 0.8]
+shear_modulus = { range = [0.005, 0.08], scale = "log" }
+[noise]
+torque_Nm = "1 %"
+drawbar_pull_N = "1 % + 2"
+"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL)
+    return tmp_path / "model.toml"
+
+
+def test_what_is_simulated_is_identified(model, tmp_path):
+    curve, fit = str(tmp_path / "curve.csv"), tmp_path / "fit.json"
+    runs = ["--slip", "0.05:0.6:5", "--load", "300:900:2", "--run", "a", "--out", curve]
+    assert main(["simulate", str(model), *runs]) == 0
+    assert main(["identify", str(model), curve, "--out", str(fit)]) == 0
+    found = json.loads(fit.read_text())["parameters"]
+    assert found["friction_angle"]["value"] == pytest.approx(0.541, rel=1e-4)
+    assert found["shear_modulus"]["value"] == pytest.approx(0.0348, rel=1e-3)
+
+
+def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(model, tmp_path):
+    curve = tmp_path / "curve.csv"
+    runs = ["--slip", "0.2", "--load", "600,1e6", "--out", str(curve)]
+    assert main(["simulate", str(model), *runs]) == 0
+    light, heavy = csv.DictReader(curve.read_text().splitlines())
+    assert light["status"] == "ok" and np.isfinite(float(light["drawbar_pull_N"]))
+    assert "no equilibrium" in heavy["status"] and heavy["drawbar_pull_N"] == ""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("base = 0.6", "base = 0.15", "model.toml [gear]: base is 0.15 m with wheels of radius"),
+        ("base = 0.6\n", "", "model.toml [gear]: base is missing"),
+        ("base = 0.6", "base = 0.6\nleaving = 0.9", "leaving is 0.9; it must lie between"),
+        ("[noise]", '[[effect]]\nname = "grousers"\n[noise]', "grousers is one of rigid wheels"),
+    ],
+)
+def test_a_track_that_cannot_be_is_refused_in_one_line(model, old, new, said, capsys):
+    model.write_text(MODEL.replace(old, new))
+    assert main(["simulate", str(model), "--slip", "0.2", "--load", "600"]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
