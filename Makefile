@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers gap test check models kls1 gap-real bench bench-gap bench-papers clean
+.PHONY: help demo demo-papers gap test check models kls1 gap-real bench bench-gap clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -56,9 +56,6 @@ bench-gap: $(VENV)/.ready ## 1600 sets with hidden effects against gates and bas
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[bench]'
 	@$(BIN)/python bench/gap.py
-
-bench-papers: $(VENV)/.ready ## how often bands of climbing ability hold the truth, ten minutes
-	@$(BIN)/python bench/climbing.py
 
 clean: ## remove the environment and what demo and tests made
 	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import board
 import learning
 import physics
+import systems
 from place import FILE, MARK, ROOT
 
 from soilml.saving import save_text
@@ -87,6 +88,23 @@ def sections(folder: Path) -> list[tuple[str, str, str]]:
     )
     part("Closed-form leave-one-out", "", learning.leave_one_out())
     part("Latency on board", "One thread.", board.latency() + "\n\n" + board.cold_start())
+    part(
+        "Other gears",
+        "50 000 rows each, loads that the gear is made for, side by side.",
+        systems.gears(),
+    )
+    part(
+        "Walking wheel-legs",
+        "Feet none, LTF, SRF, CIF on five legs, and 2, 3 and 6 legs without feet. Goal: a turn "
+        "in under 5 s.",
+        systems.walking(),
+    )
+    part(
+        "Bands of climbing ability",
+        "60 simulated rovers a line whose ground is known, each slope driven four times: share of "
+        "truths inside the 90 % band, error over claimed std (1 is right). Pull at slip 0.4.",
+        systems.climbing(),
+    )
     times = "\n".join(["| | seconds |", "|---|---:|", wall_time("demo"), wall_time("test")])
     part("Wall time", "With the environment made.", times)
     return parts
