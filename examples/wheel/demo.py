@@ -72,7 +72,7 @@ def run() -> None:
         command("identify", model, str(OUT / "log.csv"), "--method", method, "--out", out)
     test = str(OUT / "test.parquet")
     command("generate", "wheel_test", test)
-    command("compare", model, test, *files.values(), "--out", str(OUT), "--analytic-sets", "60")
+    command("compare", model, test, *files.values(), "--out", str(OUT), "--analytic-sets", "30")
     show(log, truth, Estimator.load(files["fused"]))
     print(f"\n{time.perf_counter() - started:.0f} s; pictures: {OUT}/log.png, {OUT}/compare.png")
 
