@@ -101,10 +101,11 @@ def _weighed(u: Floats, logs: Floats, drawn: Floats) -> Population:
 
 def _tempered(logs: Floats, drawn: Floats) -> Floats:
     """Weights of the highest power of the density that enough samples share."""
-    logs = logs - np.max(logs)
+    live = np.isfinite(logs)
+    kept = np.where(live, logs - np.max(logs), 0.0)
 
     def weights(power: float) -> Floats:
-        found = np.where(np.isfinite(logs), np.exp(power * logs), 0.0) / drawn
+        found = live * np.exp(power * kept) / drawn
         return np.asarray(found / found.sum())
 
     if 1.0 / np.sum(weights(1.0) ** 2) >= FITTED:

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 #: Fractions of the posterior below the ends of the interval that is reported.
 INTERVAL = np.asarray([0.05, 0.95])
+#: Effective samples below which neither mean nor spread of the samples mean anything.
+FEWEST = 50.0
 #: Most model evaluations in one call, which bounds memory.
 CELLS = 200_000
 
@@ -96,6 +98,12 @@ def sampled(
     if not np.isfinite(found.evidence):
         raise FitError(
             "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
+        )
+    if found.effective < FEWEST:
+        raise FitError(
+            f"the samples are worth {found.effective:.0f} only, too few for a mean and a spread: "
+            "the rows allow too narrow a part of the prior; try the nonlinear method, or narrow "
+            "[soil.prior]"
         )
     top = found.u[[int(np.argmax(found.weights))]]
     y = stacked(data, predicted(case, free, top, data.at))

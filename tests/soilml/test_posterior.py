@@ -1,11 +1,14 @@
 """The posterior: equal to brute force, calibrated, and never worse than least squares."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from soilml import Operating, identify, read_case
 from soilml.errors import FitError
 from soilml.identification.population import population
+from soilml.noise import Noise
 from soilml.table import Table
 
 SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
@@ -111,3 +114,21 @@ def test_noise_that_nobody_declared_is_asked_for(case):
     table = measured(case, truth, SLIPS, LOADS, seed=1)
     with pytest.raises(FitError, match="declare it in"):
         identify(type(case)(case.model, case.soil, case.prior), table, None, "posterior")
+
+
+def test_a_posterior_too_narrow_to_sample_is_refused_and_never_given_as_certain(case, monkeypatch):
+    monkeypatch.setattr("soilml.identification.population.MOST_ROUNDS", 2)
+    case = replace(case, noise={"torque_Nm": Noise(share=1e-4)})
+    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    table = measured(case, truth, SLIPS, LOADS, seed=1)
+    with pytest.raises(FitError, match="too narrow a part of the prior; try the nonlinear"):
+        identify(case, table, None, "posterior")
+
+
+def test_dead_corners_of_the_prior_are_passed_over_in_silence(recwarn):
+    def cornered(u):
+        near = -0.5 * (((u - 0.7) / 1e-4) ** 2).sum(axis=1)
+        return np.where(u[:, 0] < 0.4, -np.inf, near)
+
+    assert population(cornered, 3).effective > 1000
+    assert not recwarn.list
