@@ -17,6 +17,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import InputError
+
 Floats = NDArray[np.float64]
 
 
@@ -40,6 +42,7 @@ def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = Non
 
     References: Comin and Saaj 2017, eq. 26, for two.
     """
+    _check(std)
     information = std**-2.0
     weights = information / information.sum(axis=0)
     return Fused((weights * mean).sum(axis=0), information.sum(axis=0) ** -0.5, weights)
@@ -53,6 +56,7 @@ def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> Fu
     References: Comin and Saaj 2017, eq. 30, for three. Heuristic: not optimal even for independent
     errors, but less hostage to one understated variance.
     """
+    _check(std)
     m = len(mean)
     variance = std**2
     weights = np.zeros_like(std)
@@ -76,6 +80,7 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     ask for, trade on differences that are mostly noise. References: Bates and Granger, J. Oper.
     Res. Soc. 20(4), 1969. For up to five or six estimators.
     """
+    _check(std)
     m = len(mean)
     R = np.eye(m) if correlation is None else correlation
     best_variance = np.full(std.shape[1:], np.inf)
@@ -105,9 +110,16 @@ def covariance_intersection(mean: Floats, std: Floats, correlation: Floats | Non
 
     References: Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
     """
+    _check(std)
     information = std**-2.0
     weights = information / information.sum(axis=0)
     return Fused((weights * mean).sum(axis=0), information.mean(axis=0) ** -0.5, weights)
+
+
+def _check(std: Floats) -> None:
+    """Raise `InputError` for an estimate that claims to be certain: no other has a weight then."""
+    if not bool(np.all(std > 0.0)):
+        raise InputError(f"a standard deviation is {np.min(std):g}; needed is a number above 0")
 
 
 def shrunk(correlation: Floats, share: float = 0.1) -> Floats:
@@ -125,11 +137,13 @@ def shrunk(correlation: Floats, share: float = 0.1) -> Floats:
 
 #: The rule for regressors of the same measurement: it knows how their errors correlate.
 BEST_LINEAR = "best-linear"
+#: The rule that holds whatever the correlation of the errors.
+COVARIANCE_INTERSECTION = "covariance-intersection"
 
 #: Rule by the name that a training spec takes.
 RULES: dict[str, Callable[..., Fused]] = {
     BEST_LINEAR: best_linear,
-    "covariance-intersection": covariance_intersection,
+    COVARIANCE_INTERSECTION: covariance_intersection,
     "inverse-variance": inverse_variance,
     "pairwise": pairwise,
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from soilml.commands.identify import add_row_options, chosen_rows
 from soilml.commands.output import deliver
 from soilml.errors import InputError, TableError
 from soilml.estimate import Estimate
+from soilml.fusion import COVARIANCE_INTERSECTION
 from soilml.needs import need
 from soilml.onboard import LEAST_SOUND, Estimator
 from soilml.quantities import QUANTITIES, column
@@ -40,8 +42,10 @@ the prior. One row brings one equation for three unknowns, so its estimate is mo
 --by run, all rows of a run are joined, which can say far more; rows that contradict each other, or
 of which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
 estimate, and so does one whose status is not ok. --with fuses files that estimate the same from
-other sensors, row by row: a file whose reading is blank, or out of range, takes no part, and
-`files` says how many did. Slip differs from row to row: no --by. Needs numpy and onnxruntime alone.
+other sensors, row by row, and needs errors that are independent: files that read the same are
+refused but for --rule covariance-intersection. A file whose reading is blank, or out of range,
+takes no part, and `files` says how many did. Slip differs from row to row: no --by. Needs numpy and
+onnxruntime alone.
 """
 
 
@@ -105,11 +109,26 @@ def _check_asked(args: argparse.Namespace, estimators: list[Estimator]) -> None:
         raise InputError("--rule says how --with fuses; give --with OTHER.onnx")
     if args.by is not None and args.others:
         raise InputError("--with fuses row by row; leave out --by")
+    if args.rule != COVARIANCE_INTERSECTION:
+        _check_independent(args, estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
             "a run; leave out --by"
         )
+
+
+def _check_independent(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` where one file reads nothing but what another reads: they err alike."""
+    files = list(zip((args.model, *args.others), estimators, strict=True))
+    for (one, first), (other, second) in combinations(files, 2):
+        shared = set(first.inputs) & set(second.inputs)
+        if len(shared) == min(len(first.inputs), len(second.inputs)):
+            names = ", ".join(column(name) for name in first.inputs if name in shared)
+            raise InputError(
+                f"{one} and {other} both read {names}: their errors are not independent; take one "
+                f"of them, or --rule {COVARIANCE_INTERSECTION}"
+            )
 
 
 def _measured(estimator: Estimator, table: Table) -> NDArray[np.bool_]:

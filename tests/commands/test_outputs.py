@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from conftest import MODEL, RECIPE
@@ -155,3 +156,19 @@ def test_more_rows_than_memory_holds_are_refused(folder, capsys, slip):
     assert main(command) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and len(error) < 400
+
+
+def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(tmp_path, capsys):
+    exported = Path(__file__).parents[2] / "exported"
+    log = tmp_path / "log.csv"
+    log.write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.1\n")
+    command = ["estimate", str(exported / "wheel.onnx"), str(log)]
+    twin = [*command, "--with", str(exported / "wheel.onnx")]
+    for extra in ([], ["--rule", "pairwise"], ["--rule", "inverse-variance"]):
+        assert main([*twin, *extra]) == 2
+        assert "their errors are not independent" in capsys.readouterr().err
+    assert main([*twin, "--rule", "covariance-intersection"]) == 0
+    fused = capsys.readouterr().out.splitlines()[1].split(",")
+    assert main(command) == 0
+    one = capsys.readouterr().out.splitlines()[1].split(",")
+    assert float(fused[5]) == pytest.approx(float(one[5]), rel=1e-4)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from soilml.errors import InputError
 from soilml.fusion import (
     RULES,
     best_linear,
@@ -103,3 +104,10 @@ def test_shrinking_keeps_a_correlation_matrix():
     np.testing.assert_allclose(np.diag(small), 1.0)
     assert np.linalg.eigvalsh(small).min() > np.linalg.eigvalsh(R).min()
     assert shrunk(np.eye(1)).tolist() == [[1.0]]
+
+
+@pytest.mark.parametrize("rule", RULES.values())
+@pytest.mark.parametrize("std", [0.0, np.nan])
+def test_an_estimate_without_an_uncertainty_is_not_fused(rule, std):
+    with pytest.raises(InputError, match="a standard deviation is"):
+        rule(np.array([[1.0], [2.0]]), np.array([[std], [1.0]]))
