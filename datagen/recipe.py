@@ -15,6 +15,7 @@ from datagen.stick_slip import StickSlip, take_stick_slip
 from soilml.case import Case, take_case
 from soilml.effects import EFFECTS, Effect
 from soilml.errors import InputError
+from soilml.gears import Midstance
 from soilml.noise import Noise, take_noise
 from soilml.operating import COVARIATES, MOST_SLIP
 from soilml.prior import Prior, take_prior
@@ -131,6 +132,11 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
     stick_slip = None
     if "stick_slip" in settings:
         stick_slip = take_stick_slip(settings.table("stick_slip"))
+        if not isinstance(case.model.gear, Midstance):
+            settings.fail(
+                f"[stick_slip] is of wheel-legs; [gear] type is {case.model.gear.name!r}, needed "
+                "is 'midstance'"
+            )
         if slip.lower < 0.0:
             operating.fail(f"slip begins at {slip.lower:g}; [stick_slip] is for driving legs")
     bias_settings = settings.table("bias")

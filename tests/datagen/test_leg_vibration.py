@@ -155,6 +155,13 @@ def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_a_wheel_has_no_legs_to_stick_and_slip(tmp_path):
+    gear = RECIPE[RECIPE.index("[gear]") : RECIPE.index("[soil]")]
+    wheel = '[gear]\ntype = "wheel"\nradius = 0.15\nwidth = 0.1\n'
+    with pytest.raises(InputError, match=r"\[stick_slip\] is of wheel-legs; .* 'wheel'"):
+        recipe(tmp_path, RECIPE.replace(gear, wheel))
+
+
 def test_the_packaged_recipe_varies_all_that_the_specs_read(tmp_path):
     made = piece(read_recipe("wheel_leg"), 0, 0, 200)
     assert (made["status"] == "ok").mean() > 0.9
