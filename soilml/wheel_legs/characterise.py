@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 
 #: The slips of a line must spread by this much, in standard deviations of one of them.
 SPREAD = 1.0
+#: An answer so many standard deviations from any soil is none.
+FAR = 3.0
 
 Law = TypeVar("Law", TorqueSlip, VibrationSlip)
 
@@ -55,7 +57,7 @@ def from_torque(
     References: Comin and Saaj 2017, eq. 27. Raises `FitError` where the pairs cannot tell.
     """
     law = _named(model, TORQUE_SLIP)
-    torque, slip = _pairs(torque, slip, "torque")
+    torque, slip = _pairs(torque, slip, "torque", torque_std)
     if law.intercept is None:
         a, b, covariance = _line(torque, slip, law.slip_std, torque_std, "simplified")
     else:
@@ -66,7 +68,7 @@ def from_torque(
         a, covariance = law.intercept, np.diag([0.0, var])
     angle, stiffness = law.soil(a, b)
     turn = np.asarray([law.friction[:0:-1], np.asarray(law.stiffness[:0:-1]) * 1e4])
-    return LegSoil(float(angle), float(stiffness), turn @ covariance @ turn.T)
+    return _possible(LegSoil(float(angle), float(stiffness), turn @ covariance @ turn.T))
 
 
 def from_vibration(
@@ -81,7 +83,7 @@ def from_vibration(
     References: Comin and Saaj 2017, eqs. 27 and 28. Raises `FitError` where the pairs cannot tell.
     """
     law = _named(model, VIBRATION_SLIP)
-    vibration, slip = _pairs(vibration, slip, "vibration")
+    vibration, slip = _pairs(vibration, slip, "vibration", vibration_std)
     if law.assumed is None:
         a, b, covariance = _line(vibration, slip, law.slip_std, vibration_std, "linear")
         found = np.asarray([a, b])
@@ -101,7 +103,7 @@ def from_vibration(
 
     value = of_line(found)
     turn = np.column_stack([of_line(found + step) - value for step in np.eye(len(found))])
-    return LegSoil(float(value[0]), float(value[1]), turn @ covariance @ turn.T)
+    return _possible(LegSoil(float(value[0]), float(value[1]), turn @ covariance @ turn.T))
 
 
 def _named(model: str | Law, catalogue: Mapping[str, Law]) -> Law:
@@ -112,7 +114,7 @@ def _named(model: str | Law, catalogue: Mapping[str, Law]) -> Law:
     return catalogue[model]
 
 
-def _pairs(felt: Floats, slip: Floats, name: str) -> tuple[Floats, Floats]:
+def _pairs(felt: Floats, slip: Floats, name: str, std: float) -> tuple[Floats, Floats]:
     felt, slip = np.atleast_1d(np.asarray(felt, float)), np.atleast_1d(np.asarray(slip, float))
     if felt.ndim != 1 or felt.shape != slip.shape or felt.size == 0:
         raise InputError(
@@ -120,7 +122,26 @@ def _pairs(felt: Floats, slip: Floats, name: str) -> tuple[Floats, Floats]:
         )
     if not (np.isfinite(felt).all() and np.isfinite(slip).all()):
         raise InputError(f"a {name} or a slip is not a number; leave that pair out")
+    if np.abs(slip).max() > 1.0:
+        raise InputError(
+            f"slip is {slip[np.abs(slip).argmax()]:g}; it must lie between -1 and 1, a share and "
+            "not in percent"
+        )
+    if not 0.0 <= std < np.inf:
+        raise InputError(f"{name}_std is {std:g}; needed is a standard deviation, 0 or more")
     return felt, slip
+
+
+def _possible(found: LegSoil) -> LegSoil:
+    """The same; `FitError` where no soil lies within its errors: lines go on where soils end."""
+    angle, stiffness = found.friction_angle, found.normal_stiffness
+    angle_far, stiffness_far = FAR * found.std
+    if not -angle_far <= angle <= 0.5 * np.pi + angle_far or stiffness < -stiffness_far:
+        raise FitError(
+            f"these pairs give a friction angle of {angle:.3g} rad and a stiffness of "
+            f"{stiffness:.3g} Pa, which no soil has: the model does not hold for them"
+        )
+    return found
 
 
 def _line(

@@ -94,3 +94,13 @@ def test_what_makes_no_pair_is_refused():
         from_torque(1.0, 0.1, "magic")
     with pytest.raises(FitError, match="torque of zero"):
         from_torque(0.0, 0.1)
+    with pytest.raises(InputError, match="slip is 20; it must lie between -1 and 1"):
+        from_torque(1.0, 20.0)
+    with pytest.raises(InputError, match="torque_std is nan"):
+        from_torque(1.0, 0.2, torque_std=np.nan)
+
+
+@pytest.mark.parametrize(("torque", "slip"), [(1e9, 0.2), (-1.0, 0.2), (1.0, -0.9)])
+def test_no_answer_is_a_soil_that_cannot_be(torque, slip):
+    with pytest.raises(FitError, match="which no soil has"):
+        from_torque(torque, slip)
