@@ -85,7 +85,7 @@ class WheelLeg:
     def flaw(self) -> str:
         """What makes it no wheel-leg, or nothing."""
         sections = [s for s in (self.leg, self.foot.tip, self.foot.heel) if s is not None]
-        if not 1 <= self.legs <= MOST_LEGS:
+        if self.legs not in range(1, MOST_LEGS + 1):
             return f"{self.legs} legs; the model is for 1 to {MOST_LEGS}"
         if not 0.0 < self.mass < np.inf:
             return f"a mass of {self.mass:g} kg; it must be positive"

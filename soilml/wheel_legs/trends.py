@@ -49,7 +49,7 @@ def gait(walked: Walk) -> Gait:
         mean_sinkage=sinkage.mean(axis=0),
         rms_slip=_rms(slip),
         rms_slip_propelled=np.sqrt(
-            np.sum(np.where(propelled, slip, 0.0) ** 2, axis=0) / np.maximum(propelled.sum(0), 1)
+            np.sum(np.where(slip >= 1.0, 0.0, slip) ** 2, axis=0) / np.maximum(propelled.sum(0), 1)
         ),
         mean_slip=slip.mean(axis=0),
         mean_torque=last.torque.mean(axis=0),

@@ -99,7 +99,7 @@ def walk(
     `height`, m. `fading` is a share of the leg end's speed, see `reaction`. Cases that fail carry
     a status. Raises `InputError` for settings of no simulation.
     """
-    if not (steps >= 100 and turns > 0.0 and fading > 0.0):
+    if not (steps >= 100 and 0.0 < turns < np.inf and fading > 0.0):
         raise InputError(
             f"steps {steps}, turns {turns:g}, fading {fading:g}: a walk needs at least 100 steps "
             "to a turn, and turns and fading above 0"

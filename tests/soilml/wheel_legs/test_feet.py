@@ -62,6 +62,7 @@ def test_legs_stand_evenly_about_the_hub():
     [
         ({"legs": 0}, "0 legs"),
         ({"legs": 7}, "1 to 6"),
+        ({"legs": 2.5}, "2.5 legs"),
         ({"mass": 0.0}, "mass of 0 kg"),
         ({"mass": -1.0}, "must be positive"),
         ({"mass": np.nan}, "mass of nan"),

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from soilml.wheel_legs.feet import wheel_leg
 from soilml.wheel_legs.ground import Ground
-from soilml.wheel_legs.trends import falls_until, feet_compared, legs_compared
+from soilml.wheel_legs.trends import falls_until, feet_compared, gait, legs_compared
+from soilml.wheel_legs.walk import walk
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +72,10 @@ def test_falling_ends_where_a_value_is_not_lower():
     assert falls_until(np.array([3.0, 2.0, 2.0, 1.0])) == 2
     assert falls_until(np.array([1.0, 2.0])) == 1
     assert falls_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
+
+
+def test_a_walk_that_stopped_has_no_figures():
+    stopped = gait(walk(wheel_leg("LTF"), Ground(stiffness=10.0)))
+    assert stopped.status[0] != 0
+    figures = [v for name, v in vars(stopped).items() if name != "status"]
+    assert np.isnan(figures).all()
