@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 #: Samples by which a signal is mirrored at its ends before it is filtered.
 MIRRORED = 9
+#: Lowest cutoff as a share of the rate; below it the filter's coefficients cancel.
+SLOWEST = 1e-5
 #: Blocks into which a signal is cut, and the fewest of them that count as standing still.
 BLOCKS, FEWEST = 40, 8
 #: A block mean this many robust standard deviations from the segment's median is none of it.
@@ -48,9 +50,14 @@ def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
     44(4), 1996, forward-backward filtering.
     """
     x = _clean(signal, "signal", MIRRORED + 1)
-    if not (rate > 0.0 and 0.0 < cutoff < 0.5 * rate):
+    if not (0.0 < rate < math.inf and 0.0 < cutoff < 0.5 * rate):
         raise InputError(
             f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie between 0 and half that"
+        )
+    if cutoff < SLOWEST * rate:
+        raise InputError(
+            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; below {SLOWEST * rate:g} Hz the "
+            "filter loses its digits: take fewer samples first"
         )
     before = 2.0 * x[0] - x[MIRRORED:0:-1]
     after = 2.0 * x[-1] - x[-2 : -MIRRORED - 2 : -1]
@@ -131,6 +138,13 @@ def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: f
         _clean(x, name, 1) for x, name in ((rear, "rear"), (front, "front"), (angle, "angle"))
     )
     _alike(rear=l_r, front=l_f, angle=delta)
+    if not 0.0 < spacing < math.inf:
+        raise InputError(f"spacing is {spacing:g} m; it must be above 0")
+    if np.abs(delta).max() >= 0.5 * math.pi:
+        place = int(np.abs(delta).argmax())
+        raise InputError(
+            f"angle is {delta[place]:g} at sample {place}; needed is an inclination in rad"
+        )
     return np.asarray(l_r + spacing * np.sin(delta) - l_f)
 
 

@@ -109,3 +109,13 @@ def test_bad_signals_are_told_apart():
         slip_of_displacements([0, 1], [0, 1, 2], 1)
     with pytest.raises(InputError, match="crest_length"):
         rut_mean([0.1], [0.1], 0.06, 0.05)
+    with pytest.raises(InputError, match=r"below 0\.001 Hz the filter loses its digits"):
+        low_pass(good, RATE, 1e-9)
+    with pytest.raises(InputError, match="rate of inf Hz"):
+        low_pass(good, np.inf, 5.0)
+    with pytest.raises(
+        InputError, match="angle is 10 at sample 1; needed is an inclination in rad"
+    ):
+        rear_sinkage([1, 2], [1, 2], [0, 10], 0.5)
+    with pytest.raises(InputError, match="spacing is nan"):
+        rear_sinkage([1], [1], [0], np.nan)
