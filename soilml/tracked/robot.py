@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soilml.effects import Effect, ShearSoftening, TrackGrousers
+from soilml.errors import InputError
 from soilml.gears import Track
 from soilml.gears.belt import FRONT, MIDDLE, REAR, gone
 from soilml.model import Model
@@ -78,8 +79,9 @@ def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Bala
     of its base by `centre` less (hitch height) DP / W has it. References: Wang et al. 2018,
     eqs. 3, 8 and 9, in which the tensions at the joints cancel. Raises `InputError` as a model.
     """
-    assert isinstance(model.gear, Track)
-    track, force = model.gear, model(soil, at)
+    track, force = _track(model), model(soil, at)
+    if points < 3:
+        raise InputError(f"points is {points}; needed are 3 or more along the belt")
     belt = track.shape(force.sinkage, soil, at)
     profile = model.profile(soil, at, points)
     ends = [gone(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
@@ -124,12 +126,14 @@ def settled_by_moments(
     and 0.5 balances: a robot whose nose digs in. The trim then follows from the load instead of a
     constant of the soil. Own derivation; Wang et al. 2018 print no balance of moments.
     """
+    if not np.isfinite([behind, hitch]).all():
+        raise InputError(f"behind is {behind:g} m and hitch {hitch:g} m; both must be numbers")
+    track = _track(model)
     shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
     driven = replace(at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape))
 
     def excess(settling: Floats) -> Floats:
-        assert isinstance(model.gear, Track)
-        there = replace(model, gear=replace(model.gear, settling=settling))
+        there = replace(model, gear=replace(track, settling=settling))
         need = behind + hitch * there(soil, driven).drawbar_pull / driven.load
         return np.asarray(balance(there, soil, driven, points=801).centre - need)
 
@@ -140,3 +144,10 @@ def settled_by_moments(
         short = excess(middle) < 0.0
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return np.where(found, 0.5 * (low + high), np.nan)
+
+
+def _track(model: Model) -> Track:
+    """The gear; raises `InputError` where it is no track."""
+    if not isinstance(model.gear, Track):
+        raise InputError(f"the gear is a {model.gear.name}; this needs a track")
+    return model.gear

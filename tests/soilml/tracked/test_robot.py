@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from soilml import Model, Operating, soil
+from soilml.errors import InputError
+from soilml.gears import Wheel
 from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance, settled_by_moments
 
 SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
@@ -89,3 +91,11 @@ def test_the_lines_on_the_page_run(capsys):
     assert np.all(names["force"].status == 0)
     assert names["stands"].middle > names["stands"].front > names["stands"].rear
     assert capsys.readouterr().out
+
+
+def test_only_a_track_has_a_balance_along_its_belt():
+    at = Operating(slip=0.2, load=100.0)
+    wheel = Model(gear=Wheel(radius=0.1, width=0.08))
+    for asked in (balance, settled_by_moments):
+        with pytest.raises(InputError, match="the gear is a wheel; this needs a track"):
+            asked(wheel, CLAY, at)
