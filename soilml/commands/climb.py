@@ -60,6 +60,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder is there already."""
     if args.out is None or args.out.lower().endswith(".json"):
         return named(args.out, ".json")
+    if not args.out:
+        raise InputError("--out is empty; needed is a folder, or a name ...json")
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {args.out} is a file; needed is a folder, or a name ...json")

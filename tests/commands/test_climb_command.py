@@ -53,6 +53,13 @@ def folder(tmp_path, tables, monkeypatch):
     return tmp_path
 
 
+def test_an_output_without_a_name_is_refused(folder, capsys):
+    before = sorted(folder.iterdir())
+    assert main([*COMMAND, "--out", ""]) == 2
+    assert "--out is empty" in capsys.readouterr().err
+    assert sorted(folder.iterdir()) == before
+
+
 def test_the_slope_that_a_rover_climbs_is_within_its_band(folder, true, capsys):
     assert main([*COMMAND, "--slip-limit", "0.3"]) == 0
     found = json.loads(capsys.readouterr().out)
