@@ -80,7 +80,8 @@ class Settings:
         """Raise `InputError` for the first key that nobody took."""
         for key in self._left:
             near = difflib.get_close_matches(key, self._known, 1, 0.6)
-            hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(self._known)}"
+            known = ", ".join(dict.fromkeys(self._known))
+            hint = f"did you mean {near[0]!r}?" if near else f"known: {known}"
             self.fail(f"unknown key {key!r}; {hint}")
 
     def fail(self, text: str) -> None:

@@ -97,3 +97,10 @@ def test_readings_beyond_single_precision_are_out_of_range(tmp_path, capsys, sma
     (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1e308\n")
     assert main(["estimate", str(small_model), str(tmp_path / "runs.csv")]) == 0
     assert capsys.readouterr().out.splitlines()[1].endswith(",0")
+
+
+def test_a_hint_names_each_known_key_once(tmp_path, capsys):
+    (tmp_path / "m.toml").write_text(MODEL.replace("[gear]", "[gear]\nzzz = 1"))
+    assert main(["simulate", str(tmp_path / "m.toml"), "--slip", "0.1", "--load", "60"]) == 2
+    known = capsys.readouterr().err.split("known: ")[1].strip().split(", ")
+    assert len(known) == len(set(known)) >= 3
