@@ -29,9 +29,14 @@ class Felt:
 def averaged(readings: Readings, wheel: SensingWheel) -> Felt:
     """The mean over turns and sensors, in bins of one sample's turn.
 
-    References: Nagatani et al. 2009, section IV. Raises `InputError` where nothing was felt.
+    References: Nagatani et al. 2009, section IV. Raises `InputError` where nothing was felt, or
+    not by as many sensors as the wheel has.
     """
     force = readings.force
+    if force.shape[2] != wheel.sensors:
+        raise InputError(
+            f"readings of {force.shape[2]} sensors; the wheel has {wheel.sensors:g} in a row"
+        )
     touched = (force > 0.0) & (force >= wheel.deadband)
     inside = touched & (force < wheel.saturation)
     if not touched.any():

@@ -200,3 +200,9 @@ def test_the_lines_on_the_page_run():
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
     assert names["grip"].interval[0] < TRUE < names["grip"].interval[1]
+
+
+def test_readings_of_another_row_of_sensors_are_refused():
+    angle = np.zeros((3, 5))
+    with pytest.raises(InputError, match="readings of 2 sensors; the wheel has 4 in a row"):
+        averaged(Readings(angle, np.ones((3, 5, 2))), SensingWheel())
