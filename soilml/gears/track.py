@@ -45,8 +45,9 @@ class Track:
     so that the centre of mass and the hitch are those which that trim needs; tensions at the joints
     are inner forces, and the middle arc's tension is the one that its pressure and radius ask for
     (`soilml.tracked.robot.balance`). While it brakes, shear turns at places that the nodes do not
-    know: then to about a part in a thousand. Not for belts stiff in bending, road wheels between
-    the end wheels, or turning.
+    know: forces are then good to some parts in a thousand, at worst in a hundred, and where shear
+    is many times the load, sinkage need not rise from one load to the next. Not for belts stiff in
+    bending, road wheels between the end wheels, or turning.
     """
 
     name: ClassVar[str] = "track"
