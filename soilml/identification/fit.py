@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -38,10 +38,6 @@ class Fit:
     #: ends of the 90 % interval, (p,), where the method knows them; else +- 1.645 std holds it
     low: Floats | None = None
     high: Floats | None = None
-
-    def warned(self, text: str) -> Fit:
-        """The same with one more warning."""
-        return replace(self, warnings=(*self.warnings, text))
 
     @property
     def interval(self) -> tuple[Floats, Floats]:

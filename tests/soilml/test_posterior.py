@@ -103,10 +103,14 @@ def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
 def test_a_model_that_lacks_something_is_said_to(case):
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, SLIPS, LOADS, seed=1)
-    shaken = table["torque_Nm"] * np.tile([0.9, 1.1], 4)  # five times the declared 2 %
+    measured_well, shaken = (
+        table,
+        table["torque_Nm"] * np.tile([0.9, 1.1], 4),
+    )  # five times the declared 2 %
     table = Table(dict(table.columns) | {"torque_Nm": shaken})
-    said = " ".join(identify(case, table, None, "posterior").warnings)
-    assert "times the declared noise" in said
+    fit, calm = (identify(case, t, None, "posterior") for t in (table, measured_well))
+    assert "times the declared noise" in " ".join(fit.warnings)
+    assert (fit.std > 2.0 * calm.std).all()
 
 
 def test_noise_that_nobody_declared_is_asked_for(case):
