@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import textwrap
+from collections import Counter
 from pathlib import Path
 
 from soilml.commands.output import deliver, watched
@@ -16,21 +18,28 @@ from soilml.writing import aligned
 
 HELP = "the source papers' printed numbers beside the computed ones"
 DESCRIPTION = """\
-Compute every number that the source papers print, and show it beside what they print.
+Compute what the source papers print as numbers, and show it beside what they print.
 
-  soilml papers                        all; takes about a minute
+  soilml papers                        all; takes about ten seconds
   soilml papers nagatani2009           one paper
-  soilml papers --out papers.csv       for programs
+  soilml papers comin2017 --all        every number, also those that nothing computes
+  soilml papers --out papers.csv       every number, for programs
 
-`holds` says whether the difference is within the tolerance. What is known not to be reproduced, or
-cannot be, is in the table as well, and the reason stands under it. Exit status 1 where a number
-that should hold does not.
+holds: yes           computed, and the difference is within the tolerance
+       known         computed, and known to miss it: the reason stands under the table
+       NO            computed, should be within the tolerance, and is not: exit status 1
+       given         an input that the model keeps as printed; no result
+       not computed  rests on measurements or settings that are not printed: the reason is given
+
+Tolerance is the largest difference allowed, in the number's unit or in per cent of it.
 """
+WIDTH = 110
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("paper", nargs="?", help=f"one of: {', '.join(PAPERS)}")
+    parser.add_argument("--all", action="store_true", help="a line for every number")
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
 
 
@@ -55,37 +64,52 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None or not watched():
         deliver(_columns(found), args.out)
     else:
-        print("\n\n".join(_page(paper, found) for paper in PAPERS if _of(paper, found)))
-    held, known = sum(c.holds for c in found), sum(c.said == "known" for c in found)
-    wrong = [c for c in found if c.said == "NO"]
+        papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
+        print("\n\n".join(_page(paper, its, args.all) for paper, its in papers.items()), end="\n\n")
+    count = Counter(c.said for c in found)
     print(
-        f"{held} of {len(found)} printed numbers reproduced within their tolerance, {known} known "
-        f"not to be, {len(wrong)} wrong",
+        f"{len(found)} printed numbers: {count['yes']} reproduced within their tolerance, "
+        f"{count['known']} known to miss it, {count['NO']} wrong; {count['given']} inputs kept as "
+        f"printed; {count['not computed']} that nothing computes",
         file=sys.stderr,
     )
-    return 1 if wrong else 0
+    return 1 if count["NO"] else 0
 
 
-def _of(paper: str, found: list[Compared]) -> list[Compared]:
-    return [c for c in found if c.row.paper == paper]
-
-
-def _page(paper: str, found: list[Compared]) -> str:
-    """One paper as an aligned table, with the reasons under it."""
-    header = ("what", "where", "unit", "holds", "printed", "computed", "tolerance")
-    lines, notes = [], []
-    for c in _of(paper, found):
-        mark = ""
-        if c.row.reason:
-            if c.row.reason not in notes:
-                notes.append(c.row.reason)
-            mark = f" [{notes.index(c.row.reason) + 1}]"
-        allowed = f"{100 * c.row.tolerance:.3g} %" if c.row.relative else f"{c.row.tolerance:.3g}"
+def _page(paper: str, found: list[Compared], every: bool) -> str:
+    """One paper as an aligned table with the reasons under it; the rest in a line a reason."""
+    shown = [c for c in found if every or c.said in ("yes", "known", "NO")]
+    notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
+    lines = []
+    for c in shown:
+        row = c.row
+        mark = f" [{notes.index(row.reason) + 1}]" if row.reason else ""
+        allowed = f"{100 * row.tolerance:.3g} %" if row.relative else f"{row.tolerance:.3g}"
         computed = "" if math.isnan(c.computed) else f"{c.computed:.4g}"
-        numbers = (f"{c.row.published:.4g}", computed, allowed)
-        lines.append((c.row.what, c.row.source, c.row.unit, f"{c.said}{mark}", *numbers))
-    said = [f"[{i}] {note}" for i, note in enumerate(notes, 1)]
-    return "\n".join([TITLES[paper], aligned(header, lines, text_columns=4), *said])
+        numbers = (f"{row.published:.4g}", computed, "" if c.said == "not computed" else allowed)
+        lines.append((f"{c.said}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
+    header = ("holds", "unit", "printed", "computed", "tolerance", "what (where)")
+    page = [TITLES[paper], aligned(header, lines, text_columns=2, last_left=True)]
+    page += [_wrapped(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
+    return "\n".join(page + ([] if every else _rest(found)))
+
+
+def _rest(found: list[Compared]) -> list[str]:
+    """What the table leaves out: inputs, and numbers that nothing computes, by reason."""
+    given = [c.row.what for c in found if c.said == "given"]
+    said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
+    why: dict[str, list[str]] = {}
+    for c in found:
+        if c.said == "not computed":
+            why.setdefault(c.row.reason, []).append(c.row.source)
+    for reason, sources in why.items():
+        where = "; ".join(dict.fromkeys(sources))
+        said.append(_wrapped(f"{len(sources)} not computed ({where}): {reason}"))
+    return said
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def _columns(found: list[Compared]) -> dict[str, list[object]]:

@@ -1,7 +1,8 @@
 """The source papers, number by number: what they print beside what soilml computes.
 
 A chapter is a CSV file of what is printed and the module of the same name, whose `COMPUTED` holds
-a function of no arguments for each key. A new paper is such a pair and one line here.
+a function of no arguments for each key, and whose `GIVEN`, where there is one, the keys of inputs
+that are kept as printed. A new paper is such a pair and one line here.
 """
 
 from __future__ import annotations

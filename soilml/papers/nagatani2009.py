@@ -63,6 +63,12 @@ def _shifted() -> float:
     return float(np.rad2deg(left.entry - left.exit))
 
 
+#: Keys of what the wheel and the sand of the catalogue keep as printed.
+GIVEN = frozenset(
+    "radius width sensors diameter interval rim_speed saturation deadband cohesion friction_angle"
+    " modulus_flat".split()
+)
+
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "radius": lambda: float(SensingWheel().radius),

@@ -21,6 +21,7 @@ class Published:
 
     `tolerance` is a share of the number where the file gives per cent, else in its unit. A row
     with a `reason` is known not to be reproduced; one that nothing computes must have a reason.
+    A number that is `given` is an input that the model keeps as printed: read back, not computed.
     """
 
     paper: str
@@ -32,6 +33,7 @@ class Published:
     tolerance: float
     relative: bool
     reason: str
+    given: bool
     compute: Callable[[], float] | None
 
     @property
@@ -56,7 +58,11 @@ class Compared:
     @property
     def said(self) -> str:
         """The judgement in words."""
-        return "yes" if self.holds else "known" if self.row.reason else "NO"
+        if self.holds:
+            return "given" if self.row.given else "yes"
+        if not self.row.reason:
+            return "NO"
+        return "not computed" if math.isnan(self.computed) else "known"
 
     @property
     def honest(self) -> bool:
@@ -70,13 +76,17 @@ def published(paper: str | None = None) -> Iterator[Published]:
         raise InputError(f"no paper {paper!r}; there are: {', '.join(PAPERS)}")
     for name in PAPERS if paper is None else (paper,):
         for chapter in PAPERS[name]:
-            computed = importlib.import_module(f"soilml.papers.{chapter}").COMPUTED
+            module = importlib.import_module(f"soilml.papers.{chapter}")
+            given = getattr(module, "GIVEN", frozenset())
             text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
             for entry in csv.DictReader(text.splitlines()):
-                yield _row(name, entry, computed)
+                compute = module.COMPUTED.get(entry["key"])
+                yield _row(name, entry, compute, entry["key"] in given)
 
 
-def _row(paper: str, entry: dict[str, str], computed: dict[str, Callable[[], float]]) -> Published:
+def _row(
+    paper: str, entry: dict[str, str], compute: Callable[[], float] | None, given: bool
+) -> Published:
     tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
     return Published(
         paper=paper,
@@ -88,5 +98,6 @@ def _row(paper: str, entry: dict[str, str], computed: dict[str, Callable[[], flo
         tolerance=float(tolerance.rstrip("% ")) / 100.0 if relative else float(tolerance),
         relative=relative,
         reason=entry["reason"].strip(),
-        compute=computed.get(entry["key"]),
+        given=given,
+        compute=compute,
     )

@@ -142,6 +142,9 @@ def _least_readings(method: str, free: tuple[str, ...]) -> float:
     return float("nan")
 
 
+#: Keys of what the simplified wheel is told, and keeps.
+GIVEN = frozenset({"load", "theta_m", "theta_2"})
+
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "load": lambda: float(_quadrature().load[1, 0]),

@@ -6,6 +6,7 @@ from importlib import resources
 
 import pytest
 
+from soilml.cli import main
 from soilml.papers import PAPERS, TITLES
 from soilml.papers.published import COLUMNS, published
 
@@ -36,3 +37,24 @@ def test_a_chapter_is_whole(chapter):
 
 def test_every_paper_has_a_title():
     assert set(TITLES) == set(PAPERS)
+
+
+def test_an_input_that_is_kept_counts_as_no_result():
+    kept = [row.compared() for row in ROWS if row.given]
+    assert {one.said for one in kept} == {"given"}
+    assert all(abs(one.computed - one.row.published) <= 0.01 for one in kept)
+
+
+def test_a_person_sees_what_is_computed_and_the_rest_by_reason(monkeypatch, capsys):
+    monkeypatch.setattr("soilml.commands.papers.watched", lambda: True)
+    assert main(["papers", "nagatani2009"]) == 0
+    short = capsys.readouterr()
+    assert main(["papers", "nagatani2009", "--all"]) == 0
+    every = capsys.readouterr()
+    rows = [row for row in ROWS if row.paper == "nagatani2009"]
+    assert all(f"{row.what} ({row.source})" in every.out for row in rows)
+    computed = [row for row in rows if row.compute is not None and not row.given]
+    assert all(f"{row.what} ({row.source})" in short.out for row in computed)
+    kept, rest = sum(row.given for row in rows), sum(row.compute is None for row in rows)
+    assert f"{kept} given, kept as printed: wheel radius, " in short.out
+    assert f"{kept} inputs kept as printed; {rest} that nothing computes" in short.err
