@@ -65,8 +65,10 @@ def _shifted() -> float:
 
 #: Keys of what the wheel and the sand of the catalogue keep as printed.
 GIVEN = frozenset(
-    "radius width sensors diameter interval rim_speed saturation deadband cohesion friction_angle"
-    " modulus_flat".split()
+    (
+        *("radius", "width", "sensors", "diameter", "interval", "rim_speed", "saturation"),
+        *("deadband", "cohesion", "friction_angle", "modulus_flat"),
+    )
 )
 
 #: By key of the CSV file of the same name.

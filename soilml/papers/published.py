@@ -77,7 +77,7 @@ def published(paper: str | None = None) -> Iterator[Published]:
     for name in PAPERS if paper is None else (paper,):
         for chapter in PAPERS[name]:
             module = importlib.import_module(f"soilml.papers.{chapter}")
-            given = getattr(module, "GIVEN", frozenset())
+            given: frozenset[str] = getattr(module, "GIVEN", frozenset())
             text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
             for entry in csv.DictReader(text.splitlines()):
                 compute = module.COMPUTED.get(entry["key"])
