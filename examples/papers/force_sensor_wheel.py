@@ -15,11 +15,13 @@ from soilml.measured_stress import (
     Run,
     SensingWheel,
     Strength,
+    StressProfile,
     averaged,
     balanced_arc,
     conventional,
     estimate,
     forces,
+    profiled,
     pull,
     sensed,
     solve,
@@ -94,12 +96,51 @@ def main() -> None:
         f"{1e3 * TRUE:.1f} mm it has\nthe wheel pull {known[0]:.2f} N there, which pulls nothing."
     )
 
+    without_noise(true_runs, arcs)
     for shift, stiffer in ((0.3, 1.0), (0.57, 8.0)):
         on = "that sand" if stiffer == 1.0 else f"sand {stiffer:g} times as stiff"
         print(f"\nA wheel with stress-shift {shift:g} on {on}, its model without:")
         print(f"  {diagnosed(shift, stiffer)}")
     OUT.mkdir(parents=True, exist_ok=True)
     drawn(arcs, felt, grips, wide, pulls, known, tuned)
+
+
+def without_noise(runs: list[Run], arcs: list[StressProfile]) -> None:
+    """How much hangs on the printed k_x, the contact, the disc, the lugs and the speed."""
+    print("\nWithout noise")
+    asked = [
+        balanced_arc(np.radians(30.0), at, SENSORS, STRENGTH, modulus)
+        for at, modulus in zip(runs, TABLE_I, strict=True)
+    ]
+    middles = [f"{np.rad2deg(0.5 * (a.exit_angle + a.entry_angle)):.0f}" for a in asked]
+    print(f"  middle of the arc that each printed k_x asks for, deg  {' '.join(middles)}")
+    pulls = []
+    for front in np.radians([35.0, 45.0, 50.0]):
+        first, last = 1.0 - np.cos(front), 1.0 - np.cos(FRONT + REAR - front)
+        sunk, back = float(SENSORS.radius * first), float(last / first)
+        wide = conventional(WHEEL, SAND, slip=SLIPS[0], sinkage=sunk, rebound=back)
+        pulls.append(f"{pulled(wide, runs[0], TRUE):.1f}")
+    print(f"  pull of the conventional 70 deg, 35, 45 or 50 in front, N  {' '.join(pulls)}")
+    quiet = replace(SENSORS, noise=0.0)
+    ways = {
+        "disc taken off": ((0.3, 0.3), profiled),
+        "as read": ((0.3, 0.3), as_read),
+        "lugs 50 % in front, 10 % behind": ((0.5, 0.1), profiled),
+    }
+    for name, (lugs, way) in ways.items():
+        level, later = (way(sensed(arcs[i], quiet, lugs=lugs), quiet) for i in (0, 3))
+        found = solve(level, runs[0], quiet, STRENGTH).shear_modulus
+        off = pulled(later, runs[3], found) - NEEDED[3]
+        print(f"  {name}: k_x off by {found / TRUE - 1:+.0%}, pull at slip 0.39 by {off:+.2f} N")
+    fast = replace(runs[0], slip=1.0 - (1.0 - SLIPS[0]) * (1.0 - SPEED_ERROR))
+    found = solve(arcs[0], fast, quiet, STRENGTH).shear_modulus
+    print(f"  speed read 1.5 % low at slip 0.11: k_x off by {found / TRUE - 1:+.0%}")
+
+
+def as_read(readings, wheel: SensingWheel) -> StressProfile:
+    """The mean of the readings, blurred by the disc."""
+    felt = averaged(readings, wheel)
+    return StressProfile(felt.angle, felt.normal)
 
 
 def measured(at: Run, rng: np.random.Generator) -> Run:

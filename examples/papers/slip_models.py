@@ -143,7 +143,7 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
     shown = {
         "torque alone": "slip_torque",
         "vibration alone": "slip_vibration",
-        "both, fused on board": "two files: prior-once",
+        "two files fused": "two files: prior-once",
     }
     slip = found["slip"]
     for k, (axis, (title, key)) in enumerate(zip(axes[0], shown.items(), strict=True)):
@@ -153,7 +153,9 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
         inside = [(slip >= a) & (slip < b) for a, b in pairwise(ends)]
         middle = 0.5 * (ends[1:] + ends[:-1])
         low, high = ([np.median(v[i, 0]) for i in inside] for v in (estimate.low, estimate.high))
-        axis.fill_between(middle, low, high, color=f"C{k}", alpha=0.2, lw=0, label="90 %, median")
+        axis.fill_between(
+            middle, low, high, color=f"C{k}", alpha=0.2, lw=0, label="90 % interval (median)"
+        )
         axis.plot([0, 0.6], [0, 0.6], "k-", lw=0.8)
         axis.set(xlabel="true slip", ylabel="estimated slip", xlim=(0, 0.6), ylim=(0, 0.6))
         axis.set_title(f"slip from {title}; soil unknown", fontsize=10)
@@ -163,9 +165,7 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
         axes[1][0].plot(100 * BANDS, 100 * (held - BANDS), color=f"C{k}", label=title)
     twice = found["two files: inverse-variance"]
     held = [np.mean(np.abs(slip - twice.mean[:, 0]) <= _half(b) * twice.std[:, 0]) for b in BANDS]
-    axes[1][0].plot(
-        100 * BANDS, 100 * (held - BANDS), "--", color="C3", label="by inverse variance (eq. 26)"
-    )
+    axes[1][0].plot(100 * BANDS, 100 * (held - BANDS), "--", color="C3", label="both by eq. 26")
     axes[1][0].axhline(0.0, color="k", lw=0.8)
     axes[1][0].set(xlabel="interval claims to hold, %", ylabel="it holds more by, % of rows")
     axes[1][0].set_ylim(-16, 8)

@@ -16,7 +16,7 @@ import numpy as np
 
 from soilml import Case, Model, Operating, soil
 from soilml.noise import Noise
-from soilml.papers.wang2018 import plateau, printed
+from soilml.papers.wang2018 import LEVEL, plateau, printed
 from soilml.prior import Prior
 from soilml.tracked.groups import FIVE, Groups, driven, identified, predicted
 from soilml.tracked.regression import Regression, points_behind, regression
@@ -48,6 +48,7 @@ def main() -> None:
         name = "12 mm" if lugs else "none"
         print(f"{ground}  {name:8s}  {told:9d}  {found:10.0f}  {found / told - 1.0:+10.1%}")
     at = Operating(slip=0.2, load=WANG2018.load)
+    hanging()
     print("\nWhat carries the load at slip 0.2")
     print("soil  front wheel  belt between  rear wheel  sinkage mm  tension kN")
     for ground in COLOURS:
@@ -63,6 +64,33 @@ def main() -> None:
     lines = told_by(case, groups, fresh)
     draw(case, groups, fresh, lines)
     print(f"\npicture: {OUT}")
+
+
+def hanging() -> None:
+    """How much of the four plateaus hangs on what the paper does not print."""
+    track, bare, hump = WANG2018.track, (), BEYOND_PEAK["clay"]
+    softer = (replace(hump[0], residual=0.6),)
+    sooner = replace(GROUSERS, yielding=1.5)
+    cases = {
+        "as assumed": (track, bare, hump, GROUSERS),
+        "no hump on clay": (track, bare, bare, GROUSERS),
+        "hump on sand too": (track, hump, hump, GROUSERS),
+        "K_r 0.6 on clay": (track, bare, softer, GROUSERS),
+        "belt 0.10 m wide": (replace(track, width=0.1), bare, hump, GROUSERS),
+        "slack belt, A_12 = 0.2": (replace(track, leaving=0.2), bare, hump, GROUSERS),
+        "taut belt, A_12 = 0.05": (replace(track, leaving=0.05), bare, hump, GROUSERS),
+        "springs back less, rho 0.25": (replace(track, rebound=0.25), bare, hump, GROUSERS),
+        "grousers mobilise sooner": (track, bare, hump, sooner),
+    }
+    print("\nPlateaus in N                sand  grousers  clay  grousers")
+    for name, (gear, on_sand, on_clay, lugs) in cases.items():
+        robot = replace(WANG2018, track=gear)
+        found = [
+            robot.pull(soil(f"wang2018/{ground}"), LEVEL, (*some, *beyond)).mean()
+            for ground, beyond in (("sand", on_sand), ("clay", on_clay))
+            for some in ((), (lugs,))
+        ]
+        print(f"{name:29s}" + "{:4.0f}  {:8.0f}  {:4.0f}  {:8.0f}".format(*found))
 
 
 def eight_groups() -> tuple[Case, Groups]:

@@ -22,9 +22,10 @@ from soilml.table import Table
 from soilml.wheel_legs.characterise import from_torque
 from soilml.wheel_legs.feet import wheel_leg
 from soilml.wheel_legs.ground import GROUNDS
+from soilml.wheel_legs.slip_fits import fit_torque_slip
 from soilml.wheel_legs.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
 from soilml.wheel_legs.soil_fusion import PROPERTIES, RULES, SENSES, judged, learned
-from soilml.wheel_legs.stances import FOOT, LOAD, SLIPS, felt, four_soils, torques
+from soilml.wheel_legs.stances import FOOT, LOAD, SLIPS, felt, four_soils, torques, varied_soils
 from soilml.wheel_legs.stick_slip import SpringLeg, amplitude, stance
 from soilml.wheel_legs.walk import walk
 
@@ -62,6 +63,18 @@ def torque_slip(axes: plt.Axes) -> None:
     rows = {"fitted": (*fitted.law.friction, fitted.goodness["friction"])}
     rows["printed"] = (*printed.friction, 0.909)
     for name, row in rows.items():
+        print(f"    {name:<29}" + "".join(f"{value:9.3f}" for value in row))
+    others = {f"fitted at {load:g} N": (known, load) for load in (9.0, 15.0)}
+    others["200 soils drawn between"] = (varied_soils(200, seed=1), LOAD)
+    for name, (ground, load) in others.items():
+        drawn = (
+            torques(ground, load=load),
+            SLIPS,
+            ground.soil.friction_angle,
+            ground.normal_stiffness,
+        )
+        other = fit_torque_slip(*drawn, "terramechanics")
+        row = (*other.law.friction, other.goodness["friction"])
         print(f"    {name:<29}" + "".join(f"{value:9.3f}" for value in row))
     print("  sigma_1 = c + b slope:                c        b               R2")
     rows = {"fitted": (*fitted.law.stiffness[:2], fitted.goodness["stiffness"])}
@@ -132,7 +145,14 @@ def fusion(axes: plt.Axes) -> None:
         for sense in names:
             row = found[sense]
             print(f"    {sense:<22} {scale * row.rmse:8.2f} {scale * row.claimed:8.2f}"
-                  f" {row.within_two:8.2f}")  # fmt: skip
+                  f" {100 * row.within_two:7.0f}%")  # fmt: skip
+        between = {
+            "torque, vibration": (0, 1),
+            "torque, sinkage": (0, 2),
+            "vibration, sinkage": (1, 2),
+        }
+        told = ", ".join(f"{two} {senses.correlation[at]:.2f}" for two, at in between.items())
+        print(f"    errors correlate: {told}")
         truth = np.std(hold.ground.soil.friction_angle if k == 0 else hold.ground.normal_stiffness)
         place = np.arange(len(names)) + 0.38 * (k - 0.5)
         label = f"{name.replace('_', ' ')} (spread {scale * truth:.1f} {unit})"

@@ -50,6 +50,9 @@ def figures(legs, feet, soils, fit):
             f"{sinking[0][i] * 1e8:6.1f} +- {sinking[1][i] * 1e8:3.1f} cm   "
             f"{slipping[0][i] * 1e6:6.2f} +- {slipping[1][i] * 1e6:4.2f}  per N/cm3"
         )
+    ltf, srf = feet.feet.index("LTF"), feet.feet.index("SRF")
+    margins = [told[0][ltf] / told[0][srf] - 1.0 for told in (sinking, slipping)]
+    print("  the LTF is more sensitive than the SRF by {:.0%} and {:.0%}".format(*margins))
     print("\nSoil from midstance sinkage, four soils in three states:")
     print("                     fitted   printed")
     print(f"  s_sigma, N/cm    {fit.s_sigma / CM:8.2f}      3.39")
@@ -57,6 +60,12 @@ def figures(legs, feet, soils, fit):
     print(f"  s_I, rad         {fit.s_i:8.2f}      0.76")
     print(f"  s_Z, rad/cm      {fit.s_z / CM:8.3f}    -0.07")
     print(f"  R2               {fit.friction_r2:8.2f}      0.98")
+    more = fitted_to(simulated(offset=True))
+    print(
+        f"  missed on soils left out: sigma_1 by {fit.stiffness_scatter:.0%}\n"
+        f"  with sigma_0 in the walk: s_sigma {more.s_sigma / CM:.1f}, R2 {more.stiffness_r2:.2f}, "
+        f"missed by {more.stiffness_scatter:.0%}"
+    )
     told = fit(0.05, 0.005)
     print(
         f"  sunk 5.0 +- 0.5 cm: sigma_1 {told.normal_stiffness / 1e4:.1f} +- "

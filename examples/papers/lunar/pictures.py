@@ -103,6 +103,7 @@ def _pulls(axis: Any, sweep: Sweep) -> None:
     mean, low, high = sweep.pulls["prior"]
     axis.fill_between(sweep.slip, low, high, color=GREY, lw=0)
     axis.plot(sweep.slip, mean, color="0.55", lw=1.2)
+    mean_of_prior = mean[-1]
     mean, low, high = sweep.pulls["one"]
     axis.fill_between(sweep.slip, low, high, color=ONE, alpha=0.25, lw=0)
     axis.plot(sweep.slip, mean, color=ONE, lw=1.2)
@@ -113,7 +114,9 @@ def _pulls(axis: Any, sweep: Sweep) -> None:
         _, low, high = sweep.pulls[name]
         axis.fill_between(sweep.slip, low, high, color=color, lw=0, alpha=0.6)
     axis.plot(sweep.slip, sweep.pull, color=TRUTH, lw=1.4, ls="--")
-    axis.set_title("drawbar pull foretold from these, N")
+    axis.annotate("prior's mean", (sweep.slip[-1], mean_of_prior), (6, -3), color="0.4",
+                  textcoords="offset points", fontsize=9)  # fmt: skip
+    axis.set_title("drawbar pull foretold from these, N (bands and lines: 90 %)")
     axis.set_xlim(0.19, 0.68)
 
 
