@@ -50,7 +50,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("rover", metavar="ROVER.toml")
     parser.add_argument("runs", metavar="RUNS.csv", help="climbs, CSV or Parquet")
     parser.add_argument("--stress", metavar="STRESS.csv", required=True, help="stress on the rims")
-    parser.add_argument("--slip-limit", type=float, help="steepest slope at slips up to this, too")
+    parser.add_argument(
+        "--slip-limit", type=float, metavar="S", help="steepest slope at slips up to this, too"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of all draws; 0 by default")
     parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
     parser.add_argument("--out", metavar="DIR", help="folder for three files, or FILE.json")
