@@ -202,13 +202,13 @@ def efficiency(name: str, width: Floats | float, slip: float) -> Floats:
     return np.asarray(pull_efficiency(wheel, soil(f"comin2017/{name.lower()}"), at))
 
 
-def own_gap() -> None:
+def own_gap(seed: int = 0) -> None:
     """The midstance model against walks by resistive forces, as if those were measured."""
     loads, slips = (8.0, 11.0, 14.0, 17.0), np.linspace(0.05, 0.5, 6)
     load, slip = (v.ravel() for v in np.meshgrid(loads, slips, indexing="ij"))
     legs = [wheel_leg("LTF", mass=value / 9.81) for value in load]
     walked = walk(legs, GROUNDS["SSC-2"], slip=slip, turns=1.0, steps=500).after(0.4 * np.pi)
-    draw = np.random.default_rng(0).standard_normal
+    draw = np.random.default_rng(seed).standard_normal
     torque = walked.at_midstance(walked.torque)
     sinkage = walked.at_midstance(walked.sinkage) + FOOT.tip_height  # of the foot's lowest point
     table = Table({
