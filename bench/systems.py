@@ -6,6 +6,7 @@ import math
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml import Midstance, Model, Operating, Wheel, soil
 from soilml.climbing.coverage import coverage
@@ -58,25 +59,34 @@ def walking() -> str:
     cases = [wheel_leg(foot) for foot in ("none", "LTF", "SRF", "CIF")]
     cases += [wheel_leg("none", legs=legs) for legs in (2, 3, 6)]
     lines = [
-        "| steps to a turn | cases | seconds a turn | hub height to the fine step, rms |",
-        "|---|---:|---:|---:|",
+        "| steps to a turn | cases | seconds | hub height, rms | largest sinkage | rms slip |",
+        "|---|---:|---:|---:|---:|---:|",
     ]
     started = time.perf_counter()
     fine = walk(cases, ground, turns=1.0, steps=FINE, step=explicit, fading=SHARP)
     spent = time.perf_counter() - started
-    lines.append(f"| {FINE} (1e-4 s, explicit) | {len(cases)} | {spent:.0f} | |")
+    lines.append(f"| {FINE} (1e-4 s, explicit) | {len(cases)} | {spent:.0f} | | | |")
     for steps in (500, 1000, 2000):
         started = time.perf_counter()
         coarse = walk(cases, ground, turns=1.0, steps=steps)
         spent = time.perf_counter() - started
         near = fine.z[np.searchsorted(fine.angle, coarse.angle[coarse.angle <= fine.angle[-1]])]
         off = 1e3 * np.sqrt(np.mean((coarse.z[: len(near)] - near) ** 2, axis=0)).max()
-        lines.append(f"| {steps} | {len(cases)} | {spent:.2f} | {off:.2f} mm |")
+        deep = 1e3 * np.abs(coarse.sinkage.max(axis=0) - fine.sinkage.max(axis=0)).max()
+        slip = np.abs(_rms(coarse.slip) - _rms(fine.slip)).max()
+        lines.append(
+            f"| {steps} | {len(cases)} | {spent:.2f} | {off:.1f} mm | {deep:.1f} mm | {slip:.3f} |"
+        )
     for count in (1, 24):
         started = time.perf_counter()
         walk(cases[1], [ground] * count, turns=1.0)
-        lines.append(f"| 1000 | {count} | {time.perf_counter() - started:.2f} | |")
+        lines.append(f"| 1000 | {count} | {time.perf_counter() - started:.2f} | | | |")
     return "\n".join(lines)
+
+
+def _rms(slip: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Root mean square over a turn, for each case."""
+    return np.asarray(np.sqrt(np.mean(slip**2, axis=0)))
 
 
 def climbing() -> str:
