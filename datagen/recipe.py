@@ -112,6 +112,14 @@ def read_recipe(
     return recipe
 
 
+def recipe_of(text: str, where: str) -> Recipe:
+    """The recipe of which this is the `text`."""
+    settings = Settings(json.loads(text), where, Path())
+    recipe = _take_recipe(settings, EFFECTS)
+    settings.finish()
+    return recipe
+
+
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
     case = take_case(settings, effects)
     if not case.prior:

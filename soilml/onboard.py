@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
 
@@ -15,22 +14,22 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
-from soilml.estimate import Driven, Estimate, Kind, Known, Together, answered
+from soilml.estimate import Estimate, Known, Together
 from soilml.features import readings
+from soilml.joining import joined_run
+from soilml.model_file import check_origin, numbers, opened, together_of
+from soilml.sets import Memory, SetPosterior, once
 
 Floats = NDArray[np.float64]
 
-#: Version of the file's contract: input and output names, metadata keys.
-FORMAT = "2"
-#: Keys of what the metadata says of what is driven, and of joining rows in each kind of run.
-DRIVEN = ("lower", "upper", "std")
-KIND = ("rows", "worth", "widening", "reach")
 #: Half-width of the 90 % interval of an answer that is the prior, in its standard deviations.
 GAUSSIAN_90 = 1.645
-#: A run of which less than this share is in range is not estimated.
-LEAST_SOUND = 0.9
 #: Answers to the file's own probe may differ by this share of the prior.
 PROBE_TOLERANCE = 1e-4
+#: The same of a set: its samples are drawn anew where a rounding tips the scales.
+SET_TOLERANCE = 0.05
+#: What the graph answers for single readings.
+ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
 
 
 @final
@@ -51,6 +50,7 @@ class Estimator:
     metadata: dict[str, str]
     prior: Known
     together: Together
+    sets: SetPosterior | None
     session: ort.InferenceSession
 
     @staticmethod
@@ -61,21 +61,12 @@ class Estimator:
         run: that tests the runtime of this machine as well.
         """
         file = Path(path)
-        content = _content(file)
-        session, metadata = _session(file, content)
-        if "soilml_format" not in metadata:
-            raise ModelFileError(f"{file} is an ONNX model, but none that soilml train wrote")
-        if metadata["soilml_format"] != FORMAT:
-            raise ModelFileError(
-                f"{file} has format {metadata['soilml_format']}, this soilml reads {FORMAT}"
-            )
-        if not _whole(content, metadata):
-            raise ModelFileError(f"{file} is damaged: its checksum does not hold; export it again")
+        session, metadata = opened(file)
         try:
             inputs = json.loads(metadata["inputs"])
             outputs = json.loads(metadata["outputs"])
             probe = json.loads(metadata["probe"])
-            _check_origin(metadata)
+            check_origin(metadata)
             estimator = Estimator(
                 path=str(file),
                 inputs=tuple(entry["name"] for entry in inputs),
@@ -84,36 +75,45 @@ class Estimator:
                 per_row=tuple(e["name"] for e in outputs if e.get("per_row", False)),
                 metadata=metadata,
                 prior=Known(
-                    *(_column(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper"))
+                    *(numbers(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper"))
                 ),
-                together=_together(json.loads(metadata["together"])),
+                together=together_of(json.loads(metadata["together"])),
+                sets=SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None,
                 session=session,
             )
-            answer = estimator(**probe["readings"])
-            off = np.abs(answer.mean - np.asarray(probe["mean"])) / estimator.prior.std
-            off = np.maximum(off, np.abs(answer.std - np.asarray(probe["std"])) / answer.prior_std)
-            same = np.array_equal(answer.in_range, probe["in_range"])
+            sound = all(estimator._holds(**entry) for entry in probe)
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
             raise ModelFileError(f"{file} cannot be run: {error}") from None
-        if not (same and bool(np.all(off < PROBE_TOLERANCE))):
+        if not sound:
             raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator
+
+    def on(self, **given: float) -> Estimator:
+        """The same for one wheel on one kind of ground, where the file serves many.
+
+        Raises `InputError` for what the file does not take, or is not for.
+        """
+        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).on(given)
+        outputs = json.loads(self.metadata["outputs"])
+        scale = np.asarray([sets.given.get(entry.get("scale", ""), 1.0) for entry in outputs])
+        unit = [numbers(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper")]
+        return replace(self, sets=sets, prior=Known(*(scale * end for end in unit)))
 
     def __call__(self, **measured: Any) -> Estimate:
         """Estimates from readings, each on its own; numbers or arrays that broadcast.
 
         Raises `InputError` for a reading that is missing, not finite or impossible.
         """
+        if self.sets is not None and self.sets.alone:
+            return self._one_by_one(self.sets, measured)
         flat, shape = readings(self.inputs, measured)
         with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
             feed = {n: a.astype(np.float32) for n, a in zip(self.inputs, flat, strict=True)}
-        mean, std, covariance, in_range = self.session.run(
-            ("mean", "std", "covariance", "in_range"), feed
-        )
+        mean, std, covariance, in_range = self.session.run(ROW_OUTPUTS, feed)
         q = len(self.names)
-        return self._estimate(
+        return self.estimate(
             mean.astype(np.float64).reshape(*shape, q),
             covariance.astype(np.float64).reshape(*shape, q, q),
             std.astype(np.float64).reshape(*shape, q),
@@ -124,11 +124,18 @@ class Estimator:
     def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings together: rows driven on one soil, arrays (rows,).
 
-        Rows of nearly the same slip and load count as one. Rows out of range are left out, up to a
-        tenth of them. Where there are more, or where the rows contradict each other as rows of one
-        soil hardly ever do, `in_range` is false and the answer is the prior. Raises `InputError` as
-        a call does, where there is no row, and where the rows of a run have no one value: slip.
+        Beside slip, torque and load, sinkage and drawbar_pull may be given, NaN in rows that lack
+        them, and torque_std, sinkage_std, drawbar_pull_std where the file's own noise does not
+        hold. Rows that repeat another in every reading count once. Rows out of range are left out,
+        up to a tenth of them; where there are more, or where no soil explains the rows together,
+        `in_range` is false and the answer is the prior. Raises `InputError` as a call does, where
+        there is no row, and where the rows of a run have no one value: slip.
         """
+        if self.sets is not None:
+            rows = once(self._ready.rows(measured))
+            if rows["slip"].size == 0:
+                raise InputError("no reading given; needed is one or more")
+            return self._answered(rows, self.start())[0]
         if self.per_row:
             raise InputError(
                 f"{self.path} estimates {self.per_row[0]}, which differs from row to row: rows of "
@@ -137,20 +144,62 @@ class Estimator:
         flat, _ = readings(self.inputs, measured)
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        measured = dict(zip(self.inputs, flat, strict=True))
-        single = self(**measured)
-        sound = single.in_range
-        if sound.size == 1:
-            parts = (single.mean[0], single.covariance[0], single.std[0], sound[0])
-            return self._estimate(*parts, self.together.alone)
-        if sound.sum() < LEAST_SOUND * sound.size:
-            return self.unknown()
-        rule = self.together.rule({name: values[sound] for name, values in measured.items()})
-        joint = answered(single.mean[sound], single.covariance[sound], self.prior, rule)
-        if bool((joint.doubt > self.together.doubt).any()):
-            return self.unknown()
-        std = np.sqrt(np.diag(joint.covariance))
-        return self._estimate(joint.mean, joint.covariance, std, np.asarray(True), rule.reach)
+        return joined_run(self, dict(zip(self.inputs, flat, strict=True)))
+
+    def start(self) -> Memory:
+        """The memory of a soil of which nothing was measured yet."""
+        return self._ready.start()
+
+    def step(self, memory: Memory, **measured: Any) -> tuple[Estimate, Memory]:
+        """The estimate after one more reading, or several, and the memory to go on with.
+
+        The order of readings changes nothing, and the memory does not grow with their number.
+        Raises `InputError` as `run` does.
+        """
+        return self._answered(self._ready.rows(measured), memory)
+
+    @property
+    def _ready(self) -> SetPosterior:
+        if self.sets is None:
+            raise InputError(f"{self.path} has no set posterior; train it with [set_posterior]")
+        if missing := self.sets.needs:
+            raise InputError(
+                f"{self.path} is for many wheels: give {', '.join(missing)} first, by "
+                "estimator.on(...)"
+            )
+        return self.sets
+
+    def _answered(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
+        """Estimate and memory after these rows (m,)."""
+        found, memory = self._ready.learned(self.session, rows, memory)
+        mean, std, covariance, low, high = (np.asarray(x, np.float64) for x in found[:5])
+        sound = np.asarray(bool(found[5][0]))
+        parts = (mean, std, covariance, low, high, sound)
+        return Estimate(self.names, self.units, *parts, self.prior), memory
+
+    def _one_by_one(self, sets: SetPosterior, measured: Mapping[str, Any]) -> Estimate:
+        """Every row as a set of its own."""
+        rows = self._ready.rows(measured)
+        shape = np.broadcast_shapes(*(np.shape(value) for value in measured.values()))
+        single = [{k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size)]
+        found = [self._answered(row, sets.start())[0] for row in single]
+        parts = {
+            key: np.reshape(
+                [getattr(e, key) for e in found], (*shape, *getattr(found[0], key).shape)
+            )
+            for key in ("mean", "std", "covariance", "low", "high", "in_range")
+        }
+        return Estimate(names=self.names, units=self.units, prior=self.prior, **parts)
+
+    def _holds(self, readings: Any, mean: Any, std: Any, in_range: Any, given: Any = None) -> bool:
+        """Whether the readings of a probe are answered as they were where the file was made."""
+        if given is None:
+            answer, most = self(**readings), PROBE_TOLERANCE
+        else:
+            answer, most = self.on(**given).run(**readings), SET_TOLERANCE
+        off = np.abs(answer.mean - np.asarray(mean)), np.abs(answer.std - np.asarray(std))
+        same = np.array_equal(answer.in_range, in_range)
+        return same and all(bool(np.all(part < most * answer.prior_std)) for part in off)
 
     def unknown(self, *shape: int) -> Estimate:
         """What is known where nothing was measured: the prior, flagged as out of range."""
@@ -158,9 +207,9 @@ class Estimator:
         mean, std = (np.broadcast_to(x, (*shape, q)).copy() for x in (prior.mean, prior.std))
         covariance = np.broadcast_to(np.diag(prior.std**2), (*shape, q, q)).copy()
         flag = np.zeros(shape, dtype=bool)
-        return self._estimate(mean, covariance, std, flag, self.together.alone)
+        return self.estimate(mean, covariance, std, flag, self.together.alone)
 
-    def _estimate(
+    def estimate(
         self,
         mean: Floats,
         covariance: Floats,
@@ -168,6 +217,7 @@ class Estimator:
         in_range: NDArray[np.bool_],
         reach: Floats,
     ) -> Estimate:
+        """An Estimate whose interval reaches so many standard deviations, inside the prior."""
         half = np.where(in_range[..., None], reach, GAUSSIAN_90) * std
         return Estimate(
             names=self.names,
@@ -180,88 +230,3 @@ class Estimator:
             in_range=in_range,
             prior=self.prior,
         )
-
-
-def checksum(metadata: Mapping[str, str]) -> str:
-    """Hash of all metadata but the hash itself."""
-    entries = sorted((k, v) for k, v in metadata.items() if k != "metadata_sha256")
-    return hashlib.sha256(json.dumps(entries).encode()).hexdigest()
-
-
-def behind(metadata: Mapping[str, str]) -> bytes:
-    """The metadata as it stands behind the graph in the file: entries of field 14, by key."""
-    found = b""
-    for key, value in sorted(metadata.items()):
-        entry = _field(1, key.encode()) + _field(2, value.encode())
-        found += _field(14, entry)
-    return found
-
-
-def _field(number: int, content: bytes) -> bytes:
-    """A field of a protobuf message: its number and wire type 2, its length, its content."""
-    size, length = len(content), bytearray()
-    while size > 127:
-        length.append(size & 127 | 128)
-        size >>= 7
-    return bytes((number << 3 | 2, *length, size)) + content
-
-
-def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
-    """Whether the file is the graph and the metadata that were written, and not a byte more."""
-    told = behind(metadata)
-    graph = content.removesuffix(told)
-    return (
-        len(graph) + len(told) == len(content)
-        and hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256")
-        and checksum(metadata) == metadata.get("metadata_sha256")
-    )
-
-
-def _check_origin(metadata: Mapping[str, str]) -> None:
-    """Raise where gear and recipe, which commands look into, are not as they are written."""
-    gear, recipe = json.loads(metadata["gear"]), json.loads(metadata["recipe"])
-    sizes = [float(gear[name]) for name in ("radius", "width") if name in gear]
-    names = [str(effect["name"]) for effect in recipe.get("effect", [])]
-    if not (isinstance(gear, dict) and all(size > 0.0 for size in sizes) and all(names)):
-        raise ValueError("gear or recipe")
-
-
-def _content(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        raise ModelFileError(f"{file}: there is no such file") from None
-    except OSError as error:
-        raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
-
-
-def _session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str, str]]:
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    try:
-        session = ort.InferenceSession(
-            content, options, providers=["CPUExecutionProvider"], enable_fallback=0
-        )
-        return session, dict(session.get_modelmeta().custom_metadata_map)
-    except Exception as error:  # onnxruntime raises many kinds, none with a public base
-        first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ModelFileError(f"{file} is not a whole ONNX model: {first[:160]}") from None
-
-
-def _together(said: dict[str, Any]) -> Together:
-    driven = Driven(tuple(said["over"]), *(np.asarray(said[key], float) for key in DRIVEN))
-    return Together(
-        driven,
-        tuple(
-            Kind(tuple(kind["varies"]), *(np.asarray(kind[key], float) for key in KIND))
-            for kind in said["kinds"]
-        ),
-        np.asarray(said["alone"], float),
-        np.asarray(said["doubt"], float),
-    )
-
-
-def _column(entries: list[dict[str, Any]], key: str) -> Floats:
-    return np.asarray([entry[key] for entry in entries], dtype=np.float64)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from training.score import Score
+from training.sets.said import table_of
 from training.train import Trained
 
 WORTH = (
@@ -22,6 +23,13 @@ TOGETHER = (
     "Several readings of one soil together (`run`), by what the run varied: what came of them "
     "on runs that joining was not fitted to. Rows of nearly the same slip and load count as "
     "one, and a run between these kinds is taken between them."
+)
+
+POSTERIOR = (
+    "Several readings of one soil together by the set posterior (`run`, `step`): the exact "
+    "likelihood of all readings under a learned response of the wheel, sampled in the graph. On "
+    "fresh sets, driven anywhere, at three levels or steadily; in a third sinkage and drawbar pull "
+    "are measured too. Sets that are refused count with the prior."
 )
 
 
@@ -76,7 +84,12 @@ def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
         "",
         *_scores(trained.scores, [o["name"] for o in outputs]),
         "",
-        *([] if trained.spec.per_row else _together(trained, [o["name"] for o in outputs])),
+        *(
+            []
+            if trained.spec.per_row or trained.posterior
+            else _together(trained, [o["name"] for o in outputs])
+        ),
+        *_posterior(trained, [o["name"] for o in outputs]),
         "## Made by",
         "",
         f"- rows: {len(parts.train)} learned from, {len(parts.choose)} to stop and choose by, "
@@ -128,6 +141,13 @@ def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
         label = f"**{name}**" if name == "estimator" else name
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return lines
+
+
+def _posterior(trained: Trained, names: list[str]) -> list[str]:
+    """What the set posterior gives, on fresh simulated sets."""
+    if trained.posterior is None:
+        return []
+    return [POSTERIOR, "", *table_of(trained.figures, names)]
 
 
 def _together(trained: Trained, names: list[str]) -> list[str]:

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from datagen.recipe import recipe_of
 from soilml import __version__
 from soilml.errors import SoilmlError
 from soilml.features import READABLE, computed, inputs_of, parts
-from soilml.onboard import DRIVEN, FORMAT, KIND, behind, checksum
-from soilml.quantities import QUANTITIES
+from soilml.model_file import DRIVEN, FORMAT, KIND, behind, checksum
+from soilml.quantities import QUANTITIES, column
 from soilml.saving import replacing
-from training.graph import IR_VERSION, OPSET, Graph
+from training.graph import IR_VERSION, OPSET, Graph, Output, session_of
+from training.sets.family import CHANNELS
+from training.sets.posterior import SetPosterior
+from training.sets.said import figures_of, probe_of_sets, said_of
 from training.targets import PER_ROW
 from training.train import Trained
 
@@ -30,8 +34,41 @@ PARITY_ROWS = 8192
 
 
 def draw(trained: Trained) -> Any:
-    """The whole estimator as an ONNX model without metadata."""
-    graph, spec, estimator = Graph(), trained.spec, trained.estimator
+    """The whole estimator as an ONNX model without metadata.
+
+    With a set posterior it has two branches, of which one is run: with the input `joint` true all
+    rows are answered for together, else each by itself. What a branch does not read or give need
+    not be fed, and comes back empty.
+    """
+    names = list(inputs_of(trained.spec.features))
+    q, posterior = len(trained.spec.targets), trained.posterior
+    inputs: dict[str, list[Any]] = {name: ["rows"] for name in names}
+    outputs: dict[str, Output] = {
+        "mean": (1, ["rows", q]),
+        "std": (1, ["rows", q]),
+        "covariance": (1, ["rows", q, q]),
+        "in_range": (9, ["rows"]),
+    }
+    graph = Graph()
+    if posterior is None:
+        _draw_rows(trained, graph, "")
+        return graph.model(inputs, outputs)
+    rows, sets = Graph("rows_"), Graph("sets_")
+    _draw_rows(trained, rows, "rows_")
+    posterior.draw(sets, "sets_")
+    outputs = {
+        name: (kind, [None] * len(shape))
+        for name, (kind, shape) in (outputs | posterior.outputs).items()
+    }
+    graph.either("joint", sets, rows, outputs)
+    for name, value in (posterior.defaults() | {"joint": np.zeros(1, bool)}).items():
+        graph.default(name, value)
+    return graph.model(inputs | posterior.inputs | {"joint": [1]}, outputs)
+
+
+def _draw_rows(trained: Trained, graph: Graph, prefix: str) -> None:
+    """Every row by itself; outputs are named `<prefix><output>`."""
+    spec, estimator = trained.spec, trained.estimator
     names = list(inputs_of(spec.features))
     double = {name: graph.double(name) for name in names}
     columns = []
@@ -46,7 +83,7 @@ def draw(trained: Trained) -> Any:
     outer = graph.op("Mul", graph.reshaped(std, -1, q, 1), graph.reshaped(std, -1, 1, q))
     covariance = graph.op("Mul", outer, graph.constant(estimator.correlation))
     inside = trained.support.draw(graph, features)
-    graph.op("Identity", inside, out="in_range")
+    graph.op("Identity", inside, out=prefix + "in_range")
     ends = [graph.constant(end) for end in (trained.prior.lower, trained.prior.upper)]
     kept = graph.op("Min", graph.op("Max", mean, ends[0]), ends[1])
     prior = np.diag(trained.prior.std**2)
@@ -57,16 +94,8 @@ def draw(trained: Trained) -> Any:
     }
     for name, (value, otherwise, shape) in answers.items():
         flag = graph.reshaped(inside, *shape)
-        graph.single(graph.op("Where", flag, value, graph.constant(otherwise)), name)
-    return graph.model(
-        names,
-        {
-            "mean": (1, ["rows", q]),
-            "std": (1, ["rows", q]),
-            "covariance": (1, ["rows", q, q]),
-            "in_range": (9, ["rows"]),
-        },
-    )
+        answer = graph.op("Where", flag, value, graph.constant(otherwise))
+        graph.single(answer, prefix + name)
 
 
 def export(
@@ -77,19 +106,24 @@ def export(
     Bytes depend on the spec and the data alone.
     """
     model = draw(trained)
-    parity = _parity(trained, model.SerializeToString())
+    parity = _parity(trained, model)
     if not parity < TOLERANCE:
         raise SoilmlError(
             f"the exported model differs from the original by {parity:.1e} of the prior's spread, "
             f"more than {TOLERANCE:g}: lower gamma, or take fewer centres"
         )
     metadata = _metadata(trained, parity, data_path)
+    write_model(model, metadata, path)
+    return metadata
+
+
+def write_model(model: Any, metadata: dict[str, str], path: str | os.PathLike[str]) -> None:
+    """Write a graph with its metadata and their checksums."""
     graph = model.SerializeToString(deterministic=True)
     metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
     metadata["metadata_sha256"] = checksum(metadata)
     with replacing(path) as part:
         part.write_bytes(graph + behind(metadata))
-    return metadata
 
 
 def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]) -> dict[str, str]:
@@ -137,7 +171,12 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
                 "doubt": joint.doubt.tolist(),
             }
         ),
-        "probe": json.dumps(_probe(trained)),
+        "probe": json.dumps([_probe(trained), *probe_of_sets(trained.posterior)]),
+        **(
+            {}
+            if trained.posterior is None
+            else {"set": json.dumps(_set(trained.posterior, recipe))}
+        ),
         "spec": spec.text,
         "recipe": recipe,
         "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
@@ -155,6 +194,7 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
                 for name, score in trained.scores.items()
             }
         ),
+        "metrics_of_posterior": json.dumps(figures_of(trained.figures)),
         "metrics_of_sets": json.dumps(
             {
                 kind: {
@@ -174,6 +214,20 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
     }
 
 
+def _set(posterior: SetPosterior, recipe: str) -> dict[str, Any]:
+    """What the board must know of the set posterior: noise that is taken for given."""
+    content = recipe_of(recipe, "recipe of the data")
+    noise = {
+        name: [content.case.noise[column(name)].constant, content.case.noise[column(name)].share]
+        for name in CHANNELS
+        if column(name) in content.case.noise
+    }
+    bias = content.bias.get(column("torque"))
+    if bias is not None:
+        noise["torque_bias"] = [bias.constant, bias.share]
+    return said_of(posterior, noise, alone=False)
+
+
 def _box(trained: Trained) -> dict[str, Floats]:
     """Readings (n,) that fill the training box, and rows that were learned from."""
     measured = trained.parts.train.measured
@@ -186,13 +240,9 @@ def _box(trained: Trained) -> dict[str, Floats]:
     return found
 
 
-def _parity(trained: Trained, content: bytes) -> float:
+def _parity(trained: Trained, model: Any) -> float:
     """Largest difference of mean or std to the float64 original, in prior standard deviations."""
-    import onnxruntime as ort
-
-    options = ort.SessionOptions()
-    options.log_severity_level = 4
-    session = ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    session = session_of(model)
     readings = _box(trained)
     feed = {name: values.astype(np.float32) for name, values in readings.items()}
     mean, std, flag = session.run(("mean", "std", "in_range"), feed)

@@ -6,12 +6,18 @@ defaults are newer than the runtime reads.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+#: Element type and shape of a graph's output.
+Output = tuple[int, list[Any]]
+
+#: Element types of inputs.
+_FLOAT, _BOOL = 1, 9
 
 OPSET = 18
 IR_VERSION = 9
@@ -20,28 +26,46 @@ IR_VERSION = 9
 class Graph:
     """Nodes and constants of a graph under construction; values are addressed by name."""
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "") -> None:
+        self._prefix = prefix
         self._nodes: list[Any] = []
         self._constants: list[Any] = []
 
-    def constant(self, value: Any) -> str:
-        """A constant array; numbers become float64."""
+    def constant(self, value: Any, exact: bool = False) -> str:
+        """A constant array; numbers become float64, unless they are to stay as they are."""
         from onnx import numpy_helper
 
         array = np.asarray(value)
-        if array.dtype.kind == "f":
+        if array.dtype.kind == "f" and not exact:
             array = array.astype(np.float64)
-        name = f"c{len(self._constants)}"
+        name = f"{self._prefix}c{len(self._constants)}"
         self._constants.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
         return name
 
+    def small(self, value: Any) -> str:
+        """A constant array as float32."""
+        return self.constant(np.asarray(value, dtype=np.float32), exact=True)
+
     def op(self, kind: str, *inputs: str, out: str | None = None, **attributes: Any) -> str:
         """One node with one output; its name."""
+        return self.ops(kind, 1, *inputs, out=out, **attributes)[0]
+
+    def ops(
+        self,
+        kind: str,
+        count: int,
+        *inputs: str,
+        out: str | None = None,
+        outs: list[str] | None = None,
+        **attributes: Any,
+    ) -> list[str]:
+        """One node with several outputs; their names, which are new unless `outs` gives them."""
         from onnx import helper
 
-        name = out or f"v{len(self._nodes)}"
-        self._nodes.append(helper.make_node(kind, list(inputs), [name], **attributes))
-        return name
+        name = out or f"{self._prefix}v{len(self._nodes)}"
+        names = outs or [name, *[f"{name}_{i}" for i in range(1, count)]]
+        self._nodes.append(helper.make_node(kind, list(inputs), names, **attributes))
+        return names
 
     def double(self, name: str) -> str:
         """As float64."""
@@ -78,18 +102,66 @@ class Graph:
     def _axis(self, axis: int) -> str:
         return self.constant(np.asarray([axis], dtype=np.int64))
 
-    def reshaped(self, x: str, *shape: int) -> str:
+    def reshaped(self, x: str, *shape: int, out: str | None = None) -> str:
         """A new shape; 0 keeps a dimension, -1 fits."""
-        return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)))
+        return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)), out=out)
 
-    def model(self, inputs: list[str], outputs: dict[str, tuple[int, list[Any]]]) -> Any:
-        """The finished ONNX model: float32 inputs [rows]; outputs name -> (element type, shape)."""
-        from onnx import TensorProto, checker, helper
+    def default(self, name: str, value: Any) -> None:
+        """What an input is where nobody gives it."""
+        from onnx import numpy_helper
 
+        self._constants.append(numpy_helper.from_array(np.asarray(value), name))
+
+    def either(
+        self, condition: str, first: Graph, second: Graph, outputs: Mapping[str, Output]
+    ) -> None:
+        """Outputs of the first graph where the condition holds, else of the second.
+
+        Only that one is run. Each graph names what it gives `<prefix><output>`; outputs that it
+        does not give are empty.
+        """
+        self.ops(
+            "If",
+            0,
+            condition,
+            then_branch=first._branch(outputs),
+            else_branch=second._branch(outputs),
+            outs=list(outputs),
+        )
+
+    def _branch(self, outputs: Mapping[str, Output]) -> Any:
+        from onnx import helper
+
+        given = {name for node in self._nodes for name in node.output}
+        infos = []
+        for name, (kind, shape) in outputs.items():
+            own = self._prefix + name
+            if own not in given:
+                empty = np.zeros([0] * len(shape), helper.tensor_dtype_to_np_dtype(kind))
+                self.op("Identity", self.constant(empty, exact=True), out=own)
+            infos.append(helper.make_tensor_value_info(own, kind, [None] * len(shape)))
+        return helper.make_graph(self._nodes, f"{self._prefix}branch", [], infos, self._constants)
+
+    def model(
+        self,
+        inputs: Sequence[str] | Mapping[str, list[Any]],
+        outputs: Mapping[str, Output],
+    ) -> Any:
+        """The finished ONNX model: float32 inputs; outputs name -> (element type, shape).
+
+        Inputs have the shapes that are given, or [rows].
+        """
+        from onnx import checker, helper
+
+        if not isinstance(inputs, Mapping):
+            inputs = {name: ["rows"] for name in inputs}
         graph = helper.make_graph(
             self._nodes,
             "soilml",
-            [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["rows"]) for n in inputs],
+            [
+                helper.make_tensor_value_info(n, _BOOL if n == "joint" else _FLOAT, s)
+                for n, s in inputs.items()
+            ],
             [helper.make_tensor_value_info(n, k, shape) for n, (k, shape) in outputs.items()],
             self._constants,
         )
@@ -99,3 +171,14 @@ class Graph:
         model.ir_version = IR_VERSION
         checker.check_model(model, full_check=True)
         return model
+
+
+def session_of(model: Any) -> Any:
+    """An onnxruntime session of a model, on one thread."""
+    import onnxruntime as ort
+
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    content = model.SerializeToString()
+    return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])

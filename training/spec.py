@@ -18,6 +18,8 @@ from training.linear import LinearGaussian
 from training.lssvm import LSSVM
 from training.mlp import GaussianMLP
 from training.reader import Reader
+from training.sets.response import Size
+from training.sets.size import take_size
 from training.targets import PER_ROW, check_targets
 
 #: Regressor by the name that `[[regressor]] type` takes: one new file and one line here.
@@ -46,6 +48,7 @@ class Spec:
     regressors: tuple[Reader, ...]
     rule: str
     text: str
+    set_posterior: Size | None = None
 
     @property
     def per_row(self) -> bool:
@@ -78,9 +81,18 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     read = {k for r in regressors for k in r.columns or range(len(features))}
     for k in set(range(len(features))) - read:
         settings.fail(f"features: no regressor reads {features[k]!r}; leave it out")
+    size = take_size(settings, seed) if "set_posterior" in settings else None
     settings.finish()
-    text = json.dumps(settings.content, sort_keys=True)
-    return Spec(file.stem, seed, tuple(features), tuple(targets), tuple(regressors), rule, text)
+    return Spec(
+        name=file.stem,
+        seed=seed,
+        features=tuple(features),
+        targets=tuple(targets),
+        regressors=tuple(regressors),
+        rule=rule,
+        text=json.dumps(settings.content, sort_keys=True),
+        set_posterior=size,
+    )
 
 
 def _words(settings: Settings, key: str, default: list[str]) -> list[str]:

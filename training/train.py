@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.recipe import recipe_of
 from soilml.errors import InputError
 from soilml.estimate import Driven, Known, Rule, Together, answered
 from soilml.fusion import RULES
@@ -30,6 +31,10 @@ from training.fused import Fused, fused
 from training.mlp import GaussianMLP
 from training.reader import Reader
 from training.score import NINETY, Score, scored
+from training.sets.measured import Figures, measured, with_limits
+from training.sets.one_wheel import OneWheel
+from training.sets.posterior import SetPosterior
+from training.sets.response import learned
 from training.spec import Spec
 from training.support import Support
 
@@ -51,6 +56,8 @@ class Trained:
     scores: dict[str, Score]
     sets: dict[str, dict[int, Score]]
     members: tuple[Calibrated, ...]
+    posterior: SetPosterior | None = None
+    figures: dict[int, Figures] = field(default_factory=dict)
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Mean, standard deviation (n, q) and in-range flag (n,), as the exported file gives them.
@@ -102,6 +109,11 @@ def train(
     joint = _together(
         estimator, parts.calibrate.rows(~unseen), prior, driven_of(parts.train), spec.per_row
     )
+    posterior, figures = None, {}
+    if spec.set_posterior is not None:
+        family = OneWheel.of(recipe_of(data.recipe, "recipe of the data"), spec.targets)
+        posterior = with_limits(family, learned(family, spec.set_posterior, progress), progress)
+        figures = measured(posterior, progress)
     return Trained(
         spec=spec,
         estimator=estimator,
@@ -113,6 +125,8 @@ def train(
         scores=scores,
         sets=_set_scores(estimator, joint, parts.calibrate.rows(unseen), prior),
         members=tuple(members),
+        posterior=posterior,
+        figures=figures,
     )
 
 

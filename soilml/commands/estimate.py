@@ -18,8 +18,9 @@ from soilml.commands.output import deliver
 from soilml.errors import InputError, TableError
 from soilml.estimate import Estimate
 from soilml.fusion import COVARIANCE_INTERSECTION
+from soilml.joining import LEAST_SOUND
 from soilml.needs import need
-from soilml.onboard import LEAST_SOUND, Estimator
+from soilml.onboard import Estimator
 from soilml.quantities import QUANTITIES, column
 from soilml.reading import FILLED, RUNS
 from soilml.saving import named

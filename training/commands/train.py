@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from soilml.errors import InputError
 from soilml.needs import need
 from soilml.saving import named, replacing_all
 
@@ -15,6 +16,7 @@ Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not lear
 
   soilml train spec.toml data.parquet wheel.onnx
   soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip ...
+  soilml train any_wheel any.onnx                one file for wheels of any size; it needs no data
 
 Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
 
@@ -29,13 +31,17 @@ Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec
   type = "mlp"                                   # hidden = [64, 64], epochs, batch, patience, ...
   [[regressor]]
   type = "linear"                                # or "lssvm", exact, for some thousand rows
+  [set_posterior]                                # optional: all readings of one soil together, by
+  designs = 4096                                 # their exact likelihood under a learned response
+  hidden = 64                                    # of the wheel to slip, load and soil
+  epochs = 500
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("spec", metavar="SPEC.toml", help="or the name of a packaged spec")
-    parser.add_argument("data", metavar="DATA.parquet", help="from soilml generate")
+    parser.add_argument("data", metavar="DATA.parquet", nargs="?", help="from soilml generate")
     parser.add_argument("out", metavar="OUT.onnx")
 
 
@@ -47,6 +53,35 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
+    from training.sets.for_any_wheel import is_for_any_wheel
+
+    if is_for_any_wheel(args.spec):
+        return _any_wheel(args)
+    if args.data is None:
+        raise InputError(f"DATA.parquet is missing; {args.spec} learns from data: soilml generate")
+    return _from_data(args)
+
+
+def _any_wheel(args: argparse.Namespace) -> int:
+    """Train the file for wheels of any size."""
+    from datagen.progress import stages
+    from training.sets.for_any_wheel import card, export, read_any_spec, trained
+
+    if args.data is not None:
+        raise InputError(f"{args.data}: {args.spec} simulates its own rows; leave the data out")
+    spec, out = read_any_spec(args.spec), Path(args.out)
+    with stages() as progress:
+        posterior, figures = trained(spec, progress)
+        with replacing_all(outputs(args)[:2]) as (model, page):
+            metadata = export(spec, posterior, figures, model)
+            page.write_text(card(metadata, posterior, figures), encoding="utf-8")
+    size = out.stat().st_size / 1e3
+    print(f"\n{out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
+    return 0
+
+
+def _from_data(args: argparse.Namespace) -> int:
+    """Train what learns from data."""
     from datagen.progress import stages
     from soilml.writing import aligned
     from training.card import card
