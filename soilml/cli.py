@@ -26,7 +26,7 @@ shear modulus, with an uncertainty that can be believed.
   from data to a flying file  soilml train
   from measurements to soil   soilml estimate (trained, on board), identify (analytic)
   which to believe            soilml compare
-  what slope can be climbed   soilml climb
+  what slope can be climbed   soilml pull (by measured rows), climb (by stress on the rims)
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 ORDER = (
@@ -42,6 +42,8 @@ ORDER = (
     "compare",
     "climb",
 )
+#: Arguments that name files to write.
+WRITTEN = ("out", "picture")
 _NEGATIVE = re.compile(r"-[\d.]")
 
 
@@ -140,7 +142,7 @@ def _silence_output() -> None:
 
 def _files(args: argparse.Namespace) -> list[str]:
     """Every argument that may name a file to read."""
-    given = (v if isinstance(v, list) else [v] for k, v in vars(args).items() if k != "out")
+    given = (v if isinstance(v, list) else [v] for k, v in vars(args).items() if k not in WRITTEN)
     return [value for values in given for value in values if isinstance(value, str)]
 
 

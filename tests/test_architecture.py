@@ -21,6 +21,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/identification/nonlinear.py": {"scipy"},
     "soilml/gap/page.py": {"jinja2"},
     "soilml/gap/pictures.py": {"matplotlib"},
+    "soilml/traction/picture.py": {"matplotlib"},
 }
 
 

@@ -45,10 +45,7 @@ def posterior(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     nonlinear method: the posterior is drawn again with all noise larger by as much (of sets
     that the model does hold for, one in a thousand is). That is no cure where it lacks an effect.
     """
-    found, misfit, cells = sampled(case, data, free)
-    surplus = misfit > _expected(cells - len(free))
-    if surplus:
-        found, _, _ = sampled(case, data, free, larger=float(np.sqrt(misfit)))
+    found, misfit, surplus = settled_samples(case, data, free)
     values = np.stack([f.prior.at(found.u[:, i]) for i, f in enumerate(free)], axis=1)
     mean = found.mean(values)
     off = values - mean
@@ -70,6 +67,17 @@ def posterior(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
         high=high,
     )
     return caveats(fit, case, data, free, middle, surplus=surplus, undeclared=False)
+
+
+def settled_samples(
+    case: Case, data: Measured, free: Sequence[Free]
+) -> tuple[Population, float, bool]:
+    """Weighted samples of the posterior, misfit, and whether noise had to be taken for larger."""
+    found, misfit, cells = sampled(case, data, free)
+    surplus = misfit > _expected(cells - len(free))
+    if surplus:
+        found, _, _ = sampled(case, data, free, larger=float(np.sqrt(misfit)))
+    return found, misfit, surplus
 
 
 def sampled(
