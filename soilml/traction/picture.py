@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,18 @@ def draw(report: Report, path: Path) -> None:
         low.set_xlabel("slip")
     panels[0, 0].set_ylabel("drawbar pull, N")
     panels[1, 0].set_ylabel("slope climbed, degrees")
-    panels[0, 0].legend(loc="lower right", fontsize=9, frameon=False)
+    parts: dict[str, Any] = {}
+    for axes in panels.flat:
+        axes.plot(
+            report.driven.slip, [0.0, 0.0], color=MEASURED, lw=5, alpha=0.6, label="slips driven",
+            transform=axes.get_xaxis_transform(), solid_capstyle="butt",
+        )  # fmt: skip
+        handles, labels = axes.get_legend_handles_labels()
+        parts |= dict(zip(labels, handles, strict=True))
+    figure.legend(
+        parts.values(), parts.keys(), loc="outside lower center", ncols=4 if count > 1 else 2,
+        fontsize=9, frameon=False,
+    )  # fmt: skip
     figure.savefig(path, format="png", dpi=130)
 
 
@@ -62,4 +73,4 @@ def _bands(axes: Axes, slip: Floats, prior: Band, known: Band) -> None:
     axes.grid(color="#eeeeee", lw=0.7)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set_xlim(0.0, float(slip[-1]))
+    axes.set_xlim(0.0, 1.03 * float(slip[-1]))

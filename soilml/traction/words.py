@@ -51,7 +51,7 @@ def said(known: Traction, left: tuple[float, float], driven: Driven) -> Iterator
 
 def _learned(left: tuple[float, float]) -> Iterator[str]:
     for name, share in zip(("largest pull", "steepest slope"), left, strict=True):
-        wide = f"its band is {share:.0%} as wide as the prior's"
+        wide = f"its band is {min(share, 1.0):.0%} as wide as the prior's"
         if share > NOT:
             yield f"the {name} is not known: {wide}, the rows tell nothing of it; do not use it"
         elif share > HARDLY:

@@ -1,0 +1,51 @@
+"""Whether the bands of `soilml pull` hold what the soil truly gives, and by how much they miss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from place import ROOT
+from scipy.stats import binom
+
+from soilml import Estimator, SlipSinkage, read_case
+from soilml.traction.coverage import SLIPS, Coverage, coverage
+
+#: Soils that nothing was settled with; a load among those driven, and one that is not (N).
+SEEDS = range(20_000, 20_240)
+LOADS = (75.0, 200.0)
+
+
+def prospects() -> str:
+    """Coverage of 90 % bands of pull and of the steepest slope, as a table."""
+    case = read_case(ROOT / "examples/wheel/model.toml")
+    digging = replace(case, model=case.model + SlipSinkage(n1=SlipSinkage.about.reference["n1"]))
+    onboard = Estimator.load(ROOT / "exported/wheel.onnx")
+    kinds = {
+        "posterior": coverage(case, SEEDS, LOADS),
+        "exported/wheel.onnx": coverage(case, SEEDS, LOADS, estimator=onboard),
+        "posterior, slip-sinkage missing": coverage(case, SEEDS, LOADS, world=digging),
+    }
+    slips = " | ".join(f"pull at {s:g}" for s in SLIPS)
+    lines = [f"| soil by | load, N | {slips} | steepest | its width | nine of ten within |"]
+    lines.append("|---|---:|" + "---:|" * (len(SLIPS) + 3))
+    lines += [line for name, found in kinds.items() for line in _lines(name, found)]
+    low, high = binom.interval(0.95, len(SEEDS), 0.9) / np.asarray(len(SEEDS))
+    lines.append(f"\n95 of 100 exact bands would show {100 * low:.0f} to {100 * high:.0f} %.")
+    return "\n".join(lines)
+
+
+def _lines(name: str, found: dict[float, Coverage]) -> Iterator[str]:
+    for load, one in found.items():
+        pulls = " | ".join(f"{100 * share:.0f} %" for share in one.pull.inside)
+        wide = np.rad2deg(np.median(one.steepest.width))
+        reach = np.rad2deg(np.quantile(np.abs(one.steepest.off), 0.9))
+        yield (
+            f"| {name} | {load:g} | {pulls} | {100 * one.steepest.inside:.0f} % "
+            f"| {wide:.1f} deg | {reach:.1f} deg |"
+        )
+
+
+if __name__ == "__main__":
+    print(prospects())

@@ -1,0 +1,114 @@
+"""Whether bands of pull and slope hold the truth as often as they say, over simulated soils."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.case import Case
+from soilml.identification.free import chosen
+from soilml.identification.measured import measured_rows
+from soilml.onboard import Estimator
+from soilml.operating import Operating
+from soilml.quantities import column
+from soilml.table import Table
+from soilml.traction.draws import Draws, posterior_draws
+from soilml.traction.onboard_soil import onboard_draws
+from soilml.traction.prediction import QUANTILES, Traction, band, traction
+
+Floats = NDArray[np.float64]
+
+#: Slips at which is asked; six rows are driven between their ends, at loads (N) between these.
+SLIPS = np.round(np.linspace(0.1, 0.6, 6), 12)
+ROWS = 6
+LOADS = (30.0, 120.0)
+
+
+@dataclass(frozen=True)
+class Covered:
+    """Of each soil (n, ...): share of draws below the truth, truth - middle, width of the band."""
+
+    below: Floats
+    off: Floats
+    width: Floats
+
+    @property
+    def inside(self) -> Floats:
+        """Share of soils whose truth lies in the band of nine tenths, (...)."""
+        held = (self.below > QUANTILES[0]) & (self.below < QUANTILES[-1])
+        return np.asarray(held.mean(axis=0))
+
+    @property
+    def reach(self) -> Floats:
+        """How far from the middle nine of ten truths lie, in half-widths: 1 where bands hold."""
+        return np.asarray(np.quantile(np.abs(self.off) / (0.5 * self.width), 0.9, axis=0))
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What was covered under one load: pull (N) at `SLIPS`, and the steepest slope (rad)."""
+
+    pull: Covered
+    steepest: Covered
+
+
+def coverage(
+    case: Case,
+    seeds: Iterable[int],
+    loads: tuple[float, ...],
+    *,
+    world: Case | None = None,
+    estimator: Estimator | None = None,
+) -> dict[float, Coverage]:
+    """Drive soils drawn from the case's prior, predict, and compare with what they truly give.
+
+    Six rows a soil with torque alone, with the case's noise; the soil by the posterior, or as
+    `estimator` knows it. Rows and truths come from `world` where that is not the case.
+    """
+    found: dict[float, list[tuple[Traction, Traction]]] = {load: [] for load in loads}
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        truth = {name: prior.at(rng.random(1)) for name, prior in case.prior.items()}
+        true = Draws(tuple(truth), np.stack(list(truth.values()), axis=1))
+        table = _driven(case, world or case, true, rng)
+        draws = _known(case, table, estimator, seed)
+        for load, pairs in found.items():
+            made = traction(case, draws, load, SLIPS), traction(world or case, true, load, SLIPS)
+            pairs.append(made)
+    return {
+        load: Coverage(
+            _covered([(a.pull, b.pull[0]) for a, b in pairs]),
+            _covered([(a.steepest, b.steepest[0]) for a, b in pairs]),
+        )
+        for load, pairs in found.items()
+    }
+
+
+def _driven(case: Case, world: Case, true: Draws, rng: np.random.Generator) -> Table:
+    """Six rows on the true soil, torque with the case's noise."""
+    slip = SLIPS[0] + (SLIPS[-1] - SLIPS[0]) * (np.arange(ROWS) + rng.random(ROWS)) / ROWS
+    load = rng.uniform(*LOADS, size=ROWS)
+    there = true.of(world, np.zeros(ROWS, dtype=np.int64))
+    torque = np.asarray(there.model(there.soil, Operating(slip=slip, load=load)).torque)
+    key = column("torque")
+    torque = torque + case.noise[key].std(torque) * rng.standard_normal(ROWS)
+    run = np.full(ROWS, "simulated")
+    return Table({"run": run, "slip": slip, "load_N": load, key: torque})
+
+
+def _known(case: Case, table: Table, estimator: Estimator | None, seed: int) -> Draws:
+    if estimator is not None:
+        return onboard_draws(estimator, case, table)[1]
+    return posterior_draws(case, measured_rows(case, table), chosen(case, None), seed=seed).draws
+
+
+def _covered(pairs: list[tuple[Floats, Floats]]) -> Covered:
+    bands = [band(draws) for draws, _ in pairs]
+    return Covered(
+        below=np.stack([np.mean(draws < truth, axis=0) for draws, truth in pairs]),
+        off=np.stack([truth - b.middle for (_, truth), b in zip(pairs, bands, strict=True)]),
+        width=np.stack([b.width for b in bands]),
+    )
