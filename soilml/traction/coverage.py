@@ -15,7 +15,7 @@ from soilml.onboard import Estimator
 from soilml.operating import Operating
 from soilml.quantities import column
 from soilml.table import Table
-from soilml.traction.draws import Draws, posterior_draws
+from soilml.traction.draws import COUNT, Draws, posterior_draws
 from soilml.traction.onboard_soil import onboard_draws
 from soilml.traction.prediction import QUANTILES, Traction, band, traction
 
@@ -38,7 +38,7 @@ class Covered:
     @property
     def inside(self) -> Floats:
         """Share of soils whose truth lies in the band of nine tenths, (...)."""
-        held = (self.below > QUANTILES[0]) & (self.below < QUANTILES[-1])
+        held = (self.below >= QUANTILES[0]) & (self.below <= QUANTILES[-1])
         return np.asarray(held.mean(axis=0))
 
     @property
@@ -62,11 +62,13 @@ def coverage(
     *,
     world: Case | None = None,
     estimator: Estimator | None = None,
+    count: int = COUNT,
 ) -> dict[float, Coverage]:
     """Drive soils drawn from the case's prior, predict, and compare with what they truly give.
 
     Six rows a soil with torque alone, with the case's noise; the soil by the posterior, or as
-    `estimator` knows it. Rows and truths come from `world` where that is not the case.
+    `estimator` knows it, `count` draws of it. Rows and truths come
+    from `world` where that is not the case.
     """
     found: dict[float, list[tuple[Traction, Traction]]] = {load: [] for load in loads}
     for seed in seeds:
@@ -74,7 +76,11 @@ def coverage(
         truth = {name: prior.at(rng.random(1)) for name, prior in case.prior.items()}
         true = Draws(tuple(truth), np.stack(list(truth.values()), axis=1))
         table = _driven(case, world or case, true, rng)
-        draws = _known(case, table, estimator, seed)
+        if estimator is not None:
+            draws = onboard_draws(estimator, case, table)[1]
+        else:
+            data = measured_rows(case, table)
+            draws = posterior_draws(case, data, chosen(case, None), count, seed).draws
         for load, pairs in found.items():
             made = traction(case, draws, load, SLIPS), traction(world or case, true, load, SLIPS)
             pairs.append(made)
@@ -97,12 +103,6 @@ def _driven(case: Case, world: Case, true: Draws, rng: np.random.Generator) -> T
     torque = torque + case.noise[key].std(torque) * rng.standard_normal(ROWS)
     run = np.full(ROWS, "simulated")
     return Table({"run": run, "slip": slip, "load_N": load, key: torque})
-
-
-def _known(case: Case, table: Table, estimator: Estimator | None, seed: int) -> Draws:
-    if estimator is not None:
-        return onboard_draws(estimator, case, table)[1]
-    return posterior_draws(case, measured_rows(case, table), chosen(case, None), seed=seed).draws
 
 
 def _covered(pairs: list[tuple[Floats, Floats]]) -> Covered:

@@ -13,7 +13,7 @@ from soilml.errors import InputError
 from soilml.operating import Operating
 from soilml.status import Status
 from soilml.traction.draws import Draws
-from soilml.traction.prediction import Traction, band, traction
+from soilml.traction.prediction import Band, Traction, band, traction
 from soilml.traction.words import Driven, said
 
 Floats = NDArray[np.float64]
@@ -37,12 +37,9 @@ class Prospect:
     @property
     def left(self) -> tuple[float, float]:
         """Width of the bands of largest pull and steepest slope over those of the prior."""
-        pairs = (
-            (self.known.largest_pull, self.prior.largest_pull),
-            (self.known.steepest, self.prior.steepest),
-        )
-        pull, slope = (float(band(a).width / band(b).width) for a, b in pairs)
-        return pull, slope
+        known, prior = self.known, self.prior
+        pull = _share(band(known.largest_pull), band(prior.largest_pull))
+        return pull, _share(band(known.steepest), band(prior.steepest))
 
 
 def prospects(
@@ -85,6 +82,11 @@ def asked_slips(limit: float | None, driven: Driven) -> Floats:
         raise InputError(f"slip limit {limit:g}; needed is a slip between 0 and 1")
     top = max(HIGHEST, driven.slip[1]) if limit is None else limit
     return np.asarray(top * np.arange(1, SLIPS + 1) / SLIPS)
+
+
+def _share(known: Band, prior: Band) -> float:
+    """Width over the prior's; NaN where the prior has none."""
+    return float(known.width / prior.width) if prior.width > 0.0 else np.nan
 
 
 def _check_carried(

@@ -163,6 +163,7 @@ def test_soils_and_effects_list_their_catalogues(capsys):
         "soils",
         "effects",
         "climb",
+        "pull",
     ],
 )
 def test_help_teaches_with_an_example(command, capsys):

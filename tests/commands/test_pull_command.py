@@ -1,0 +1,115 @@
+"""`soilml pull`: from a table of rows to a band of pull and a slope."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from conftest import MODEL
+
+from soilml import Operating, read_case
+from soilml.cli import main
+
+ROWS = "run,slip,load_N,torque_Nm\na,0.2,60,{}\na,0.4,60,{}\n"
+COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.4"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A model file, and two rows without noise on a soil of its prior."""
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "runs.csv").write_text(ROWS.format(*torque(tmp_path)))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def truth(folder, slip):
+    case = read_case(folder / "model.toml")
+    case = case.with_values({"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012})
+    return case.model(case.soil, Operating(slip=slip, load=60.0))
+
+
+def torque(folder):
+    return truth(folder, np.asarray([0.2, 0.4])).torque.round(3)
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
+    files = ["--out", "pull.csv", "--picture", "pull.png"]
+    for name in files[1::2]:
+        (folder / name).write_text("to be written over")
+    assert main([*COMMAND, *files]) == 0
+    said = capsys.readouterr().out
+    assert (folder / "pull.png").read_bytes().startswith(b"\x89PNG")
+    rows = rows_of((folder / "pull.csv").read_text())
+    column = {k: np.asarray([float(r[k]) for r in rows]) for k in rows[0]}
+    assert column["slip"][-1] == 0.4 and set(column["load_N"]) == {60.0}
+    pull = truth(folder, column["slip"]).drawbar_pull
+    inside = (column["drawbar_pull_N_p05"] < pull) & (pull < column["drawbar_pull_N_p95"])
+    assert inside.all()
+    for name in ("drawbar_pull_N", "slope_rad"):
+        assert (column[f"{name}_prior_p05"] < column[f"{name}_p05"]).all()
+        assert (column[f"{name}_p95"] < column[f"{name}_prior_p95"]).all()
+    best = f"{column['largest_drawbar_pull_N'][0]:.1f}"
+    steep = f"{np.rad2deg(column['steepest_slope_rad'][0]):.1f}"
+    assert f"largest pull    {best} (" in said and f"steepest slope  {steep} (" in said
+    assert "no load transfer" in said
+
+
+def test_each_run_has_its_own_answer_and_one_that_cannot_be_had_is_said(folder, capsys):
+    with (folder / "runs.csv").open("a") as file:
+        file.write("b,0.2,60,\n")
+    assert main([*COMMAND, "--by", "run"]) == 0
+    captured = capsys.readouterr()
+    assert {r["run"] for r in rows_of(captured.out)} == {"a"}
+    assert "run b has no answer" in captured.err
+
+
+def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):
+    assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
+    rows = rows_of((folder / "pull.csv").read_text())
+    low, high = (float(rows[-1][f"drawbar_pull_N_{end}"]) for end in ("p05", "p95"))
+    assert low < truth(folder, 0.4).drawbar_pull < high
+    other = MODEL.replace("radius = 0.15", "radius = 0.2")
+    (folder / "model.toml").write_text(other)
+    capsys.readouterr()
+    assert main([*COMMAND, "--from", str(small_model)]) == 2
+    assert "was trained with gear.radius 0.15" in capsys.readouterr().err
+    (folder / "model.toml").write_text(MODEL.replace("[soil.prior]", "n = 0.9\n[soil.prior]"))
+    assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
+    assert "was trained with n 1.1, the model file has 0.9" in capsys.readouterr().out
+
+
+BARE = MODEL[: MODEL.index("[soil.prior]")] + MODEL[MODEL.index("[noise]") :]
+FAULTS = {
+    "no rows": ({"runs.csv": "run,slip,load_N,torque_Nm\n"}, [], "no row"),
+    "no torque": ({"runs.csv": ROWS.format("", "")}, [], "no reading of"),
+    "no prior": ({"model.toml": BARE}, [], "nothing to identify"),
+    "no noise": ({"model.toml": MODEL[: MODEL.index("[noise]")]}, [], "needs the noise"),
+    "slip limit of one": ({}, ["--slip-limit", "1"], "between 0 and 1"),
+    "slip limit below zero": ({}, ["--slip-limit", "-0.2"], "between 0 and 1"),
+    "too heavy": ({}, ["--load", "1e6"], "at most about"),
+    "load of nothing": ({}, ["--load", "0"], "needed is a load above zero"),
+    "no load": ({}, ["--load", "much"], "start:stop:count"),
+    "many loads": ({}, ["--load", "10:90:9"], "at most 8"),
+    "unknown parameter": ({}, ["--free", "stickiness"], "is no parameter"),
+    "two unknowns": ({}, ["--free", "cohesion", "--from", "x.onnx"], "--free is for the posterior"),
+    "no such file": ({}, ["--from", "none.onnx"], "no such file"),
+    "picture of runs": ({}, ["--by", "run", "--picture", "p.png"], "shows one soil"),
+    "no picture": ({}, ["--picture", "p.csv"], "the output is a .png file"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_bad_input_is_one_line(folder, capsys, fault):
+    files, options, said = FAULTS[fault]
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    before = sorted(folder.iterdir())
+    assert main([*COMMAND, *options, "--out", "pull.csv"]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1 and said in captured.err, captured.err
+    assert captured.out == "" and sorted(folder.iterdir()) == before

@@ -1,0 +1,35 @@
+"""Bands hold the truth as often as they say, unless the model lacks what the soil does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from soilml import SlipSinkage, read_case
+from soilml.noise import Noise
+from soilml.traction.coverage import coverage
+
+SOILS = 16
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def test_bands_hold_the_truth_as_often_as_they_say(case):
+    noisy = replace(case, noise={"torque_Nm": Noise(share=0.2)})  # wide posteriors are quick
+    found = coverage(noisy, range(500, 500 + SOILS), (200.0,), count=120)
+    for one in found.values():
+        for part in (one.pull.below[:, 2], one.pull.below[:, 5], one.steepest.below):
+            for low, high in ((0.05, 0.95), (0.25, 0.75)):
+                held = int(np.sum((part > low) & (part < high)))
+                ends = binom.interval(0.998, SOILS, high - low)
+                assert ends[0] <= held <= ends[1]
+
+
+def test_a_model_without_the_digging_of_the_soil_promises_too_much(case):
+    digging = replace(case, model=case.model + SlipSinkage(n1=0.4))
+    one = coverage(case, range(4), (60.0,), world=digging, count=120)[60.0]
+    assert (one.steepest.off < 0.0).all() and (one.steepest.below == 0.0).all()

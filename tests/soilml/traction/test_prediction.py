@@ -1,0 +1,137 @@
+"""What a wheel pulls and climbs on soils that are known, and how sure one can be."""
+
+import numpy as np
+import pytest
+
+from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_case
+from soilml.case import Case
+from soilml.errors import InputError
+from soilml.traction import Draws, band, prior_draws, traction
+from soilml.traction.prospect import asked_slips, driven_loads, prospects
+from soilml.traction.words import Driven
+
+SLIPS = np.asarray([0.1, 0.3, 0.6])
+EVERYWHERE = Driven((0.0, 0.99), (1.0, 1e4))
+NAMES = ("cohesion", "friction_angle", "shear_modulus")
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def soils(*rows):
+    return Draws(NAMES, np.asarray(rows, dtype=float))
+
+
+def with_effect(case, effect):
+    return Case(case.model + effect, case.soil, case.prior, case.noise)
+
+
+def test_on_the_slope_found_the_wheel_pulls_its_part_of_the_load(case):
+    rng = np.random.default_rng(3)
+    draws = soils(*zip(*[p.at(rng.random(50)) for p in case.prior.values()], strict=True))
+    found = traction(case, draws, 80.0, SLIPS)
+    soil = draws.of(case, np.arange(50)[:, None])
+    at = Operating(slip=SLIPS, load=80.0 * np.cos(found.slope))
+    pull = soil.model(soil.soil, at).drawbar_pull
+    np.testing.assert_allclose(pull, 80.0 * np.sin(found.slope), atol=1e-6)
+    assert (found.slope < 0.0).any()  # some soils at some slips: downhill only
+
+
+def test_on_sand_without_cohesion_no_slope_is_steeper_than_its_friction_angle(case):
+    found = traction(case, soils((0.0, 0.5, 0.01), (0.0, 0.7, 0.01)), 20.0, SLIPS)
+    assert (found.steepest < [0.5, 0.7]).all()
+    assert found.steepest[1] > found.steepest[0]
+
+
+def test_a_heavier_wheel_pulls_more_and_climbs_less(case):
+    light, heavy = (traction(case, soils((900.0, 0.6, 0.012)), w, SLIPS) for w in (40.0, 120.0))
+    assert heavy.largest_pull > light.largest_pull
+    assert heavy.steepest < light.steepest
+
+
+def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
+    one = (900.0, 0.6, 0.012)
+    found = band(traction(case, soils(one, one, one), 60.0, SLIPS).pull)
+    true = case.with_values(dict(zip(NAMES, one, strict=True)))
+    pull = true.model(true.soil, Operating(slip=SLIPS, load=60.0)).drawbar_pull
+    for part in (found.lower, found.middle, found.upper):
+        np.testing.assert_allclose(part, pull, rtol=1e-9)
+
+
+def test_effects_of_the_soil_count_and_those_of_rig_and_sensors_do_not(case):
+    one = soils((900.0, 0.6, 0.012))
+    plain = traction(case, one, 60.0, SLIPS)
+    for effect in (DrawbarOffset(offset=3.0), LoadTransfer(offset=20.0)):
+        seen = with_effect(case, effect)
+        np.testing.assert_array_equal(traction(seen, one, 60.0, SLIPS).pull, plain.pull)
+    digging = traction(with_effect(case, SlipSinkage(n1=0.4)), one, 60.0, SLIPS)
+    assert (np.abs(digging.pull - plain.pull) > 0.1).all()
+
+
+def test_the_best_slip_is_inside_where_digging_costs_more_than_slip_brings(case):
+    digging = with_effect(case, SlipSinkage(n1=1.5))
+    slips = np.linspace(0.05, 0.9, 18)
+    found = traction(digging, soils((900.0, 0.6, 0.012)), 60.0, slips)
+    i = int(np.argmax(found.pull[0]))
+    assert 0 < i < 17 and found.best_slip[0] == slips[i] and found.rising == 0.0
+    assert found.largest_pull[0] == found.pull[0, i]
+
+
+def test_the_prior_alone_is_said_to_tell_nothing(case):
+    before = prior_draws([free_of(case, name) for name in NAMES], 60)
+    (one,) = prospects(case, before, before, [60.0], SLIPS, EVERYWHERE)
+    assert one.left == (1.0, 1.0)
+    assert sum("is not known" in text for text in one.warnings) == 2
+    (sure,) = prospects(case, soils((900.0, 0.6, 0.012)), before, [60.0], SLIPS, EVERYWHERE)
+    assert sure.left == (0.0, 0.0)
+    assert not any("known" in text for text in sure.warnings)
+
+
+def free_of(case, name):
+    from soilml.identification.free import chosen
+
+    return chosen(case, [name])[0]
+
+
+def test_what_was_not_driven_is_said(case):
+    one = soils((900.0, 0.6, 0.012))
+    driven = Driven((0.3, 0.35), (50.0, 60.0))
+    (far,) = prospects(case, one, one, [120.0], SLIPS, driven)
+    text = " ".join(far.warnings)
+    for said in ("no slip above 0.35", "no slip below 0.3", "no load above 60 N", "asked is 120 N"):
+        assert said in text
+    (near,) = prospects(case, one, one, [55.0], np.asarray([0.3, 0.4]), driven)
+    assert not any("was driven" in said for said in near.warnings)
+
+
+def test_a_load_that_the_soil_does_not_carry_is_refused_with_what_it_carries(case):
+    one = soils((900.0, 0.6, 0.012))
+    with pytest.raises(InputError, match="at most about") as refused:
+        prospects(case, one, one, [1e6], SLIPS, EVERYWHERE)
+    limit = float(str(refused.value).split("at most about ")[1].split(" N")[0])
+    prospects(case, one, one, [0.9 * limit], SLIPS[:1], EVERYWHERE)
+
+
+def test_soils_that_do_not_carry_the_load_are_left_out_and_counted(case):
+    draws = Draws(("kphi",), np.asarray([[1.5e6], [1.5e6], [1e4]]))
+    (one,) = prospects(case, draws, draws, [60.0], SLIPS, EVERYWHERE)
+    assert one.known.sunk == pytest.approx(1 / 3)
+    assert any("do not carry 60 N" in text for text in one.warnings)
+    assert np.isfinite(band(one.known.pull).lower).all()
+    assert np.isnan(one.known.steepest[2]) and np.isnan(one.known.best_slip[2])
+
+
+def test_loads_of_rows_that_are_alike_are_one():
+    found = driven_loads(np.asarray([61.0, 30.0, 59.0, 31.0]))
+    assert found == pytest.approx([30.5, 60.0])
+    assert driven_loads(np.asarray([10.0, 20.0, 40.0, 80.0, 160.0])) == [10.0, 40.0, 160.0]
+
+
+def test_slips_end_where_asked():
+    assert asked_slips(0.3, EVERYWHERE)[-1] == 0.3
+    assert asked_slips(None, Driven((0.1, 0.2), (1.0, 2.0)))[-1] == 0.6
+    for limit in (0.0, 1.0, -0.2, float("nan")):
+        with pytest.raises(InputError, match="between 0 and 1"):
+            asked_slips(limit, EVERYWHERE)
