@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from soilml.traction.report import Report
 
 #: Every so many slips of the curve are printed; loads asked for at most.
-SHOWN, MOST_LOADS = 4, 8
+SHOWN, MOST_LOADS = 2, 8
 DEGREES = 180.0 / pi
 
 HELP = "drawbar pull against slip, and the slope climbed, on the soil of measured rows"
@@ -194,7 +194,8 @@ def _of_load(one: Prospect) -> str:
     known, prior = one.known, one.prior
     pull, slope, before = band(known.pull), band(known.slope), band(prior.pull)
     header = (
-        "slip", "pull_N", "p05", "p95", "pull/load", "slope_deg", "p05", "p95", "prior_N", "p95",
+        "slip", "pull_N", "p05", "p95", "pull/load", "slope_deg", "p05", "p95",
+        "prior_p05_N", "prior_p95_N",
     )  # fmt: skip
     lines = []
     for i in range(SHOWN - 1, len(known.slip), SHOWN):

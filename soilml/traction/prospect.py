@@ -23,7 +23,7 @@ SAME_LOAD = 0.1
 #: Loads that are shown where rows have more: the lightest, those between, the heaviest.
 MOST_LOADS = 3
 #: The highest slip where none is asked for and none higher was driven; slips of a curve.
-HIGHEST, SLIPS = 0.6, 24
+HIGHEST, SLIPS = 0.6, 12
 
 
 @dataclass(frozen=True)
