@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 #: Shares of draws below the band's lower end, its middle and its upper end.
 QUANTILES = (0.05, 0.5, 0.95)
-#: Steepest slope that is searched to either side of the flat, rad (86 degrees).
+#: Steepest slope that is searched, rad (86 degrees); a wheel that sticks to more is held there.
 STEEPEST = 1.5
 #: Kinds of effects that belong to the rig and the sensors that the rows came from.
 LEFT_BEHIND = ("rig", "sensor")
@@ -130,7 +130,7 @@ def traction(
     guess = np.arctan(flat[carried] / load)
     root = crossing(too_steep, -ends, ends, guess, np.ones(carried.size))
     slope = np.full(rows.size, np.nan)
-    slope[carried] = np.where(root.found, root.x, np.nan)
+    slope[carried] = np.where(root.found | (root.x >= STEEPEST), root.x, np.nan)
     shape = (count, len(slip))
     return Traction(float(load), slip, flat.reshape(shape), slope.reshape(shape))
 

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 #: How far beyond the slips that were driven, and by which factor beyond the loads, is far.
 FAR_SLIP, FAR_LOAD = 0.1, 1.25
+#: Slope (rad) past which no vehicle stands.
+TIPS = 0.7854
 #: What no band holds, whatever was measured.
 NEVER = (
     "bands hold what soil and noise leave open, not errors of the model; all wheels alike, no "
@@ -42,6 +44,8 @@ def said(known: Traction, left: tuple[float, float], driven: Driven) -> Iterator
     yield from _beyond(known, driven)
     if known.sunk > 0.0:
         yield f"{known.sunk:.0%} of the soils and slips do not carry {known.load:.4g} N: left out"
+    if np.nanmedian(known.steepest) > TIPS:
+        yield "past 45 degrees the slope rests on cohesion under a light gear: vehicles tip before"
     if known.rising > 0.5:
         yield (
             f"the pull still rises at slip {known.slip[-1]:g}, the highest looked at: "

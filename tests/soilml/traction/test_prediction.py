@@ -51,6 +51,13 @@ def test_a_heavier_wheel_pulls_more_and_climbs_less(case):
     assert heavy.steepest < light.steepest
 
 
+def test_a_light_wheel_on_sticky_soil_climbs_walls_which_is_doubted(case):
+    sticky = soils((2e4, 0.7, 0.002))
+    (one,) = prospects(case, sticky, sticky, [5.0], SLIPS, EVERYWHERE)
+    assert one.known.steepest[0] == pytest.approx(1.5)
+    assert any("vehicles tip before" in text for text in one.warnings)
+
+
 def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
     one = (900.0, 0.6, 0.012)
     found = band(traction(case, soils(one, one, one), 60.0, SLIPS).pull)
