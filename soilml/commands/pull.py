@@ -132,10 +132,13 @@ def _deliver(args: argparse.Namespace, found: dict[str, Report]) -> None:
                 draw(found[""], part)
             else:
                 part.write_text(text, encoding="utf-8")
+    heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
     if args.out is None and not watched():
         put(text)
+        for name, report in found.items():
+            for line in _doubts(report):
+                print(f"{heads[name]}{line}", file=sys.stderr)
     else:
-        heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
         print("\n\n".join(heads[name] + _for_people(report) for name, report in found.items()))
 
 
@@ -175,6 +178,12 @@ def _columns(one: Prospect) -> dict[str, Any]:
 
 def _ends(found: Band) -> tuple[Any, Any, Any]:
     return found.middle, found.lower, found.upper
+
+
+def _doubts(report: Report) -> list[str]:
+    """Warnings of all loads and of the whole, each once."""
+    own = [f"{one.known.load:.4g} N: {text}" for one in report.prospects for text in one.warnings]
+    return [*own, *report.warnings]
 
 
 def _for_people(report: Report) -> str:

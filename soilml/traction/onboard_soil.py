@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.case import Case, take_case
-from soilml.errors import InputError
+from soilml.errors import FitError, InputError
 from soilml.identification.free import Free
 from soilml.onboard import Estimator
 from soilml.prior import Prior
@@ -28,7 +28,7 @@ def onboard_draws(
     """What the file estimates and its range, draws of its estimate of all rows, and warnings.
 
     Raises `InputError` where the file is of another gear, or estimates what the case lacks, and
-    where no row has all its readings.
+    `FitError` where no row has all its readings.
     """
     warnings = _same_case(estimator, case)
     known, prior = case.parameters(), estimator.prior
@@ -45,7 +45,7 @@ def onboard_draws(
     whole = np.all([np.isfinite(values) for values in read.values()], axis=0)
     if not whole.any():
         names = ", ".join(column(name) for name in estimator.inputs)
-        raise InputError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
+        raise FitError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
     estimate = estimator.run(**{name: values[whole] for name, values in read.items()})
     if not estimate.in_range:
         warnings.append(
