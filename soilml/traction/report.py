@@ -58,6 +58,10 @@ def pull_report(
         found = posterior_draws(case, data, wanted)
         draws = found.draws
         warnings += data.notes
+        if [c.name for c in data.channels] == ["torque"]:
+            warnings.append(
+                "torque alone hardly shows what a model lacks: measure drawbar pull or sinkage too"
+            )
         if found.surplus:
             warnings.append(
                 f"residuals are {np.sqrt(found.misfit):.1f} times the declared noise: the model "

@@ -10,7 +10,7 @@ from soilml import SlipSinkage, read_case
 from soilml.noise import Noise
 from soilml.traction.coverage import coverage
 
-SOILS = 12
+SOILS = 10
 
 
 @pytest.fixture
@@ -31,5 +31,5 @@ def test_bands_hold_the_truth_as_often_as_they_say(case):
 
 def test_a_model_without_the_digging_of_the_soil_promises_too_much(case):
     digging = replace(case, model=case.model + SlipSinkage(n1=0.4))
-    one = coverage(case, range(3), (60.0,), world=digging, count=120)[60.0]
+    one = coverage(case, range(2), (60.0,), world=digging, count=120)[60.0]
     assert (one.steepest.off < 0.0).all() and (one.steepest.below == 0.0).all()

@@ -1,0 +1,31 @@
+"""A missing effect hides from torque alone, and shows where sinkage is measured too."""
+
+import numpy as np
+import pytest
+
+from soilml import Operating, SlipSinkage, read_case
+from soilml.noise import Noise
+from soilml.table import Table
+from soilml.traction.report import pull_report
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(case):
+    case.noise["sinkage_m"] = Noise(constant=0.0005)
+    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    true = case.with_values(truth)
+    at = Operating(slip=np.asarray([0.1, 0.3, 0.5]), load=np.asarray([40.0, 90.0, 60.0]))
+    found = {}
+    for name, model in (("same", true.model), ("digging", true.model + SlipSinkage(n1=0.4))):
+        force = model(true.soil, at)
+        columns = {"run": np.full(3, "a"), "slip": at.slip, "load_N": at.load}
+        columns |= {"torque_Nm": force.torque, "sinkage_m": force.sinkage}
+        found[name] = pull_report(case, Table(columns), loads=[60.0], slip_limit=0.5)
+    same, digging = found["same"], found["digging"]
+    assert not any("lacks something" in text for text in same.warnings)
+    assert any("lacks something" in text for text in digging.warnings)
+    assert digging.prospects[0].left[0] > 2.0 * same.prospects[0].left[0]
