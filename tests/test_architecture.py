@@ -19,6 +19,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/arrays.py": {"torch", "array_api_compat"},
     "soilml/parquet.py": {"pyarrow"},
     "soilml/identification/nonlinear.py": {"scipy"},
+    "soilml/advice/picture.py": {"matplotlib"},
     "soilml/gap/page.py": {"jinja2"},
     "soilml/gap/pictures.py": {"matplotlib"},
     "soilml/traction/picture.py": {"matplotlib"},

@@ -6,9 +6,14 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from soilml.advice import Advice, told
+from soilml.advice.words import next_words, summary
 from soilml.case import read_case
+from soilml.commands.advising import after_fit
 from soilml.commands.models import add_effects_option, chosen_effects
 from soilml.commands.output import put, watched
 from soilml.errors import FitError, InputError
@@ -34,8 +39,8 @@ have no answer. What has a prior is found, unless --free names other parameters.
 nonlinear (least squares on the full integrals, bounded, several starts), linear (c and phi from
 sinkage, K given), newton (phi, K and kphi on the closed form, c given), posterior (mean, std and
 90 % interval of everything that the rows, their noise and the prior allow: no method does better on
-average). A channel takes part where its noise is declared. The answer is JSON: into --out, or into
-a pipe; a terminal shows a table.
+average, and it says what the rows do not tell and which next row would). A channel takes part where
+its noise is declared. The answer is JSON: into --out, or into a pipe; a terminal shows a table.
 Read the warnings: they say what the rows cannot tell. `left of prior` is the width that the rows
 leave of the prior's; std is the expected distance to the truth, larger where the value of least
 squares stands anywhere in an open range.
@@ -76,24 +81,29 @@ def run(args: argparse.Namespace) -> int:
     table = chosen_rows(args, RUNS)
     free = None if args.free is None else [name.strip() for name in args.free.split(",")]
     failed: dict[str, str] = {}
+
+    def solve(rows: Table) -> Answer:
+        fit = identify(case, rows, free, args.method)
+        if fit.method != "posterior":
+            return Answer(fit)
+        return Answer(fit, after_fit(case, rows, free, fit))
+
     if args.by is None:
-        found = {"": identify(case, table, free, args.method)}
+        found = {"": solve(table)}
         content = found[""].as_json()
     else:
-        found, failed = _by(
-            table.groups(args.by), lambda rows: identify(case, rows, free, args.method)
-        )
+        found, failed = _by(table.groups(args.by), solve)
         if not found:
             name, why = next(iter(failed.items()))
             raise FitError(f"no {args.by} can be identified; {args.by} {name}: {why}")
-        runs = {name: fit.as_json() for name, fit in found.items()}
+        runs = {name: answer.as_json() for name, answer in found.items()}
         content = {"by": args.by, "runs": runs, "failed": failed}
     text = json.dumps(content, indent=2) + "\n"
     if args.out is not None:
         save_text(args.out, text)
     if args.out is not None or watched():
         heads = {name: f"{args.by} {name}: " if name else "" for name in found}
-        print("\n\n".join(heads[name] + _for_people(fit) for name, fit in found.items()))
+        print("\n\n".join(heads[name] + answer.for_people() for name, answer in found.items()))
     else:
         put(text)
     for name, why in failed.items():
@@ -101,9 +111,30 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+@dataclass(frozen=True)
+class Answer:
+    """A fit and, where the posterior found it, what to drive next."""
+
+    fit: Fit
+    advice: Advice | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of the file, for one fit."""
+        content = self.fit.as_json()
+        if self.advice is not None:
+            told_ones = zip(self.advice.names, told(self.advice.now).tolist(), strict=True)
+            content |= {"told": dict(told_ones), "advice": summary(self.advice)}
+        return content
+
+    def for_people(self) -> str:
+        """The fit as a table, its warnings, and what to drive next in words."""
+        said = [] if self.advice is None else ["", *next_words(self.advice)]
+        return "\n".join([_for_people(self.fit), *said])
+
+
 def _by(
-    groups: Iterable[tuple[str, Table]], solve: Callable[[Table], Fit]
-) -> tuple[dict[str, Fit], dict[str, str]]:
+    groups: Iterable[tuple[str, Table]], solve: Callable[[Table], Answer]
+) -> tuple[dict[str, Answer], dict[str, str]]:
     """The answer for each group, and why others have none."""
     found, failed = {}, {}
     for name, rows in groups:

@@ -1,0 +1,64 @@
+"""What sensors would read at other slips and loads, for every sample of a belief."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.advice.belief import Belief
+from soilml.case import Case
+from soilml.errors import InputError
+from soilml.identification.measured import Channel, Measured
+from soilml.identification.prediction import input_noise, predicted
+from soilml.operating import Operating
+from soilml.quantities import CHANNELS, column
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """Readings y (c, m, n) of channels at m operating points for n samples, and their noise."""
+
+    at: Operating
+    channels: tuple[str, ...]
+    y: Floats
+    std: Floats
+
+    @property
+    def drivable(self) -> NDArray[np.bool_]:
+        """Points (m,) at which no soil that is believed possible leaves the wheel stuck."""
+        return np.asarray(np.isfinite(self.y).all(axis=(0, 2)))
+
+
+def foreseen(case: Case, belief: Belief, at: Operating) -> Foreseen:
+    """Predictions of all channels whose noise the case declares; `at` holds arrays (m,).
+
+    Noise of slip and load adds to that of each channel as in the posterior, at one sample near the
+    middle of the belief. Raises `InputError` where no noise is declared.
+    """
+    channels = tuple(name for name in CHANNELS if column(name) in case.noise)
+    if not channels:
+        raise InputError("what a measurement would tell needs its noise: declare it in [noise]")
+    found = predicted(case, belief.free, belief.u, at)
+    y = np.stack([found[name].T for name in channels])
+    extra = _input_noise(case, belief, at, channels)
+    std = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
+    std = belief.larger * np.hypot(std, extra[..., None])
+    least = 1e-6 * np.nanmax(np.abs(y), axis=(1, 2), keepdims=True)
+    return Foreseen(at, channels, y, np.maximum(std, least))
+
+
+def _input_noise(case: Case, belief: Belief, at: Operating, channels: tuple[str, ...]) -> Floats:
+    """Standard deviation (c, m) that noise of slip and load adds."""
+    slip, load = np.asarray(at.slip), np.asarray(at.load)
+    stds = {
+        key: case.noise[key].std(value) if key in case.noise else np.zeros_like(value)
+        for key, value in (("slip", slip), ("load_N", load))
+    }
+    blank = [Channel(name, np.zeros_like(slip), np.ones_like(slip), True) for name in channels]
+    data = Measured(at, stds["slip"], stds["load_N"], tuple(blank), ())
+    middle = int(np.argmin((belief.shares**2).sum(axis=1)))
+    return input_noise(case, data, belief.free, belief.u[middle]).reshape(len(channels), -1)

@@ -1,0 +1,122 @@
+"""What `identify` and `estimate` say of the row to drive next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.advice import Advice, Belief, Grid, advise, grid, of_moments, of_rows
+from soilml.advice.words import next_words
+from soilml.case import Case, take_case
+from soilml.errors import FitError, InputError, SoilmlError
+from soilml.estimate import Estimate
+from soilml.identification.fit import Fit
+from soilml.identification.free import chosen
+from soilml.identification.measured import measured_rows
+from soilml.onboard import Estimator
+from soilml.operating import COVARIATES, Operating
+from soilml.quantities import CHANNELS
+from soilml.settings import Settings
+from soilml.table import Table
+
+Floats = NDArray[np.float64]
+
+#: Samples and simulated readings of an advice that comes along with an answer: half a second.
+QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
+#: Rows that the sequence of such an advice plans.
+AHEAD = 2
+#: Tables of a recipe that a case holds, or that say only how rows are drawn.
+HELD = {"gear", "soil", "effect", "noise", "operating", "rows", "seed", "runs"}
+#: Slips and loads of a recipe's ranges that are tried.
+ALONG = 4
+
+
+def after_fit(case: Case, table: Table, free: Sequence[str] | None, fit: Fit) -> Advice | None:
+    """Advice after rows that the posterior method answered with `fit`; None where there is none.
+
+    That is where [noise] names no channel, or no row that could be driven is known to be possible.
+    """
+    try:
+        data = measured_rows(case, table)
+        belief = of_rows(case, data, chosen(case, free), QUICK_SAMPLES)
+        now = np.asarray([fit.left[f.path] for f in belief.free])
+        return _quick(case, belief, grid(None, None, data.load), data.at, now=now)
+    except (FitError, InputError):
+        return None
+
+
+def after_estimate(
+    estimator: Estimator, estimate: Estimate, readings: Mapping[str, Floats]
+) -> list[str]:
+    """What to drive after one estimate, () + (q,), of these readings (rows,); lines, or none.
+
+    The ground's model, prior and noise are those of the recipe in the file; slips and loads those
+    that it was trained for. Nothing is said where the recipe holds what a case does not: drift of
+    sensors, vibration, speed, a slip to be estimated.
+    """
+    found = _trained_for(estimator)
+    if found is None or not bool(estimate.in_range):
+        return []
+    case, ranges = found
+    names, free = estimate.names, chosen(case, None)
+    try:
+        belief = of_moments(free, names, estimate.mean, estimate.covariance, QUICK_SAMPLES)
+        driven = Operating(
+            slip=np.atleast_1d(readings["slip"]), load=np.atleast_1d(readings["load"])
+        )
+        advice = _quick(case, belief, ranges, driven, reads=estimator.inputs)
+    except (SoilmlError, np.linalg.LinAlgError):
+        return []
+    return next_words(advice)
+
+
+def covariates(at: Operating) -> dict[str, float]:
+    """Further fields of how rows were driven, at their means: the next row is driven so too."""
+    given = {field: getattr(at, field) for field in COVARIATES}
+    return {field: float(np.mean(value)) for field, value in given.items() if value is not None}
+
+
+def _quick(
+    case: Case,
+    belief: Belief,
+    ranges: Grid,
+    driven: Operating,
+    *,
+    reads: tuple[str, ...] | None = None,
+    now: Floats | None = None,
+) -> Advice:
+    return advise(
+        case,
+        belief,
+        ranges,
+        driven=driven,
+        count=AHEAD,
+        covariates=covariates(driven),
+        reads=reads,
+        now=now,
+        outcome_count=QUICK_OUTCOMES,
+    )
+
+
+def _trained_for(estimator: Estimator) -> tuple[Case, Grid] | None:
+    """The case of a model file and the ranges of slip and load; None where no case can hold it."""
+    read = {*estimator.inputs}
+    if estimator.per_row or not {"slip", "load"} < read <= {"slip", "load", *CHANNELS}:
+        return None
+    try:
+        recipe = json.loads(estimator.metadata["recipe"])
+        if recipe.keys() - HELD or recipe["operating"].keys() - {"slip", "load_N"}:
+            return None
+        case = take_case(Settings(recipe, estimator.path, Path()))
+        ends = [recipe["operating"][key] for key in ("slip", "load_N")]
+        slips, loads = (
+            tuple(float(x) for x in np.linspace(*(e["range"] if isinstance(e, dict) else e), ALONG))
+            for e in ends
+        )
+        return case, Grid(slips, loads)
+    except (SoilmlError, AttributeError, KeyError, TypeError, ValueError):
+        return None
