@@ -86,6 +86,7 @@ def advise(
     count: int = 1,
     covariates: Mapping[str, float] | None = None,
     reads: Sequence[str] | None = None,
+    wanted: Sequence[str] | None = None,
     now: Floats | None = None,
     outcome_count: int = OUTCOMES,
     seed: int = 0,
@@ -94,72 +95,89 @@ def advise(
 
     `driven` are rows whose repetition is compared, `count` how many rows the sequence plans,
     `covariates` further fields of `Operating`, `reads` the channels that there are (default: those
-    with declared noise), `now` (p,) the width left where it is known better than by the belief's
-    few samples. Points at which a soil that is believed possible leaves the wheel stuck
-    are left out, and counted. The sequence is greedy, each row the best after those before it; it
-    reads the first set of channels. Raises `FitError` where no point is left, `InputError` where no
-    noise is declared.
+    with declared noise), `wanted` the parameters that are looked at (default: all of the belief),
+    `now` (p,) the width left of them where it is known better than by few samples. Points at which
+    a soil that is believed possible leaves the wheel stuck are left out, and counted. The sequence
+    is greedy, each row the best after those before it; it reads the first set of channels. Raises
+    `FitError` where no point is left, `InputError` where no noise is declared.
 
     It believes the model: where an effect is missing, the best row is not the one said here. A
     width is one expected over all that may be read; the one that comes out differs.
     """
-    ahead, place = _ahead(case, belief, grid, driven, covariates or {})
-    sets = channel_sets([c for c in ahead.channels if reads is None or c in reads])
-    now = belief.left if now is None else now
-    scale = now / belief.left
-    soils = outcomes(belief, len(ahead.channels), outcome_count, seed)
-
-    def tried(
-        candidates: Sequence[Candidate], own: Outcomes, before: Floats32 | None = None
-    ) -> list[Choice]:
-        found = []
-        for c in candidates:
-            point = place[c.slip, c.load]
-            if ahead.drivable[point]:
-                logs = own.logs(ahead, c.channels, point)
-                left = own.remaining(logs if before is None else logs + before)
-                found.append(Choice(c, scale * np.sqrt(left)))
-        return found
-
-    names = tuple(f.path for f in belief.free)
-    candidates = grid.candidates(sets)
-    again = tried([] if driven is None else repeats(driven, sets[0]), soils)
-    choices = tried(candidates, soils)
-    if not choices:
+    trial = _trial(case, belief, grid, driven, covariates or {}, wanted, now)
+    sets = channel_sets([c for c in trial.ahead.channels if reads is None or c in reads])
+    soils = outcomes(belief, len(trial.ahead.channels), outcome_count, seed)
+    first = trial.of(grid.candidates(sets[:1]), soils)
+    if not first:
         raise FitError(
             "at none of these slips and loads does the wheel rest on every soil that is still "
             "possible: try smaller loads, or narrow [soil.prior]"
         )
-    sequence, before = [least(choices[: len(choices) // len(sets)], names, None)], None
+    sequence, before = [least(first, trial.names, None)], None
     for step in range(1, count):
-        last = sequence[-1].candidate
-        logs = soils.logs(ahead, last.channels, place[last.slip, last.load])
+        logs = trial.logs(sequence[-1].candidate, soils)
         before = logs if before is None else before + logs
         soils = soils.with_noise(seed + step)
-        one_set = [c for c in candidates if c.channels == sets[0]]
-        sequence.append(least(tried(one_set, soils, before), names, None))
+        second = trial.of([c.candidate for c in first], soils, before)
+        sequence.append(least(second, trial.names, None))
+    soils = soils.with_noise(seed)
     return Advice(
-        names=names,
-        now=now,
-        choices=tuple(choices),
-        again=tuple(again),
+        names=trial.names,
+        now=trial.now,
+        choices=(*first, *trial.of(grid.candidates(sets[1:]), soils)),
+        again=tuple(trial.of([] if driven is None else repeats(driven, sets[0]), soils)),
         sequence=tuple(sequence),
-        stuck=sum(not ahead.drivable[place[c.slip, c.load]] for c in candidates) // len(sets),
+        stuck=len(grid.slips) * len(grid.loads) - len(first),
     )
 
 
-def _ahead(
+@dataclass(frozen=True)
+class _Trial:
+    """What candidates are judged by: readings ahead at each point, and what is looked at."""
+
+    names: tuple[str, ...]
+    now: Floats
+    looked: list[int]
+    scale: Floats
+    ahead: Foreseen
+    place: dict[tuple[float, float], int]
+
+    def logs(self, c: Candidate, soils: Outcomes) -> Floats32:
+        return soils.logs(self.ahead, c.channels, self.place[c.slip, c.load])
+
+    def of(
+        self, candidates: Sequence[Candidate], soils: Outcomes, before: Floats32 | None = None
+    ) -> list[Choice]:
+        """Those of the candidates that can be driven, after rows whose likelihood is `before`."""
+        found = []
+        for c in candidates:
+            if self.ahead.drivable[self.place[c.slip, c.load]]:
+                logs = self.logs(c, soils)
+                left = soils.remaining(logs if before is None else logs + before)[self.looked]
+                found.append(Choice(c, self.scale * np.sqrt(left)))
+        return found
+
+
+def _trial(
     case: Case,
     belief: Belief,
     grid: Grid,
     driven: Operating | None,
     covariates: Mapping[str, float],
-) -> tuple[Foreseen, dict[tuple[float, float], int]]:
-    """Predictions at all points, those driven among them, and where each point stands."""
+    wanted: Sequence[str] | None,
+    now: Floats | None,
+) -> _Trial:
+    """Readings at all points, those driven among them."""
     points = [(c.slip, c.load) for c in grid.candidates([()])]
     if driven is not None:
         points += [(c.slip, c.load) for c in repeats(driven)]
     place = {point: k for k, point in enumerate(dict.fromkeys(points))}
     slip, load = np.asarray(list(place)).T
     known = {key: np.full(len(place), value) for key, value in covariates.items()}
-    return foreseen(case, belief, Operating(slip=slip, load=load, **known)), place
+    ahead = foreseen(case, belief, Operating(slip=slip, load=load, **known))
+    every = [f.path for f in belief.free]
+    names = tuple(wanted or every)
+    looked = [every.index(name) for name in names]
+    left = belief.left[looked]
+    now = left if now is None else now
+    return _Trial(names, now, looked, now / left, ahead, place)

@@ -82,6 +82,8 @@ def grid(
 
 def channel_sets(declared: Sequence[str]) -> list[tuple[str, ...]]:
     """The first of the channels with noise declared (torque), and it with each other one."""
+    if not declared:
+        raise InputError("none of the channels that are read has its noise declared in [noise]")
     first, *others = declared
     return [(first,), *[(first, other) for other in others]]
 

@@ -21,6 +21,7 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
+    from matplotlib.patches import Rectangle
 
     choices = advice.of(advice.sets[0])
     slips = sorted({c.candidate.slip for c in choices})
@@ -43,7 +44,7 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
                 panel.text(col, row, f"{100 * share:.0f}", ha="center", va="center", color=ink)
         best = advice.best(name).candidate
         corner = slips.index(best.slip) - 0.5, loads.index(best.load) - 0.5
-        frame = pyplot.Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5)
+        frame = Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5)
         panel.add_patch(frame)
         if driven is not None:
             slip = np.interp(np.atleast_1d(driven.slip), slips, np.arange(len(slips)))

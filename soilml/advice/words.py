@@ -23,15 +23,18 @@ def told(left: Floats) -> NDArray[np.bool_]:
 
 
 def abstained(name: str, left: float, what: str = "these rows do") -> str:
-    """That a parameter was not told; `what` does not: one row alone does, these rows do."""
+    """That a parameter was not told; `what` names the rows: these rows do, this row does."""
     name = name.replace("_", " ")
     return f"{name}: {left:.0%} of the prior's width remains: {what} not tell it"
 
 
-def next_words(advice: Advice) -> list[str]:
-    """A line for each parameter that was not told, and one of the row that helps most in all."""
+def next_words(advice: Advice, what: str = "these rows do") -> list[str]:
+    """A line for each parameter that was not told, and one of the row that helps most in all.
+
+    `what` as for `abstained`.
+    """
     said = [
-        f"{abstained(name, left)}. {_helps(advice, name)}"
+        f"{abstained(name, left, what)}. {_helps(advice, name)}"
         for name, left, ok in zip(advice.names, advice.now, told(advice.now), strict=True)
         if not ok
     ]
@@ -61,7 +64,7 @@ def _helps(advice: Advice, name: str) -> str:
     repeat = advice.repeat(name)
     if repeat is not None:
         text += f"; repeating what was driven leaves {repeat.left[i]:.0%}"
-    return text if told(np.asarray(left)) else f"{text}. {_together(advice, i).capitalize()}"
+    return text if told(np.asarray(left)) else f"{text}; {_together(advice, i)}"
 
 
 def _together(advice: Advice, i: int) -> str:
@@ -70,7 +73,7 @@ def _together(advice: Advice, i: int) -> str:
         return "several rows at other slips and loads may"
     rows = ", then ".join(c.candidate.said for c in advice.sequence)
     count = len(advice.sequence)
-    return f"{count} rows leave {advice.sequence[-1].left[i]:.0%}: {rows}"
+    return f"{count} rows together leave {advice.sequence[-1].left[i]:.0%}: {rows}"
 
 
 def as_json(advice: Advice, choice: Choice) -> dict[str, object]:

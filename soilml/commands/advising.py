@@ -50,28 +50,54 @@ def after_fit(case: Case, table: Table, free: Sequence[str] | None, fit: Fit) ->
 
 
 def after_estimate(
-    estimator: Estimator, estimate: Estimate, readings: Mapping[str, Floats]
+    estimator: Estimator,
+    mean: Floats,
+    covariance: Floats,
+    readings: Mapping[str, Floats],
 ) -> list[str]:
-    """What to drive after one estimate, () + (q,), of these readings (rows,); lines, or none.
+    """Lines on what to drive after one estimate, (q,) and (q, q), of readings (rows,); or none.
 
-    The ground's model, prior and noise are those of the recipe in the file; slips and loads those
-    that it was trained for. Nothing is said where the recipe holds what a case does not: drift of
+    Model, prior and noise are those of the recipe in the file; slips, loads and sensors those that
+    it was trained for. Nothing is said where the recipe holds what a case does not: drift of
     sensors, vibration, speed, a slip to be estimated.
     """
     found = _trained_for(estimator)
-    if found is None or not bool(estimate.in_range):
+    if found is None:
         return []
     case, ranges = found
-    names, free = estimate.names, chosen(case, None)
+    slip, load = (np.atleast_1d(readings[key]) for key in ("slip", "load"))
+    now = np.sqrt(np.diag(covariance)) / estimator.prior.std
     try:
-        belief = of_moments(free, names, estimate.mean, estimate.covariance, QUICK_SAMPLES)
-        driven = Operating(
-            slip=np.atleast_1d(readings["slip"]), load=np.atleast_1d(readings["load"])
+        belief = of_moments(chosen(case, None), estimator.names, mean, covariance, QUICK_SAMPLES)
+        advice = _quick(
+            case,
+            belief,
+            ranges,
+            Operating(slip=slip, load=load),
+            reads=estimator.inputs,
+            wanted=estimator.names,
+            now=now,
         )
-        advice = _quick(case, belief, ranges, driven, reads=estimator.inputs)
-    except (SoilmlError, np.linalg.LinAlgError):
+    except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
         return []
-    return next_words(advice)
+    return next_words(advice, "this row does" if slip.size == 1 else "these rows do")
+
+
+def _shares(estimate: Estimate) -> NDArray[np.float64]:
+    """Width over the prior's of all parameters together, (rows,); NaN out of range."""
+    shares = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))
+    return np.where(estimate.in_range, shares, np.nan)
+
+
+def typical(estimate: Estimate) -> int:
+    """The row in range that stands in the middle by its width."""
+    shares = _shares(estimate)
+    return int(np.argsort(shares)[(int(estimate.in_range.sum()) - 1) // 2])
+
+
+def vaguest(estimate: Estimate) -> int:
+    """The row in range that is widest."""
+    return int(np.nanargmax(_shares(estimate)))
 
 
 def covariates(at: Operating) -> dict[str, float]:
@@ -87,6 +113,7 @@ def _quick(
     driven: Operating,
     *,
     reads: tuple[str, ...] | None = None,
+    wanted: tuple[str, ...] | None = None,
     now: Floats | None = None,
 ) -> Advice:
     return advise(
@@ -97,6 +124,7 @@ def _quick(
         count=AHEAD,
         covariates=covariates(driven),
         reads=reads,
+        wanted=wanted,
         now=now,
         outcome_count=QUICK_OUTCOMES,
     )
@@ -113,10 +141,8 @@ def _trained_for(estimator: Estimator) -> tuple[Case, Grid] | None:
             return None
         case = take_case(Settings(recipe, estimator.path, Path()))
         ends = [recipe["operating"][key] for key in ("slip", "load_N")]
-        slips, loads = (
-            tuple(float(x) for x in np.linspace(*(e["range"] if isinstance(e, dict) else e), ALONG))
-            for e in ends
-        )
-        return case, Grid(slips, loads)
+        pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
+        slips, loads = ([float(x) for x in np.linspace(a, b, ALONG)] for a, b in pairs)
+        return case, Grid(tuple(slips), tuple(loads))
     except (SoilmlError, AttributeError, KeyError, TypeError, ValueError):
         return None

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.advice import told
 from soilml.combined import ACROSS_FILES, PRIOR_ONCE, fused_estimates
+from soilml.commands.advising import after_estimate, typical, vaguest
 from soilml.commands.identify import add_row_options, chosen_rows
 from soilml.commands.output import deliver
 from soilml.errors import InputError, TableError
@@ -25,9 +27,6 @@ from soilml.quantities import QUANTITIES, column
 from soilml.reading import FILLED, RUNS
 from soilml.saving import named
 from soilml.table import Table
-
-#: Share of the prior's width above which an estimate is mostly the prior.
-VAGUE = 0.8
 
 HELP = "soil parameters or slip from measured rows, by a trained model file"
 DESCRIPTION = """\
@@ -158,7 +157,14 @@ def _row_by_row(
         columns["files"] = files
     if estimators[0].per_row:
         hint = "measure with other sensors too, or train for soil that is better known,"
-    said = _worth(estimate, "one row alone", hint)
+    said = _worth(estimate, "one row alone", "does", hint)
+    if files is None and estimate.in_range.any():
+        row = typical(estimate)
+        readings = _readings(estimators[0], table.rows(np.asarray([row])))
+        lines = after_estimate(
+            estimators[0], estimate.mean[row], estimate.covariance[row], readings
+        )
+        said += [f"after {table.place(row)} alone, a typical row: {line}" for line in lines[-1:]]
     outside = int(np.count_nonzero(whole & ~estimate.in_range))
     if outside:
         said.append(
@@ -201,7 +207,12 @@ def _by(
     for key, values in _answers(estimate).items():
         columns[key] = np.where(there, values[index], np.nan)
     columns["in_range"] = there & estimate.in_range[index]
-    said = _worth(estimate, f"all rows of a {by}", "drive other loads and slips")
+    said = _worth(estimate, f"all rows of a {by}", "do", "drive other loads and slips")
+    if estimate.in_range.any():
+        name, rows = groups[i := vaguest(estimate)]
+        readings = _readings(estimator, rows)
+        lines = after_estimate(estimator, estimate.mean[i], estimate.covariance[i], readings)
+        said += [f"{by} {name}: {line}" for line in lines]
     for (name, rows), good, one in zip(groups, sound, estimates, strict=True):
         if not one.in_range:
             why = f"{len(rows) - good} of {len(rows)} rows are out of range"
@@ -258,15 +269,17 @@ def _stacked(estimates: list[Estimate]) -> Estimate:
     return Estimate(names=first.names, units=first.units, prior=first.prior, **parts)
 
 
-def _worth(estimate: Estimate, what: str, hint: str) -> list[str]:
-    """What the estimates that are in range are worth, in words."""
+def _worth(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:
+    """What the estimates that are in range are worth, in words; abstaining where it is nothing."""
     if not estimate.in_range.any():
         return []
     share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
     names = [name.replace("_", " ") for name in estimate.names]
     shares = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share, strict=True))
     said = [f"width of the estimate against the prior's, {what}: {shares}"]
-    vague = [name for name, s in zip(names, share, strict=True) if s > VAGUE]
+    vague = [name for name, ok in zip(names, told(share), strict=True) if not ok]
     if vague:
-        said.append(f"{' and '.join(vague)}: mostly the prior; {hint} to learn more")
+        said.append(
+            f"{' and '.join(vague)}: mostly the prior, {what} {does} not tell; {hint} to learn more"
+        )
     return said

@@ -1,0 +1,128 @@
+"""The advised next row against a random one and a repetition, on soils that are known."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from place import ROOT
+
+from soilml import Case, Operating, identify, read_case
+from soilml.advice import advise, grid, of_rows
+from soilml.advice.candidate import SLIPS
+from soilml.identification.fit import Fit
+from soilml.identification.free import chosen
+from soilml.identification.measured import measured_rows
+from soilml.table import Table
+
+LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)
+SOILS = 120
+#: Rows after the first drive, by name; `nothing` is no further row.
+KINDS = ("nothing", "repeat", "random", "advised")
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Soils (s,) by kind of next row (k,) and parameter (p,), in standard deviations of the prior.
+
+    `expected` (s, p) is the width that the advice said would be left.
+    """
+
+    error: np.ndarray
+    std: np.ndarray
+    expected: np.ndarray
+
+    def root_mean_square(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of error and of std, (k, p)."""
+        return np.sqrt(np.mean(self.error**2, axis=0)), np.sqrt(np.mean(self.std**2, axis=0))
+
+
+def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) -> Driven:
+    """Draw soils from the prior, drive `rows` at one slip and load, then one more row of each kind.
+
+    The drawn point and the next ones are of one grid of slips and loads; the torque is measured
+    with the case's noise, the same draw of it whichever next row is driven.
+    """
+    rng = np.random.default_rng(seed)
+    free = chosen(case, None)
+    spread = np.asarray([f.prior.std for f in free])
+    found = []
+    for _ in range(soils):
+        truth = {f.path: float(f.prior.at(rng.random())) for f in free}
+        values = np.asarray(list(truth.values()))
+        first, other = ((rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(2))
+        normal = rng.standard_normal(rows + 1)
+        table = _measured(case, truth, [first] * rows, normal[:rows])
+        data = measured_rows(case, table)
+        belief = of_rows(case, data, free, samples)
+        best = advise(case, belief, grid(SLIPS, LOADS), reads=("torque",)).best()
+        points = {
+            "repeat": first,
+            "random": other,
+            "advised": (best.candidate.slip, best.candidate.load),
+        }
+        fits = [identify(case, table, None, "posterior")]
+        for point in points.values():
+            fits.append(_with(case, truth, [first] * rows, point, normal))
+        found.append(
+            (
+                [(fit.values - values) / spread for fit in fits],
+                [fit.std / spread for fit in fits],
+                best.left,
+            )
+        )
+    error, std, expected = (np.asarray(part) for part in zip(*found, strict=True))
+    return Driven(error, std, expected)
+
+
+def _with(
+    case: Case,
+    truth: dict[str, float],
+    points: list[tuple[float, float]],
+    last: tuple[float, float],
+    normal: np.ndarray,
+) -> Fit:
+    return identify(case, _measured(case, truth, [*points, last], normal), None, "posterior")
+
+
+def _measured(
+    case: Case,
+    truth: dict[str, float],
+    points: Sequence[tuple[float, float]],
+    normal: np.ndarray,
+) -> Table:
+    slip, load = np.asarray(points, dtype=float).T
+    true = case.with_values(truth)
+    torque = np.asarray(true.model(true.soil, Operating(slip=slip, load=load)).torque)
+    torque = torque + case.noise["torque_Nm"].std(torque) * normal
+    run = np.full(len(slip), "a")
+    return Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
+
+
+def next_rows(soils: int = SOILS) -> str:
+    """The section of BENCHMARKS.md: width and error that each next row leaves."""
+    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
+    lines = [
+        "| rows at one slip and load | then one row | std left c | phi | K | all "
+        "| RMSE c | phi | K | all |",
+        "|---|---|" + "---:|" * 8,
+    ]
+    for rows in (1, 3):
+        found = driven(case, rows, soils, seed=rows)
+        for kind, error, std in zip(KINDS, *found.root_mean_square(), strict=True):
+            cells = [f"{v:.3f}" for part in (std, error) for v in (*part, _all(part))]
+            lines.append(f"| {rows} | {kind} | {' | '.join(cells)} |")
+        expected = np.sqrt(np.mean(found.expected**2, axis=0))
+        cells = [f"{v:.3f}" for v in (*expected, _all(expected))]
+        lines.append(f"| {rows} | advised, as expected | {' | '.join(cells)} | | | | |")
+    return "\n".join(lines)
+
+
+def _all(parts: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(parts**2)))
+
+
+if __name__ == "__main__":
+    print(next_rows(int(sys.argv[1]) if len(sys.argv) > 1 else SOILS))
