@@ -57,7 +57,7 @@ def of_rows(
     case: Case, data: Measured, free: Sequence[Free], count: int = SAMPLES, seed: int = 0
 ) -> Belief:
     """The exact posterior of measured rows; raises `FitError` as the posterior method does."""
-    found, misfit, surplus = believed(case, data, free)
+    found, misfit, surplus = settled_samples(case, data, free)
     larger = float(np.sqrt(misfit)) if surplus else 1.0
     index, times = np.unique(
         drawn(found.weights, count, np.random.default_rng(seed)), return_counts=True

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.advice.belief import Belief
 from soilml.case import Case
 from soilml.errors import InputError
-from soilml.identification.measured import Channel, Measured
+from soilml.identification.measured import LEAST_STD, Channel, Measured
 from soilml.identification.prediction import input_noise, predicted
 from soilml.operating import Operating
 from soilml.quantities import CHANNELS, column
@@ -47,8 +47,8 @@ def foreseen(case: Case, belief: Belief, at: Operating) -> Foreseen:
     extra = _input_noise(case, belief, at, channels)
     std = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
     std = belief.larger * np.hypot(std, extra[..., None])
-    least = 1e-6 * np.nanmax(np.abs(y), axis=(1, 2), keepdims=True)
-    return Foreseen(at, channels, y, np.maximum(std, least))
+    least = LEAST_STD * np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
+    return Foreseen(at, channels, y, np.maximum(std, least + 1e-12))
 
 
 def _input_noise(case: Case, belief: Belief, at: Operating, channels: tuple[str, ...]) -> Floats:

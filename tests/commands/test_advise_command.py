@@ -1,0 +1,184 @@
+"""`soilml advise`, and what `identify` and `estimate` say of the next row."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from conftest import MODEL
+
+from soilml import Estimator
+from soilml.cli import main
+from soilml.commands.advising import _trained_for, after_estimate
+
+ROOT = Path(__file__).parents[2]
+RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,2.9\na,0.2,60,2.95\n"
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "runs.csv").write_text(RUNS)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
+    command = ["advise", "model.toml", "runs.csv", "--slips", "0.05,0.6", "--loads", "30,60,120"]
+    assert main([*command, "--count", "2", "--out", "o.csv", "--picture", "o.png"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == "" and "cohesion" in captured.err and "not tell it" in captured.err
+    assert (folder / "o.png").read_bytes().startswith(b"\x89PNG")
+    rows = rows_of((folder / "o.csv").read_text())
+    assert list(rows[0]) == [
+        "row", "channels", "slip", "load_N", "cohesion_left", "friction_angle_left",
+        "shear_modulus_left", "all_left",
+    ]  # fmt: skip
+    assert [r["row"] for r in rows] == [
+        "best in all", "best for cohesion", "best for friction angle", "best for shear modulus",
+        "best repeat", "row 1 of 2", "row 2 of 2",
+    ]  # fmt: skip
+    by = {r["row"]: r for r in rows}
+    assert (by["best repeat"]["slip"], by["best repeat"]["load_N"]) == ("0.2", "60")
+    assert float(by["best for cohesion"]["cohesion_left"]) < 0.6
+    assert float(by["best repeat"]["cohesion_left"]) > 0.9
+    assert float(by["row 2 of 2"]["all_left"]) < float(by["row 1 of 2"]["all_left"])
+
+
+def test_every_candidate_can_be_had_the_best_first(folder, capsys):
+    command = ["advise", "model.toml", "--slips", "0.1:0.5:2", "--loads", "30:120:3", "--all"]
+    assert main(command) == 0
+    rows = rows_of(capsys.readouterr().out)
+    left = [float(r["all_left"]) for r in rows]
+    assert len(rows) == 6 and left == sorted(left)
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        (["model.toml"], "give --loads 30,60,120"),
+        (["model.toml", "runs.csv", "--count", "9"], "--count is 9; needed is a whole number"),
+        (["model.toml", "runs.csv", "--slips", "x"], "--slips is 'x'; needed is start:stop:count"),
+        (["model.toml", "runs.csv", "--slips", "1.5"], "a slip of 1.5 cannot be driven"),
+        (["model.toml", "--loads", "0"], "a load of 0 N cannot be driven"),
+        (["model.toml", "--loads", "1:100:2000"], "too many to try; at most 1000"),
+        (["model.toml", "--loads", "1e6"], "try smaller loads"),
+        (["model.toml", "--loads", "60", "--free", "phi"], "'phi' is no parameter"),
+        (["model.toml", "--loads", "60", "--where", "run=a"], "--where chooses rows of RUNS.csv"),
+        (["model.toml", "none.csv"], "none.csv: there is no such file"),
+        (["silent.toml", "--loads", "60"], "declare it in [noise]"),
+        (["silent.toml", "runs.csv"], "declare it in [noise]"),
+        (["model.toml", "runs.csv", "--picture", "o.svg"], "name it ....png"),
+        (["model.toml", "runs.csv", "--out", "runs.csv"], "would be written over"),
+        (["speed.toml", "--loads", "60"], "speed"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, said):
+    (folder / "silent.toml").write_text(MODEL.split("[noise]")[0])
+    rate = '[[effect]]\nname = "rate"\n'
+    (folder / "speed.toml").write_text(MODEL + rate)
+    before = {p: p.read_bytes() for p in folder.iterdir()}
+    outs = [] if {"--out", "--picture"} & {*command} else ["--out", "o.csv", "--picture", "o.png"]
+    assert main(["advise", *command, *outs]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1 and said in captured.err
+    assert {p: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_the_posterior_says_what_is_told_and_what_to_drive_next(folder, capsys):
+    command = ["identify", "model.toml", "runs.csv", "--method", "posterior"]
+    assert main(command) == 0
+    captured = capsys.readouterr()
+    content = json.loads(captured.out)
+    assert content["told"] == {"cohesion": False, "friction_angle": False, "shear_modulus": True}
+    left = content["advice"]["next_for"]["cohesion"]["left_of_prior"]["cohesion"]
+    assert left < content["advice"]["repeat"]["left_of_prior"]["cohesion"] - 0.2
+    assert main([*command, "--out", "o.json"]) == 0
+    said = capsys.readouterr().out
+    assert "cohesion: 99% of the prior's width remains: these rows do not tell it" in said
+    assert "Most helpful next: slip" in said
+    assert main([*command[:3], "--out", "o.json"]) == 0  # least squares: no samples, no advice
+    assert "told" not in json.loads((folder / "o.json").read_text())
+    capsys.readouterr()
+    assert main([*command, "--by", "run"]) == 0
+    assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
+
+
+def test_noise_that_only_the_table_declares_gives_an_answer_without_advice(folder, capsys):
+    (folder / "silent.toml").write_text(MODEL.split("[noise]")[0])
+    rows = "run,slip,load_N,torque_Nm,torque_Nm_std\na,0.2,60,2.9,0.06\na,0.2,60,2.95,0.06\n"
+    (folder / "own.csv").write_text(rows)
+    assert main(["identify", "silent.toml", "own.csv", "--method", "posterior"]) == 0
+    assert "advice" not in json.loads(capsys.readouterr().out)
+
+
+def test_an_estimate_abstains_in_words_and_keeps_its_table_clean(folder, small_model, capsys):
+    command = ["estimate", str(small_model), "runs.csv"]
+    assert main([*command, "--by", "run"]) == 0
+    captured = capsys.readouterr()
+    assert len(rows_of(captured.out)) == 1
+    assert "run a: cohesion: " in captured.err and "these rows do not tell it" in captured.err
+    assert "Most helpful next: slip" in captured.err
+    assert main(command) == 0
+    captured = capsys.readouterr()
+    assert len(rows_of(captured.out)) == 2
+    assert "a typical row: next row that helps most in all: slip" in captured.err
+
+
+def test_slips_and_loads_of_the_advice_are_those_trained_for(small_model):
+    case, ranges = _trained_for(Estimator.load(small_model))
+    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
+    assert (min(ranges.slips), max(ranges.slips)) == (0.05, 0.6)
+    assert (min(ranges.loads), max(ranges.loads)) == (30.0, 120.0)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"bias": {"torque_Nm": "1 %"}},
+        {"operating": {"slip": [0.1, 0.5], "load_N": [30, 60], "speed_m_s": [0.01, 0.1]}},
+        {"operating": {"slip": [0.1, 0.5]}},
+        {"gear": {"type": "hover"}},
+        {"soil": 3},
+        {"noise": {"sinkage_m": 0.001}},
+    ],
+)
+def test_a_recipe_that_a_case_cannot_hold_gets_no_advice(small_model, more):
+    whole = Estimator.load(small_model)
+    one = whole(slip=0.2, torque=2.9, load=60.0)
+    readings = {"slip": 0.2, "load": 60.0}
+    assert after_estimate(whole, one.mean, one.covariance, readings)
+    recipe = json.dumps(json.loads(whole.metadata["recipe"]) | more)
+    other = replace(whole, metadata=whole.metadata | {"recipe": recipe})
+    assert after_estimate(other, one.mean, one.covariance, readings) == []
+
+
+def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model):
+    code = (
+        "import sys\n"
+        "class No:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name.split('.')[0] in ('scipy', 'torch', 'pyarrow', 'array_api_compat', 'rich',"
+        " 'matplotlib', 'sklearn', 'onnx', 'jinja2'):\n"
+        "            raise ImportError('no ' + name)\n"
+        "sys.meta_path.insert(0, No())\n"
+        "import argparse\n"
+        "from soilml.commands import estimate\n"
+        "parser = argparse.ArgumentParser()\n"
+        "estimate.add(parser)\n"
+        "estimate.run(parser.parse_args())\n"
+    )
+    command = [sys.executable, "-c", code, str(small_model), "runs.csv", "--by", "run"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "mostly the prior" in done.stderr and "do not tell it" in done.stderr
