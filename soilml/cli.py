@@ -174,7 +174,7 @@ def _joined(words: list[str]) -> list[str]:
     """`--slip -0.3:0.6:10` as one word, which argparse would take for two options."""
     joined: list[str] = []
     for word in words:
-        if joined and joined[-1] in ("--slip", "--load") and _NEGATIVE.match(word):
+        if joined and joined[-1] in ("--slip", "--load", "--slips") and _NEGATIVE.match(word):
             joined[-1] += f"={word}"
         else:
             joined.append(word)

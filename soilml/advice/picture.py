@@ -10,6 +10,9 @@ from soilml.advice.advise import Advice
 from soilml.operating import Operating
 from soilml.saving import replacing
 
+#: Most cells in which the width is written, and most ticks of an axis.
+WRITTEN, TICKS = 80, 8
+
 
 def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | None) -> None:
     """A PNG file: one map for each parameter, of the width left of its prior; loads in N.
@@ -40,7 +43,7 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
         )
         for (row, col), share in np.ndenumerate(left):
             ink = "black" if share > 0.6 else "white"
-            if np.isfinite(share):
+            if np.isfinite(share) and left.size <= WRITTEN:
                 panel.text(col, row, f"{100 * share:.0f}", ha="center", va="center", color=ink)
         best = advice.best(name).candidate
         corner = slips.index(best.slip) - 0.5, loads.index(best.load) - 0.5
@@ -50,11 +53,12 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
             slip = np.interp(np.atleast_1d(driven.slip), slips, np.arange(len(slips)))
             load = np.interp(np.atleast_1d(driven.load), loads, np.arange(len(loads)))
             panel.plot(slip, load, "o", color="#d62728", fillstyle="none", markersize=25, mew=2)
-        panel.set_xticks(range(len(slips)), [f"{s:.3g}" for s in slips])
-        panel.set_yticks(range(len(loads)), [f"{w:.3g}" for w in loads])
+        across, up = (range(0, n, -(-n // TICKS)) for n in (len(slips), len(loads)))
+        panel.set_xticks(across, [f"{slips[k]:.3g}" for k in across])
+        panel.set_yticks(up, [f"{loads[k]:.3g}" for k in up])
         panel.set_title(f"{name.replace('_', ' ')}: now {advice.now[i]:.0%}")
-        panel.set_xlabel("slip of the next row (frame: best, ring: driven)")
     axes[0, 0].set_ylabel("load of the next row, N")
+    figure.supxlabel("slip of the next row (frame: best, rings: driven)", fontsize=10)
     figure.colorbar(image, ax=axes[0], label="expected width left of the prior")
     with replacing(path) as part:
         figure.savefig(part, format="png", dpi=110)
