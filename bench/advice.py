@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from place import ROOT
 
-from soilml import Case, Operating, identify, read_case
-from soilml.advice import advise, grid, of_rows
+from soilml import Case, Estimator, Operating, identify, read_case
+from soilml.advice import advise, grid, of_moments, of_prior, of_rows
 from soilml.advice.candidate import SLIPS
 from soilml.identification.fit import Fit
 from soilml.identification.free import chosen
@@ -77,6 +77,28 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
     return Driven(error, std, expected)
 
 
+def planned(case: Case, rows: int, soils: int, seed: int) -> dict[str, np.ndarray]:
+    """Std left (s, p) where `rows` are planned before any is driven, or drawn from the grid."""
+    rng = np.random.default_rng(seed)
+    free = chosen(case, None)
+    spread = np.asarray([f.prior.std for f in free])
+    ranges = grid(SLIPS, LOADS)
+    plan = advise(case, of_prior(free), ranges, reads=("torque",), count=rows).sequence
+    best = [(choice.candidate.slip, choice.candidate.load) for choice in plan]
+    left: dict[str, list[np.ndarray]] = {"drawn": [], "planned": []}
+    for _ in range(soils):
+        truth = {f.path: float(f.prior.at(rng.random())) for f in free}
+        normal = rng.standard_normal(rows)
+        drawn = [(rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(rows)]
+        for name, points in (("drawn", drawn), ("planned", best)):
+            table = _measured(case, truth, points, normal)
+            left[name].append(identify(case, table, None, "posterior").std / spread)
+    return {
+        **{name: np.asarray(values) for name, values in left.items()},
+        "planned, as expected": plan[-1].left[None],
+    }
+
+
 def _with(
     case: Case,
     truth: dict[str, float],
@@ -120,9 +142,45 @@ def next_rows(soils: int = SOILS) -> str:
     return "\n".join(lines)
 
 
+def plans(soils: int = SOILS) -> str:
+    """The section of BENCHMARKS.md: rows planned at once against rows drawn at random."""
+    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
+    lines = ["| rows | chosen | std left c | phi | K | all |", "|---|---|---:|---:|---:|---:|"]
+    for rows in (2, 3):
+        for name, left in planned(case, rows, soils, seed=10 + rows).items():
+            part = np.sqrt(np.mean(left**2, axis=0))
+            cells = [f"{v:.3f}" for v in (*part, _all(part))]
+            lines.append(f"| {rows} | {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def from_file(soils: int = SOILS, seed: int = 5) -> str:
+    """What the advice of a trained file is worth by the exact posterior of the same row."""
+    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
+    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    rng, free, ranges = np.random.default_rng(seed), chosen(case, None), grid(SLIPS, LOADS)
+    left: dict[str, list[float]] = {"the file's": [], "the posterior's": [], "any": []}
+    for _ in range(soils):
+        truth = {f.path: float(f.prior.at(rng.random())) for f in free}
+        point = float(rng.choice(SLIPS)), float(rng.choice(LOADS))
+        table = _measured(case, truth, [point], rng.standard_normal(1))
+        readings = {"slip": point[0], "load": point[1], "torque": float(table["torque_Nm"][0])}
+        told = estimator(**readings)
+        moments = of_moments(free, estimator.names, told.mean, told.covariance)
+        theirs = advise(case, moments, ranges, reads=("torque",)).best().candidate
+        exact = advise(case, of_rows(case, measured_rows(case, table), free), ranges)
+        torque = exact.of(("torque",))
+        left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
+        left["the posterior's"].append(exact.best().overall)
+        left["any"].append(_all(np.asarray([c.overall for c in torque])))
+    lines = ["| whose next row | expected to leave, all |", "|---|---:|"]
+    return "\n".join(lines + [f"| {k} | {_all(np.asarray(v)):.3f} |" for k, v in left.items()])
+
+
 def _all(parts: np.ndarray) -> float:
     return float(np.sqrt(np.mean(parts**2)))
 
 
 if __name__ == "__main__":
-    print(next_rows(int(sys.argv[1]) if len(sys.argv) > 1 else SOILS))
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else SOILS
+    print(next_rows(count), plans(count), from_file(count), sep="\n\n")

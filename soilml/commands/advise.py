@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
 def _chosen(found: Advice) -> list[tuple[str, Choice]]:
     """What the table shows of all choices: why, and which."""
     rows = [("best in all", found.best())]
-    rows += [(f"best in all, with {own[1]}", found.best(None, own)) for own in found.sets[1:]]
+    rows += [(f"best in all with {own[1]}", found.best(None, own)) for own in found.sets[1:]]
     rows += [(f"best for {name}", found.best(name)) for name in found.names]
     repeat = found.repeat()
     if repeat is not None:

@@ -164,6 +164,7 @@ def test_soils_and_effects_list_their_catalogues(capsys):
         "effects",
         "climb",
         "pull",
+        "advise",
     ],
 )
 def test_help_teaches_with_an_example(command, capsys):
