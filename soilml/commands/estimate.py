@@ -44,8 +44,8 @@ of which more than a tenth is out of range, give the prior. A row with a blank r
 estimate, and so does one whose status is not ok. --with fuses files that estimate the same from
 other sensors, row by row, and needs errors that are independent: files that read the same are
 refused but for --rule covariance-intersection. A file whose reading is blank, or out of range,
-takes no part, and `files` says how many did. Slip differs from row to row: no --by. Needs numpy and
-onnxruntime alone.
+takes no part, and `files` says how many did. Slip differs from row to row: no --by. What rows do
+not tell is said on standard error, with the next row that would. Needs numpy and onnxruntime alone.
 """
 
 

@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import MODEL
 
@@ -155,11 +157,24 @@ def test_slips_and_loads_of_the_advice_are_those_trained_for(small_model):
 def test_a_recipe_that_a_case_cannot_hold_gets_no_advice(small_model, more):
     whole = Estimator.load(small_model)
     one = whole(slip=0.2, torque=2.9, load=60.0)
-    readings = {"slip": 0.2, "load": 60.0}
+    readings = {"slip": 0.2, "load": 60.0, "torque": 2.9}
     assert after_estimate(whole, one.mean, one.covariance, readings)
     recipe = json.dumps(json.loads(whole.metadata["recipe"]) | more)
     other = replace(whole, metadata=whole.metadata | {"recipe": recipe})
     assert after_estimate(other, one.mean, one.covariance, readings) == []
+
+
+@pytest.mark.parametrize("rows", [1, 4, 6])
+def test_short_and_long_runs_at_one_load_ask_for_another(small_model, rows):
+    estimator = Estimator.load(small_model)
+    readings = {"slip": [0.2] * rows, "load": [60.0] * rows, "torque": [2.9] * rows}
+    one = estimator.run(**readings)
+    arrays = {name: np.asarray(values) for name, values in readings.items()}
+    said = after_estimate(estimator, one.mean, one.covariance, arrays)
+    cohesion = next(line for line in said if line.startswith("cohesion"))
+    left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
+    assert left < again - 20 and " at 60 N" not in cohesion
+    assert ("this row does" if rows == 1 else "these rows do") in cohesion
 
 
 def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model):
