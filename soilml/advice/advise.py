@@ -97,9 +97,9 @@ def advise(
     `covariates` further fields of `Operating`, `reads` the channels that there are (default: those
     with declared noise), `wanted` the parameters that are looked at (default: all of the belief),
     `now` (p,) the width left of them where it is known better than by few samples. Points at which
-    a soil that is believed possible leaves the wheel stuck are left out, and counted. The sequence
-    is greedy, each row the best after those before it; it reads the first set of channels. Raises
-    `FitError` where no point is left, `InputError` where no noise is declared.
+    a twentieth of what is believed possible leaves the wheel stuck are left out, and counted. The
+    sequence is greedy, each row the best after those before it; it reads the first set of channels.
+    Raises `FitError` where no point is left, `InputError` where no noise is declared.
 
     It believes the model: where an effect is missing, the best row is not the one said here. A
     width is one expected over all that may be read; the one that comes out differs.
@@ -110,8 +110,8 @@ def advise(
     first = trial.of(grid.candidates(sets[:1]), soils)
     if not first:
         raise FitError(
-            "at none of these slips and loads does the wheel rest on every soil that is still "
-            "possible: try smaller loads, or narrow [soil.prior]"
+            "at each of these slips and loads some soil that is still possible would not carry the "
+            "wheel: try smaller loads, or narrow [soil.prior]"
         )
     sequence, before = [least(first, trial.names, None)], None
     for step in range(1, count):

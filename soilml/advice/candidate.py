@@ -53,7 +53,7 @@ class Grid:
                 raise InputError(f"a slip of {slip:g} cannot be driven; needed is one inside -1..1")
         for load in self.loads:
             if not 0.0 < load < 1e7:
-                raise InputError(f"a load of {load:g} N cannot be driven; needed is one above zero")
+                raise InputError(f"a load of {load:g} N cannot be driven; needed is one in 0..1e7")
 
     def candidates(self, channels: Sequence[tuple[str, ...]]) -> list[Candidate]:
         """All combinations."""

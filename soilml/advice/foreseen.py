@@ -18,19 +18,23 @@ from soilml.quantities import CHANNELS, column
 Floats = NDArray[np.float64]
 
 
+#: Share of what is believed possible that may leave the wheel stuck at a point that is advised.
+STUCK = 0.05
+
+
 @dataclass(frozen=True)
 class Foreseen:
-    """Readings y (c, m, n) of channels at m operating points for n samples, and their noise."""
+    """Readings y (c, m, n) of channels at m operating points for n samples, and their noise.
+
+    NaN where that soil does not carry the wheel; `drivable` (m,) are points at which less than
+    `STUCK` of the belief is such.
+    """
 
     at: Operating
     channels: tuple[str, ...]
     y: Floats
     std: Floats
-
-    @property
-    def drivable(self) -> NDArray[np.bool_]:
-        """Points (m,) at which no soil that is believed possible leaves the wheel stuck."""
-        return np.asarray(np.isfinite(self.y).all(axis=(0, 2)))
+    drivable: NDArray[np.bool_]
 
 
 def foreseen(case: Case, belief: Belief, at: Operating) -> Foreseen:
@@ -47,8 +51,9 @@ def foreseen(case: Case, belief: Belief, at: Operating) -> Foreseen:
     extra = _input_noise(case, belief, at, channels)
     std = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
     std = belief.larger * np.hypot(std, extra[..., None])
+    stuck = np.isnan(y).any(axis=0) @ belief.weights
     least = LEAST_STD * np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
-    return Foreseen(at, channels, y, np.maximum(std, least + 1e-12))
+    return Foreseen(at, channels, y, np.fmax(std, least + 1e-12), stuck < STUCK)
 
 
 def _input_noise(case: Case, belief: Belief, at: Operating, channels: tuple[str, ...]) -> Floats:

@@ -18,7 +18,7 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
     """A PNG file: one map for each parameter, of the width left of its prior; loads in N.
 
     Dark is little left. The frame is the best point, rings are rows driven; blank is where a
-    possible soil would not carry the wheel. The channels are those of the first set.
+    twentieth of the possible soils would not carry the wheel. Channels are those of the first set.
     """
     import matplotlib
 

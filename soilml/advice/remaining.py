@@ -14,6 +14,8 @@ from soilml.advice.foreseen import Foreseen
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
+#: Logarithm of a likelihood that no sample has.
+LEAST_LOG = -1e30
 #: Soils among the samples whose readings are simulated.
 OUTCOMES = 256
 
@@ -35,7 +37,10 @@ class Outcomes:
         return replace(self, normal=normal)
 
     def logs(self, foreseen: Foreseen, channels: Sequence[str], point: int) -> Floats32:
-        """Logarithm of the likelihood (j, n) of each simulated reading under each sample."""
+        """Logarithm of the likelihood (j, n) of each simulated reading under each sample.
+
+        A wheel that is stuck is a reading too: of the soils that do not carry it, and of no other.
+        """
         total = np.zeros((len(self.index), len(self.belief.weights)), dtype=np.float32)
         for name in channels:
             c = foreseen.channels.index(name)
@@ -48,6 +53,10 @@ class Outcomes:
             off += 2.0 * np.log(std).astype(np.float32)
             total -= off
         total *= 0.5
+        stuck = np.asarray(np.isnan(foreseen.y[:, point]).any(axis=0))
+        if stuck.any():
+            same = stuck[self.index][:, None] == stuck
+            total = np.where(same, np.where(stuck, np.float32(0.0), total), np.float32(-np.inf))
         return total
 
     def remaining(self, logs: Floats32) -> Floats:
@@ -67,12 +76,15 @@ class Outcomes:
         """
         weight = logs + np.log(self.belief.weights).astype(np.float32)
         weight[np.arange(len(self.index)), self.index] = -np.inf
-        weight -= weight.max(axis=1, keepdims=True)
+        weight -= np.maximum(weight.max(axis=1, keepdims=True), np.float32(LEAST_LOG))
         np.exp(weight, out=weight)
         shares = self.belief.shares
         columns = np.column_stack([np.ones(len(shares)), shares, shares**2])
         sums = (weight @ columns.astype(np.float32)).astype(np.float64)
-        mean, square = np.split(sums[:, 1:] / sums[:, :1], 2, axis=1)
+        alone = sums[:, 0] == 0.0  # no other sample could have read so
+        mean, square = np.split(sums[:, 1:] / np.where(alone, 1.0, sums[:, 0])[:, None], 2, axis=1)
+        mean[alone] = shares[self.index[alone]]
+        square[alone] = mean[alone] ** 2
         off = shares[self.index] - mean
         found = 0.5 * (square - mean**2 + off**2).mean(axis=0)
         return np.asarray(np.minimum(found, self.belief.left**2))

@@ -44,8 +44,9 @@ width over the prior's: 1 where nothing is known. Rows of the answer: the best i
 for each parameter, the best repetition of what was driven, then the best --count rows one after
 the other, whose widths are what is left after all of them. --all gives every candidate instead.
 Channels are those whose noise [noise] declares: torque, and torque with each other one. Without
---loads, loads from half to twice those driven are tried. Points where a soil that is still possible
-would not carry the wheel are left out. It believes the model, as the posterior does.
+--loads, loads from half to twice those driven are tried. Points where a twentieth of the soils that
+are still possible would not carry the wheel are left out. It believes the model, as the posterior
+does.
 """
 
 
@@ -108,11 +109,11 @@ def run(args: argparse.Namespace) -> int:
         deliver(_columns(found, [("candidate", c) for c in ranked]), args.out)
     else:
         deliver(_columns(found, _chosen(found)), args.out)
-    said = next_words(found) if at is not None else []
+    said = [] if at is None else [*next_words(found), *data.notes]
     if found.stuck:
         said.append(
-            f"{found.stuck} of {len(ranges.slips) * len(ranges.loads)} points are left out: a soil "
-            "that is still possible would not carry the wheel there"
+            f"{found.stuck} of {len(ranges.slips) * len(ranges.loads)} points are left out: of the "
+            "soils that are still possible, a twentieth or more would not carry the wheel there"
         )
     print("\n".join(said), file=sys.stderr)
     return 0

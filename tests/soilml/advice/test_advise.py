@@ -93,7 +93,7 @@ def test_following_the_plan_leaves_what_it_said(case):
     np.testing.assert_allclose(planned[-1].left, realised, atol=0.15)  # 16 soils: 3 sigma
 
 
-def test_loads_that_some_possible_soil_does_not_carry_are_left_out_and_counted(case):
+def test_loads_that_possible_soils_do_not_carry_are_left_out_and_counted(case):
     heavy = grid([0.2], [60.0, 1e6])
     found = advise(case, of_prior(chosen(case, None), 64), heavy)
     assert found.stuck == 1 and {c.candidate.load for c in found.choices} == {60.0}

@@ -23,7 +23,8 @@ def read(belief, y, std):
     """One channel at one point that reads y (n,) with a noise of std."""
     at = Operating(slip=np.zeros(1), load=np.ones(1))
     shape = (1, 1, len(y))
-    return Foreseen(at, ("torque",), y.reshape(shape), np.broadcast_to(std, shape).copy())
+    noise = np.broadcast_to(std, shape).copy()
+    return Foreseen(at, ("torque",), y.reshape(shape), noise, np.ones(1, dtype=bool))
 
 
 def left(belief, y, std, count=256, seed=1):
@@ -57,6 +58,16 @@ def test_noise_far_below_the_distance_of_samples_does_not_claim_certainty():
     found = np.mean([left(line(60, k), line(60, k).u[:, 0], 1e-4, seed=k) for k in range(8)])
     assert 0.5 / 60 < found < 5.0 / 60  # the distance of samples; far above the noise, 3.5e-4
     assert belief.left[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_wheel_that_is_stuck_tells_on_which_soils_it_is():
+    belief = line(1000)
+    u = belief.u[:, 0]
+    blind = np.where(u < 0.3, np.nan, 0.0)  # it reads nothing else
+    expected = np.sqrt(0.3 * 0.3**2 + 0.7 * 0.7**2)  # two uniform parts
+    assert left(belief, blind, 1.0) == pytest.approx(expected, rel=0.05)
+    lone = np.where(u == u.min(), np.nan, 0.0)
+    assert left(belief, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_gaussian_is_left_as_its_precisions_add():
