@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,17 +35,20 @@ VIBRATION = SENSED[-1]
 class Block:
     """Runs of one length: `share` of all rows are in runs of `rows` rows on one soil each.
 
-    Within a run, the columns `steady` of [operating] keep one value.
+    Within a run, the columns `steady` of [operating] keep one value, and those of `levels` take
+    that many, evenly from end to end of the range: row by row in turn, the first column fastest.
     """
 
     rows: int
     share: float
     steady: tuple[str, ...] = ()
+    levels: tuple[tuple[str, int], ...] = ()
 
     @property
     def label(self) -> str:
         """What the names of its runs begin with."""
-        return f"{self.rows}x" + "".join(f"{name}-" for name in self.steady)
+        levels = "".join(f"{count}{name}-" for name, count in self.levels)
+        return f"{self.rows}x" + "".join(f"{name}-" for name in self.steady) + levels
 
 
 @dataclass(frozen=True)
@@ -172,13 +176,22 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
 def _take_blocks(settings: Settings) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for entry in settings.tables("runs"):
-        block = Block(entry.count("rows", 1), entry.number("share", 1.0), _take_steady(entry))
+        block = Block(
+            entry.count("rows", 1),
+            entry.number("share", 1.0),
+            _take_steady(entry),
+            _take_levels(entry),
+        )
         if not 0.0 < block.share <= 1.0:
             entry.fail(f"share is {block.share:g}; needed is a number above 0, up to 1")
         if block.steady and block.rows == 1:
             entry.fail("steady is for runs of 2 rows or more")
+        if both := set(block.steady) & {name for name, _ in block.levels}:
+            entry.fail(f"{both.pop()} stands in steady and in levels; give it in one of them")
+        if (cells := math.prod(count for _, count in block.levels)) > block.rows:
+            entry.fail(f"levels has {cells} cells; needed are that many rows or more")
         if block.label in {other.label for other in blocks}:
-            entry.fail("another [[runs]] has the same rows and steady; make them one")
+            entry.fail("another [[runs]] has the same rows, steady and levels; make them one")
         entry.finish()
         blocks.append(block)
     if not blocks:
@@ -194,3 +207,14 @@ def _take_steady(entry: Settings) -> tuple[str, ...]:
     if any(given.count(name) != 1 or name not in DRIVEN for name in given):
         entry.fail(f"steady is {given!r}; needed is {needed}")
     return tuple(name for name in DRIVEN if name in given)
+
+
+def _take_levels(entry: Settings) -> tuple[tuple[str, int], ...]:
+    given = entry.table("levels")
+    given.knows(DRIVEN)
+    found = tuple((name, given.count(name)) for name in DRIVEN if name in given)
+    given.finish()
+    for name, count in found:
+        if count < 2:
+            entry.fail(f"levels has {count} for {name}; needed is 2 or more, or steady")
+    return found

@@ -45,6 +45,10 @@ def drawn(recipe: Recipe, block: int, first: int, last: int) -> Drawn:
         operating = _sobol(len(DRIVEN), (recipe.seed, block, 2), first, last - first)
         for i, name in enumerate(shape.steady, len(priors)):
             operating[:, DRIVEN.index(name)] = soil[:, i]
+    place = row % shape.rows
+    for name, count in shape.levels:
+        operating[:, DRIVEN.index(name)] = place % count / (count - 1)
+        place = place // count
     return Drawn(
         run=run,
         soil={path: prior.at(soil[:, i]) for i, (path, prior) in enumerate(priors)},

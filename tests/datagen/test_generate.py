@@ -126,6 +126,18 @@ def test_what_is_steady_keeps_one_value_in_a_run_and_differs_between_runs(tmp_pa
     assert (part["load_N"] == one_point["load_N"][13:30]).all()
 
 
+def test_columns_at_levels_take_them_evenly_in_turn_and_in_every_combination(tmp_path):
+    levels = ("{ load_N = 3 }", "{ slip = 2, load_N = 3 }")
+    blocks = "".join(f"[[runs]]\nrows = 8\nshare = 0.5\nlevels = {one}\n" for one in levels)
+    loads, grid = pieces(recipe(tmp_path, blocks, rows=1600))
+    assert not set(loads["run"]) & set(grid["run"])
+    assert loads["load_N"][8:16].tolist() == [30.0, 75.0, 120.0] * 2 + [30.0, 75.0]
+    assert (np.ptp(loads["slip"].reshape(-1, 8), axis=1) > 0.2).all()
+    assert grid["slip"][:8].tolist() == [0.05, 0.6] * 4
+    assert grid["load_N"][:8].tolist() == [30.0] * 2 + [75.0] * 2 + [120.0] * 2 + [30.0] * 2
+    assert len(np.unique(grid["cohesion_Pa"])) == 100
+
+
 def test_rows_requested_are_rows_made(tmp_path):
     blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
     for rows in (1, 64, 1000):
@@ -184,6 +196,14 @@ def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
         ("[operating]", '[[runs]]\nsteady = ["load"]\n[operating]', "list of slip, load_N"),
         ("[operating]", '[[runs]]\nsteady = ["slip"]\n[operating]', "2 rows or more"),
         ("[operating]", "[[runs]]\nshare = 0.5\n" * 2 + "[operating]", "make them one"),
+        ("[operating]", "[[runs]]\nlevels = {{ load = 3 }}\n[operating]", "did you mean 'load_N'"),
+        ("[operating]", "[[runs]]\nlevels = {{ slip = 1 }}\n[operating]", "or steady"),
+        ("[operating]", "[[runs]]\nlevels = {{ slip = 3 }}\n[operating]", "3 cells"),
+        (
+            "[operating]",
+            '[[runs]]\nrows = 3\nsteady = ["slip"]\nlevels = {{ slip = 3 }}\n[operating]',
+            "in steady and in levels",
+        ),
     ],
 )
 def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
