@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers gap test check models kls1 gap-real bench bench-gap clean
+.PHONY: help demo demo-papers gap test check models limit kls1 gap-real bench bench-gap clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,6 +42,9 @@ check: $(VENV)/.ready ## formatting, types and layers
 
 models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
+
+limit: $(VENV)/.ready ## the Bayes limit of the benchmark's sets again, ten minutes on two cores
+	@$(BIN)/soilml compare --limit training/benchmark_limit.parquet
 
 kls1: $(VENV)/.ready ## the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/kls1/run.py

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.case import Case
-from soilml.errors import FitError, InputError
-from soilml.identification import CLOSED_FORM, METHODS, identify
+from soilml.errors import InputError
+from soilml.identification import METHODS
 from soilml.onboard import Estimator
 from soilml.parameters import declared
 from soilml.prior import Prior
-from soilml.quantities import CHANNELS, column
+from soilml.quantities import column
 from soilml.soils import Soil
 from soilml.table import Table
-from training.score import HALF
+from training.methods import Answers, Method, analytic, held, prior_alone, trained
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -26,21 +26,8 @@ Progress = Callable[[str, int, int], None]
 #: Sets of one size that are scored, and of these, how many the slower analytic methods are given.
 MOST_SETS = 4000
 ANALYTIC_SETS = 120
-#: What stands before the name of an analytic method in the table.
-ANALYTIC = "analytic "
 #: Least sets of a size that are worth scoring.
 LEAST_SETS = 20
-
-
-@dataclass(frozen=True)
-class Answers:
-    """One method's answers for sets (n,): value, std, 90 % interval (n, q); NaN where it failed."""
-
-    value: Floats
-    std: Floats
-    low: Floats
-    high: Floats
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -85,20 +72,22 @@ def compare(
             )
     prior = [case.prior.get(n) or Prior(lo, hi) for n, lo, hi in _ranges(first)]
     table = _usable(table, names)
+    always = [prior_alone(prior)]
+    always += [m for label, estimator in estimators.items() for m in trained(label, estimator)]
+    slow = [analytic(case, method, names) for method in METHODS]
     lines = []
     for size, sets in _sets(table).items():
         truth = np.asarray([[s[column(n)][0] for n in names] for s in sets])
-        lines.append(_line(size, "prior", "-", truth, _prior_answers(prior, len(sets)), prior))
-        for label, estimator in estimators.items():
-            answers = _model_answers(estimator, sets)
-            used = ", ".join(estimator.inputs)
-            lines.append(_line(size, label, used, truth, answers, prior))
+        for method in always:
+            answers = method.answers(sets, len(names))
+            lines.append(_line(size, method, truth, answers, prior))
         few = sets[:: max(len(sets) // analytic_sets, 1)][:analytic_sets]
         some = np.asarray([[s[column(n)][0] for n in names] for s in few])
-        for method in METHODS:
-            inputs, answers = _analytic(case, method, few, names, progress, size)
-            if inputs:
-                lines.append(_line(size, f"{ANALYTIC}{method}", inputs, some, answers, prior))
+        for method in slow:
+            if all(column(c) in few[0] for c in method.channels):
+                told = partial(progress, f"{method.name}, {size} rows")
+                answers = method.answers(few, len(names), told)
+                lines.append(_line(size, method, some, answers, prior))
     return lines
 
 
@@ -128,95 +117,25 @@ def _sets(table: Table) -> dict[int, list[Table]]:
     return found
 
 
-def _prior_answers(prior: Sequence[Prior], count: int) -> Answers:
-    fractions = np.asarray([0.05, 0.5, 0.95])
-    ends = np.asarray([p.at(fractions) for p in prior])
-    tiled = [np.tile(ends[:, k], (count, 1)) for k in range(3)]
-    std = np.tile([p.std for p in prior], (count, 1))
-    return Answers(tiled[1], std, tiled[0], tiled[2], 0.0)
-
-
-def _model_answers(estimator: Estimator, sets: Sequence[Table]) -> Answers:
-    """A call for each set, as on board: a single row alone, several together."""
-    names = estimator.inputs
-    started = time.perf_counter()
-    found = []
-    for rows in sets:
-        readings = {name: rows[column(name)] for name in names}
-        if len(rows) == 1:
-            single = estimator(**{n: v[0] for n, v in readings.items()})
-            found.append((single.mean, single.std, single.low, single.high))
-        else:
-            joint = estimator.run(**readings)
-            found.append((joint.mean, joint.std, joint.low, joint.high))
-    seconds = (time.perf_counter() - started) / len(sets)
-    mean, std, low, high = (np.stack(part) for part in zip(*found, strict=True))
-    return Answers(mean, std, low, high, seconds)
-
-
-def _analytic(
-    case: Case,
-    method: str,
-    sets: Sequence[Table],
-    names: Sequence[str],
-    progress: Progress,
-    size: int,
-) -> tuple[str, Answers]:
-    """Answers of an analytic method, and what it reads; no inputs where the table lacks them."""
-    channels = ["torque", "sinkage"] if method in CLOSED_FORM else ["torque"]
-    if any(column(c) not in sets[0] for c in channels):
-        nothing = np.zeros((0, 0))
-        return "", Answers(nothing, nothing, nothing, nothing, 0.0)
-    hidden = {column(c) for c in CHANNELS if c not in channels}
-    shown = [
-        replace(s, columns={k: v for k, v in s.columns.items() if k not in hidden}) for s in sets
-    ]
-    value = np.full((len(sets), len(names)), np.nan)
-    std, low, high = (np.full_like(value, np.nan) for _ in range(3))
-    started = time.perf_counter()
-    for i, rows in enumerate(shown):
-        progress(f"{method}, {size} rows", i, len(shown))
-        try:
-            fit = identify(case, rows, list(names), method)
-        except FitError:
-            continue
-        for k, name in enumerate(names):
-            if name in fit.names:
-                own = fit.names.index(name)
-                value[i, k], std[i, k] = fit.values[own], fit.std[own]
-                low[i, k], high[i, k] = fit.interval[0][own], fit.interval[1][own]
-    progress(f"{method}, {size} rows", len(shown), len(shown))
-    seconds = (time.perf_counter() - started) / len(sets)
-    given = {"linear": "; K given", "newton": "; c given"}.get(method, "")
-    used = ", ".join(["slip", "load", *channels]) + given
-    return used, Answers(value, std, low, high, seconds)
-
-
 def _line(
-    size: int, method: str, inputs: str, truth: Floats, answers: Answers, prior: Sequence[Prior]
+    size: int, method: Method, truth: Floats, answers: Answers, prior: Sequence[Prior]
 ) -> Line:
     lower, upper = np.asarray([p.lower for p in prior]), np.asarray([p.upper for p in prior])
     middle = np.asarray([float(p.at(np.asarray([0.5]))[0]) for p in prior])
     width = np.asarray([p.std for p in prior])
-    failed = ~np.isfinite(answers.value)
-    value = np.where(failed, middle, np.clip(answers.value, lower, upper))
-    error = truth - value
+    failed = ~np.isfinite(answers.mean)
+    value = np.where(failed, middle, np.clip(answers.mean, lower, upper))
     never = failed.all(axis=0)  # a parameter that the method does not estimate
-    rmse = np.where(never, np.nan, np.sqrt(np.mean(error**2, axis=0)))
-    inside = (truth >= answers.low) & (truth <= answers.high)
-    halfway = np.abs(truth - answers.value) <= HALF * answers.std
-    if method == "prior":
-        halfway = np.abs(truth - middle) <= 0.25 * (upper - lower)
-    answered = np.maximum((~failed).sum(axis=0), 1)
+    rmse = np.where(never, np.nan, np.sqrt(np.mean((truth - value) ** 2, axis=0)))
     return Line(
         rows=size,
-        method=method,
-        inputs=inputs,
+        method=method.name,
+        inputs=method.inputs,
         sets=len(truth),
         failed=int(failed[:, ~never].any(axis=1).sum()) if not never.all() else len(truth),
         rmse=rmse,
         relative=rmse / width,
-        cover50=np.where(never, np.nan, halfway.sum(axis=0) / answered),
-        cover90=np.where(never, np.nan, inside.sum(axis=0) / answered),
+        cover50=held(truth, answers.inner),
+        cover90=held(truth, answers.outer),
         seconds=answers.seconds,
     )

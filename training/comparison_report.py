@@ -12,7 +12,8 @@ import numpy as np
 from soilml.quantities import QUANTITIES
 from soilml.saving import replacing
 from soilml.writing import aligned
-from training.compare import ANALYTIC, Line
+from training.compare import Line
+from training.methods import ANALYTIC
 
 #: Unit for people: factor and name.
 _SHOWN = {"Pa": (1e-3, "kPa"), "rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}

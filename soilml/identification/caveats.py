@@ -19,6 +19,8 @@ from soilml.quantities import column
 NOT = 0.8
 HARDLY = 0.5
 TRADE_OFF = 0.95
+#: What a warning of residuals beyond the declared noise says.
+SURPLUS = "times the declared noise"
 
 
 def pinned(u: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -61,8 +63,8 @@ def caveats(
     said += _trade_offs(fit)
     if surplus:
         said.append(
-            f"residuals are {np.sqrt(fit.misfit):.1f} times the declared noise: the model lacks "
-            "something or the noise is understated; std is widened by as much"
+            f"residuals are {np.sqrt(fit.misfit):.1f} {SURPLUS}: the model lacks something or the "
+            "noise is understated; std is widened by as much"
         )
     if undeclared:
         names = ", ".join(column(c.name) for c in data.channels if not c.declared)

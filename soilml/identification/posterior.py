@@ -74,7 +74,7 @@ def settled_samples(
 ) -> tuple[Population, float, bool]:
     """Weighted samples of the posterior, misfit, and whether noise had to be taken for larger."""
     found, misfit, cells = sampled(case, data, free)
-    surplus = misfit > _expected(cells - len(free))
+    surplus = misfit > most_misfit(cells - len(free))
     if surplus:
         found, _, _ = sampled(case, data, free, larger=float(np.sqrt(misfit)))
     return found, misfit, surplus
@@ -150,7 +150,7 @@ def _unsettled(found: Population) -> tuple[str, ...]:
     )
 
 
-def _expected(freedom: int) -> float:
+def most_misfit(freedom: int) -> float:
     """Misfit that one set in a thousand exceeds by noise alone (Wilson and Hilferty 1931)."""
     if freedom < 1:
         return np.inf

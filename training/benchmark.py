@@ -1,0 +1,116 @@
+"""The fixed benchmark: every method on the same sets, beside the Bayes limit of those sets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
+
+import numpy as np
+
+from datagen.recipe import Recipe, read_recipe
+from soilml.errors import InputError
+from soilml.identification import METHODS
+from soilml.onboard import Estimator
+from soilml.quantities import SHEAR
+from training.designs import Design, design_of
+from training.limit import FRACTIONS, Job, jobs
+from training.limit_file import Limit, load, shipped
+from training.methods import (
+    PRIOR,
+    Answers,
+    Method,
+    Own,
+    analytic,
+    own_methods,
+    prior_alone,
+    trained,
+)
+from training.paired import Result
+
+Progress = Callable[[str, int, int], None]
+
+#: The recipe whose sets these are; it comes with the package.
+RECIPE = "benchmark"
+#: The line of the limit.
+LIMIT = "Bayes limit"
+#: Analytic methods that are asked; the exact posterior is the limit itself.
+ASKED = tuple(name for name in METHODS if name != "posterior")
+
+
+def methods(
+    recipe: Recipe,
+    estimators: Mapping[str, Estimator] | None = None,
+    own: Mapping[str, Own] | None = None,
+) -> list[Method]:
+    """The prior, model files, functions of one's own (see `Own`) and the analytic methods."""
+    for label, estimator in (estimators or {}).items():
+        if estimator.names != SHEAR:
+            raise InputError(
+                f"{label} estimates {', '.join(estimator.names)}; the benchmark is for "
+                f"{', '.join(SHEAR)}"
+            )
+    found = [prior_alone([recipe.case.prior[n] for n in SHEAR])]
+    for label, estimator in (estimators or {}).items():
+        found += trained(label, estimator)
+    found += own_methods(own or {})
+    return found + [analytic(recipe.case, name, SHEAR) for name in ASKED]
+
+
+def benchmark(
+    estimators: Mapping[str, Estimator] | None = None,
+    own: Mapping[str, Own] | None = None,
+    most: int | None = None,
+    limit: str | os.PathLike[str] | None = None,
+    progress: Progress = lambda text, done, total: None,
+) -> list[Result]:
+    """Every method on every design, without and with effects that none of them knows.
+
+    `most` sets of each design are used, all where it is None. `limit` is a file of
+    `soilml compare --limit`, else the one that comes with the package. Raises `InputError` where it
+    is not of these rows.
+    """
+    recipe = read_recipe(RECIPE)
+    asked = methods(recipe, estimators, own)
+    wanted = jobs(recipe, SHEAR, most)
+    known = load(limit or shipped(), wanted)
+    designs = {design.key: design for design in map(design_of, recipe.blocks)}
+    groups = [list(same) for _, same in groupby(wanted, key=lambda j: (j.effect, j.design))]
+    found, start = [], 0
+    for number, group in enumerate(groups):
+        progress("designs", number, len(groups))
+        part = slice(start, start := start + len(group))
+        found += _scored(designs[group[0].design], group, known.rows(part), asked, progress)
+    progress("designs", len(groups), len(groups))
+    return found
+
+
+def _scored(
+    design: Design, group: Sequence[Job], known: Limit, asked: Sequence[Method], progress: Progress
+) -> list[Result]:
+    """A line for the limit and one for each method, on the sets of one design."""
+    low, first, third, high = (known.quantiles[:, i] for i in range(len(FRACTIONS)))
+    inner, outer = np.stack([first, third], axis=1), np.stack([low, high], axis=1)
+    least = Answers(known.mean, known.covariance, inner, outer, known.flagged, float("nan"))
+    limit = Result(
+        design=design,
+        effect=group[0].effect,
+        method=LIMIT,
+        inputs="slip, load, torque",
+        priors=tuple(group[0].case.prior[n] for n in SHEAR),
+        truth=np.stack([job.truth for job in group]),
+        answers=least,
+        limit=known.mean,
+        density=known.density,
+        denser=known.denser,
+    )
+    found, unknown = [limit], np.full(len(group), np.nan)
+    for method in asked:
+        told = partial(progress, f"{method.name}, {limit.driven}")
+        answers = method.answers([job.table for job in group], len(SHEAR), told)
+        density = np.zeros(len(group)) if method.name == PRIOR else unknown
+        line = replace(limit, method=method.name, inputs=method.inputs)
+        found.append(replace(line, answers=answers, density=density, denser=unknown))
+    return found
