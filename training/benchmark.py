@@ -79,11 +79,9 @@ def benchmark(
     designs = {design.key: design for design in map(design_of, recipe.blocks)}
     groups = [list(same) for _, same in groupby(wanted, key=lambda j: (j.effect, j.design))]
     found, start = [], 0
-    for number, group in enumerate(groups):
-        progress("designs", number, len(groups))
+    for group in groups:
         part = slice(start, start := start + len(group))
         found += _scored(designs[group[0].design], group, known.rows(part), asked, progress)
-    progress("designs", len(groups), len(groups))
     return found
 
 
@@ -107,10 +105,17 @@ def _scored(
         denser=known.denser,
     )
     found, unknown = [limit], np.full(len(group), np.nan)
+    tables, total = [job.table for job in group], len(asked) * len(group)
     for method in asked:
-        told = partial(progress, f"{method.name}, {limit.driven}")
-        answers = method.answers([job.table for job in group], len(SHEAR), told)
+        before = (len(found) - 1) * len(group)
+        told = partial(_told, progress, limit.driven, before, total)
+        answers = method.answers(tables, len(SHEAR), told)
         density = np.zeros(len(group)) if method.name == PRIOR else unknown
         line = replace(limit, method=method.name, inputs=method.inputs)
         found.append(replace(line, answers=answers, density=density, denser=unknown))
     return found
+
+
+def _told(progress: Progress, text: str, before: int, total: int, done: int, sets: int) -> None:
+    """One bar for all methods on a design."""
+    progress(text, before + done, total)

@@ -34,7 +34,7 @@ TORQUE = "torque_Nm"
 #: Effects that no method of the benchmark knows, the designs that are driven with them, and sets.
 UNKNOWN = ("slip-sinkage", "torque-offset")
 UNKNOWN_DESIGNS = ("1x", "6x3load_N", "18x6slip-3load_N")
-UNKNOWN_SETS = 60
+UNKNOWN_SETS = 50
 
 
 @dataclass(frozen=True)

@@ -226,3 +226,13 @@ def test_without_the_released_models_the_command_says_where_they_are(tmp_path, m
     assert main(["compare", "--limit", "limit.csv"]) == 2
     assert "....parquet" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_the_limit_is_computed_anew_over_what_was_there_and_used(small_model, tmp_path, capsys):
+    file, out = tmp_path / "limit.parquet", tmp_path / "found"
+    file.write_text("old")
+    assert main(["compare", "--limit", str(file), "--sets", "1"]) == 0
+    command = ["compare", str(small_model), "--out", str(out), "--against", str(file), "--sets"]
+    assert main([*command, "2"]) == 2
+    assert "has no limit for set 1" in capsys.readouterr().err
+    assert not out.exists()

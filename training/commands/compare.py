@@ -57,7 +57,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--sets", type=_sets, metavar="N", help="only the first N sets of each size"
     )
     parser.add_argument(
-        "--limit", metavar="FILE.parquet", help="write the benchmark's Bayes limit here, no more"
+        "--limit",
+        metavar="FILE.parquet",
+        type=Path,  # an output: what is there already may be written over
+        help="write the benchmark's Bayes limit here, no more",
     )
     parser.add_argument(
         "--against", metavar="FILE.parquet", help="the limit to use, of --limit; else the package's"
@@ -79,8 +82,8 @@ def _sets(text: str) -> int:
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder is there already."""
-    if args.limit:
-        return named(args.limit, ".parquet")
+    if args.limit is not None:
+        return named(str(args.limit), ".parquet")
     folder = Path(args.out or FOLDER)
     names = FILES if _own_data(args) else BENCHMARK
     return [folder / name for name in names] if folder.is_dir() else []
@@ -94,23 +97,30 @@ def _own_data(args: argparse.Namespace) -> bool:
 def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
     need("training.benchmark", "compare")
-    if args.limit:
+    if args.limit is not None:
         return _limit(args)
     return _compare(args) if _own_data(args) else _benchmark(args)
 
 
 def _benchmark(args: argparse.Namespace) -> int:
     from datagen.progress import stages
+    from datagen.recipe import read_recipe
     from soilml.onboard import Estimator
+    from soilml.quantities import SHEAR
+    from soilml.table import Table
     from soilml.writing import csv_text
     from training import benchmark_report as report
-    from training.benchmark import LIMIT, benchmark
+    from training.alike import check_alike
+    from training.benchmark import LIMIT, RECIPE, benchmark
     from training.benchmark_picture import draw
     from training.goals import goals
 
     files = [Path(file) for file in args.files] or _released()
     estimators = {file.stem: Estimator.load(file) for file in files}
     _check_labels(estimators, files)
+    case = read_recipe(RECIPE).case
+    for note in check_alike(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
+        print(note, file=sys.stderr)
     with made_folder(args.out or FOLDER) as folder:
         with stages() as progress:
             results = benchmark(estimators, None, args.sets, args.against, progress)
