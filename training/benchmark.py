@@ -44,8 +44,9 @@ def methods(
     recipe: Recipe,
     estimators: Mapping[str, Estimator] | None = None,
     own: Mapping[str, Own] | None = None,
+    named: Sequence[str] = ASKED,
 ) -> list[Method]:
-    """The prior, model files, functions of one's own (see `Own`) and the analytic methods."""
+    """The prior, model files, functions of one's own (see `Own`) and analytic methods by name."""
     for label, estimator in (estimators or {}).items():
         if estimator.names != SHEAR:
             raise InputError(
@@ -56,7 +57,7 @@ def methods(
     for label, estimator in (estimators or {}).items():
         found += trained(label, estimator)
     found += own_methods(own or {})
-    return found + [analytic(recipe.case, name, SHEAR) for name in ASKED]
+    return found + [analytic(recipe.case, name, SHEAR) for name in named]
 
 
 def benchmark(
@@ -65,15 +66,16 @@ def benchmark(
     most: int | None = None,
     limit: str | os.PathLike[str] | None = None,
     progress: Progress = lambda text, done, total: None,
+    named: Sequence[str] = ASKED,
 ) -> list[Result]:
     """Every method on every design, without and with effects that none of them knows.
 
-    `most` sets of each design are used, all where it is None. `limit` is a file of
-    `soilml compare --limit`, else the one that comes with the package. Raises `InputError` where it
-    is not of these rows.
+    `named` are the analytic methods. `most` sets of each design are used, all where it is None.
+    `limit` is a file of `soilml compare --limit`, else the one that comes with the package. Raises
+    `InputError` where it is not of these rows.
     """
     recipe = read_recipe(RECIPE)
-    asked = methods(recipe, estimators, own)
+    asked = methods(recipe, estimators, own, named)
     wanted = jobs(recipe, SHEAR, most)
     known = load(limit or shipped(), wanted)
     designs = {design.key: design for design in map(design_of, recipe.blocks)}
