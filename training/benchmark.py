@@ -19,6 +19,7 @@ from training.designs import Design, design_of
 from training.limit import FRACTIONS, Job, jobs
 from training.limit_file import Limit, load, shipped
 from training.methods import (
+    ANALYTIC,
     PRIOR,
     Answers,
     Method,
@@ -34,8 +35,8 @@ Progress = Callable[[str, int, int], None]
 
 #: The recipe whose sets these are; it comes with the package.
 RECIPE = "benchmark"
-#: The line of the limit.
-LIMIT = "Bayes limit"
+#: The line of the limit; with an effect that its model lacks, it is but the posterior method.
+LIMIT, POSTERIOR = "Bayes limit", f"{ANALYTIC}posterior"
 #: Analytic methods that are asked; the exact posterior is the limit itself.
 ASKED = tuple(name for name in METHODS if name != "posterior")
 
@@ -97,7 +98,7 @@ def _scored(
     limit = Result(
         design=design,
         effect=group[0].effect,
-        method=LIMIT,
+        method=POSTERIOR if group[0].effect else LIMIT,
         inputs="slip, load, torque",
         priors=tuple(group[0].case.prior[n] for n in SHEAR),
         truth=np.stack([job.truth for job in group]),

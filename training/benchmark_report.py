@@ -33,6 +33,8 @@ def columns(results: Sequence[Result]) -> dict[str, list[Any]]:
             }
             keys = ("rmse", "rmse_share_of_prior", "rmse_over_limit", "rmse_over_limit_std")
             values = [float(figure[k]) for figure in figures]
+            if r.effect:  # what lacks the effect is no limit
+                values[2:4] = [float("nan")] * 2
             row |= dict(zip((*keys, "cover50", "cover90"), values, strict=True))
             row |= dict(zip(("joint_cover90", "log_density", "flagged"), shares, strict=True))
             row["seconds_per_estimate"] = r.answers.seconds
