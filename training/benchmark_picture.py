@@ -18,7 +18,7 @@ NAMES = ("cohesion", "friction angle", "shear modulus")
 def draw(results: Sequence[Result], limit: str, path: str | os.PathLike[str]) -> None:
     """RMSE at one load and at three, and what 90 % intervals hold, as PNG."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     known = [r for r in results if not r.effect]
     methods = list(dict.fromkeys(r.method for r in known))
@@ -40,6 +40,8 @@ def draw(results: Sequence[Result], limit: str, path: str | os.PathLike[str]) ->
                 if method != PRIOR:
                     cover.plot(x, [r.cover90[k] for r in own], **style)
             error.set_yscale("log")
+            error.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            error.yaxis.set_minor_formatter(NullFormatter())
             error.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
             error.grid(alpha=0.3, which="both")
             cover.axhspan(*HELD, color="C2", alpha=0.2, lw=0)
