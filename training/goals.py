@@ -127,7 +127,7 @@ def _held(own: Sequence[Result], least: Sequence[Result]) -> Iterator[Goal]:
         parts.append((f"{name} third", lambda r, third=third: thirds(r)[third]))  # type: ignore[misc]
     for name, figure in parts:
         mean, limit = (np.nanmean([figure(r) for r in rs], axis=0) for rs in (own, least))
-        sets = sum(r.sets for r in own) / (1 if name == "overall" else 3)
+        sets = len(own) ** 2 / sum(1.0 / r.sets for r in own) / (1 if name == "overall" else 3)
         yield Goal(
             f"90 % intervals, {name}: {needed}",
             own[0].method,
