@@ -81,6 +81,8 @@ class Estimator:
                 sets=SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None,
                 session=session,
             )
+            if not (isinstance(probe, list) and probe):
+                raise ValueError("no probe")
             sound = all(estimator._holds(**entry) for entry in probe)
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
@@ -136,6 +138,16 @@ class Estimator:
             if rows["slip"].size == 0:
                 raise InputError("no reading given; needed is one or more")
             return self._answered(rows, self.start())[0]
+        return self.joined(**measured)
+
+    def joined(self, **measured: Any) -> Estimate:
+        """The estimates of single readings, joined as Gaussians: what `run` is without sets.
+
+        Far from the best that many readings allow. Raises `InputError` as `run` does, and for a
+        file that has no estimates of single readings.
+        """
+        if self.sets is not None and self.sets.alone:
+            raise InputError(f"{self.path} has no estimates of single readings to join; take run")
         if self.per_row:
             raise InputError(
                 f"{self.path} estimates {self.per_row[0]}, which differs from row to row: rows of "

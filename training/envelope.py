@@ -21,7 +21,8 @@ SLACK = 0.02
 class Envelope:
     """Bounds of one column of the features (n, d), between knots along up to two other columns.
 
-    Between knots they are interpolated linearly. No row that it was made of lies outside.
+    Between knots they are interpolated linearly, beyond the last they stay. No row that it was made
+    of lies outside.
     """
 
     column: int
@@ -67,7 +68,9 @@ class Envelope:
         """Whether a row lies outside the bounds, (n,), as a node of an ONNX graph."""
         weights = []
         for k, along in zip(self.driven, self.knots, strict=True):
-            apart = graph.scaled(graph.columns(features, k, k + 1), along, along[1] - along[0])
+            ends = [graph.constant(end) for end in (along[0], along[-1])]
+            kept = graph.op("Clip", graph.columns(features, k, k + 1), *ends)
+            apart = graph.scaled(kept, along, along[1] - along[0])
             near = graph.op("Sub", graph.constant(1.0), graph.op("Abs", apart))
             weights.append(graph.op("Max", near, graph.constant(0.0)))
         value = graph.reshaped(graph.columns(features, self.column, self.column + 1), -1)
@@ -80,7 +83,8 @@ class Envelope:
 
 def _tents(values: Floats, knots: Floats) -> Floats:
     """Weights (n, k) of the knots in linear interpolation."""
-    apart = (values[:, None] - knots) / (knots[1] - knots[0])
+    kept = np.clip(values, knots[0], knots[-1])
+    apart = (kept[:, None] - knots) / (knots[1] - knots[0])
     return np.asarray(np.maximum(1.0 - np.abs(apart), 0.0))
 
 

@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 
 COVERS = 128
 POOL = 6000
+#: Slack of the box, as a share of its width: the rows do not reach its very ends.
+SLACK = 0.005
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,11 @@ class Support:
             float(np.sqrt(_least(z[i : i + 4096], covers).max())) for i in range(0, len(z), 4096)
         )
         return Support(
-            lower=features.min(axis=0),
-            upper=features.max(axis=0),
+            lower=features.min(axis=0) - SLACK * np.ptp(features, axis=0),
+            upper=features.max(axis=0) + SLACK * np.ptp(features, axis=0),
             scaling=scaling,
             covers=covers,
-            radius=radius,
+            radius=radius * (1.0 + SLACK),
             envelopes=tuple(Envelope.of(features, k, driven) for k in sorted(measured)),
         )
 

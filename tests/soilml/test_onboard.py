@@ -209,17 +209,17 @@ def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
 
 
 def test_the_probe_asks_for_a_row_out_of_range(estimator):
-    asked = json.loads(estimator.metadata["probe"])["in_range"]
+    asked = json.loads(estimator.metadata["probe"])[0]["in_range"]
     assert asked == [True] * 8 + [False]
 
 
 def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small_model):
-    from soilml.onboard import checksum
+    from soilml.model_file import checksum
 
     model = onnx.load(small_model)
     metadata = {e.key: e.value for e in model.metadata_props}
     probe = json.loads(metadata["probe"])
-    probe["mean"][0][0] += 1.0
+    probe[0]["mean"][0][0] += 1.0
     metadata["probe"] = json.dumps(probe)
     metadata["metadata_sha256"] = checksum(metadata)
     for entry in model.metadata_props:
@@ -230,7 +230,7 @@ def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small
 
 
 def test_damaged_metadata_is_refused(tmp_path, small_model):
-    from soilml.onboard import checksum
+    from soilml.model_file import checksum
 
     for key, value in {"outputs": "{", "together": "[]", "probe": "{}"}.items():
         model = onnx.load(small_model)
@@ -285,6 +285,9 @@ def test_the_runtime_loads_numpy_and_onnxruntime_and_nothing_of_the_ground(small
         "soilml.errors",
         "soilml.estimate",
         "soilml.features",
+        "soilml.joining",
+        "soilml.model_file",
         "soilml.onboard",
         "soilml.quantities",
+        "soilml.sets",
     }
