@@ -92,12 +92,16 @@ class Estimator:
             raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator
 
-    def on(self, **given: float) -> Estimator:
+    def on(
+        self, noise: Mapping[str, tuple[float, float]] | None = None, **given: float
+    ) -> Estimator:
         """The same for one wheel on one kind of ground, where the file serves many.
 
-        Raises `InputError` for what the file does not take, or is not for.
+        `noise` replaces the file's own for sets: channel, or torque_bias, -> its constant part and
+        its share of the reading. Raises `InputError` for what the file does not take, or is not
+        for.
         """
-        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).on(given)
+        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).on(given, noise or {})
         outputs = json.loads(self.metadata["outputs"])
         scale = np.asarray([sets.given.get(entry.get("scale", ""), 1.0) for entry in outputs])
         unit = [numbers(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper")]
@@ -157,6 +161,13 @@ class Estimator:
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
         return joined_run(self, dict(zip(self.inputs, flat, strict=True)))
+
+    def inside(self, **measured: Any) -> NDArray[np.bool_]:
+        """Which of the readings of a run, (rows,), lie where the file was trained."""
+        if self.sets is None:
+            return np.atleast_1d(self(**measured).in_range)
+        rows = self._ready.rows(measured)
+        return self.sets.inside(self.session, rows)
 
     def start(self) -> Memory:
         """The memory of a soil of which nothing was measured yet."""

@@ -26,6 +26,8 @@ NEEDED = ("slip", "torque", "load")
 OPTIONAL = ("sinkage", "drawbar_pull")
 #: Standard deviations that may be given row by row; without them those of the file hold.
 SPREADS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
+#: What may have noise.
+NOISY = ("torque", *OPTIONAL, "torque_bias")
 #: Outputs of the graph that make an answer, in this order, and those that make the memory.
 ANSWER = ("mean", "std", "covariance", "low", "high", "in_range", "misfit")
 KEPT = ("memory_out", "counted_out")
@@ -91,8 +93,19 @@ class SetPosterior:
         """What must still be given before anything is estimated."""
         return tuple(name for name in self.context if name not in self.given)
 
-    def on(self, given: Mapping[str, Any]) -> SetPosterior:
-        """With wheel, bearing and prior given; raises `InputError` for one that is out of range."""
+    def on(
+        self, given: Mapping[str, Any], noise: Mapping[str, tuple[float, float]]
+    ) -> SetPosterior:
+        """With wheel, bearing, prior and noise given.
+
+        Raises `InputError` for one that is not known or out of range.
+        """
+        for name, (constant, share) in noise.items():
+            if name not in NOISY or not (constant >= 0.0 and share >= 0.0):
+                raise InputError(
+                    f"noise of {name} is {constant:g} and {share:g} of the reading; needed are two "
+                    f"numbers not below zero for {', '.join(NOISY)}"
+                )
         for name, value in given.items():
             if name not in self.context:
                 known = ", ".join(self.context) or "nothing: the file is of one wheel"
@@ -100,7 +113,8 @@ class SetPosterior:
             low, high = self.context[name]
             if not low <= float(value) <= high:
                 raise InputError(f"{name} is {value:g}; this file is for {low:g} to {high:g}")
-        return replace(self, given=self.given | {k: float(v) for k, v in given.items()})
+        own = self.given | {k: float(v) for k, v in given.items()}
+        return replace(self, given=own, noise=self.noise | dict(noise))
 
     def start(self) -> Memory:
         """The memory before anything was measured."""
@@ -156,6 +170,13 @@ class SetPosterior:
         if not self.alone:
             feed["joint"] = np.ones(1, np.bool_)
         return feed | {"memory": memory.system, "counted": memory.counted}
+
+    def inside(
+        self, session: ort.InferenceSession, rows: Mapping[str, Floats]
+    ) -> NDArray[np.bool_]:
+        """Which rows (m,) lie where the response of the wheel was learned."""
+        found: NDArray[np.bool_] = session.run(("row_in_range",), self.feed(rows, self.start()))[0]
+        return found
 
     def learned(
         self, session: ort.InferenceSession, rows: Mapping[str, Floats], memory: Memory

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from itertools import combinations
 from pathlib import Path
@@ -16,14 +15,16 @@ from soilml.advice import told
 from soilml.combined import ACROSS_FILES, PRIOR_ONCE, fused_estimates
 from soilml.commands.advising import after_estimate, typical, vaguest
 from soilml.commands.identify import add_row_options, chosen_rows
+from soilml.commands.joint_rows import channels_said, joint_readings, row_readings
 from soilml.commands.output import deliver
+from soilml.commands.which_wheel import check_same_wheel, for_the_case
 from soilml.errors import InputError, TableError
 from soilml.estimate import Estimate
 from soilml.fusion import COVARIANCE_INTERSECTION
 from soilml.joining import LEAST_SOUND
 from soilml.needs import need
 from soilml.onboard import Estimator
-from soilml.quantities import QUANTITIES, column
+from soilml.quantities import column
 from soilml.reading import FILLED, RUNS
 from soilml.saving import named
 from soilml.table import Table
@@ -34,13 +35,15 @@ Estimate soil parameters, or slip, with MODEL.onnx, just as the onboard runtime 
 
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
+  soilml estimate exported/any_wheel.onnx RUNS.csv --case MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Each row gets a mean, a standard deviation and a 90 % interval (_p05, _p95) of every parameter, and
 in_range: 0 where the readings are unlike anything that the model was trained on; the answer is then
 the prior. One row brings one equation for three unknowns, so its estimate is mostly the prior; with
---by run, all rows of a run are joined, which can say far more; rows that contradict each other, or
-of which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
+--by run, all rows of a run answer together, which can say far more, and sinkage_m, drawbar_pull_N
+and <column>_std take part where the table has them; rows that no soil explains together, or of
+which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
 estimate, and so does one whose status is not ok. --with fuses files that estimate the same from
 other sensors, row by row, and needs errors that are independent: files that read the same are
 refused but for --rule covariance-intersection. A file whose reading is blank, or out of range,
@@ -58,6 +61,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--with", dest="others", metavar="OTHER.onnx", action="append", default=[], help="fuse with"
     )
     parser.add_argument("--rule", help=f"how --with fuses: {', '.join(ACROSS_FILES)}")
+    parser.add_argument("--case", metavar="MODEL.toml", help="your wheel, for any_wheel.onnx")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="where to write the estimates")
 
@@ -72,12 +76,13 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_asked(args, estimators)
+    estimators[0], said_first = for_the_case(args, estimators[0])
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
     table = chosen_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
-        _same_wheel(estimator, table)
+        check_same_wheel(estimator, table)
     each = [_measured(estimator, table) & table.answered for estimator in estimators]
     measured = np.any([_measured(estimator, table) for estimator in estimators], axis=0)
     if not np.any(each):
@@ -88,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         columns, said = _by(estimators[0], table, each[0], args.by)
     deliver(columns, args.out)
+    said = said_first + said
     said += _left_out(table, ~measured, "lack a reading")
     said += _left_out(table, measured & ~table.answered, "have a status that is not ok")
     print("\n".join(said), file=sys.stderr)
@@ -160,7 +166,7 @@ def _row_by_row(
     said = _worth(estimate, "one row alone", "does", hint)
     if files is None and estimate.in_range.any():
         row = typical(estimate)
-        readings = _readings(estimators[0], table.rows(np.asarray([row])))
+        readings = row_readings(estimators[0], table.rows(np.asarray([row])))
         lines = after_estimate(
             estimators[0], estimate.mean[row], estimate.covariance[row], readings
         )
@@ -180,7 +186,9 @@ def _of_rows(estimator: Estimator, whole: NDArray[np.bool_], table: Table) -> Es
     """An estimate for every row: out of range where it is not whole."""
     found = estimator.unknown(len(table))
     if whole.any():
-        estimate = estimator(**_readings(estimator, table.rows(whole)))
+        alone = estimator.sets is not None and estimator.sets.alone
+        readings = (joint_readings if alone else row_readings)(estimator, table.rows(whole))
+        estimate = estimator(**readings)
         for key in ("mean", "std", "covariance", "low", "high", "in_range"):
             getattr(found, key)[whole] = getattr(estimate, key)
     return found
@@ -192,8 +200,9 @@ def _by(
     """A line for every value of a column, from all its rows together; blank where none is whole."""
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(whole).groups(by))
-    estimates = [estimator.run(**_readings(estimator, rows)) for _, rows in groups]
-    sound = [int(estimator(**_readings(estimator, rows)).in_range.sum()) for _, rows in groups]
+    readings = [joint_readings(estimator, rows) for _, rows in groups]
+    estimates = [estimator.run(**those) for those in readings]
+    sound = [int(estimator.inside(**those).sum()) for those in readings]
     estimate = _stacked(estimates)
     place = {name: i for i, (name, _) in enumerate(groups)}
     there = np.asarray([name in place for name in order])
@@ -207,23 +216,21 @@ def _by(
     for key, values in _answers(estimate).items():
         columns[key] = np.where(there, values[index], np.nan)
     columns["in_range"] = there & estimate.in_range[index]
-    said = _worth(estimate, f"all rows of a {by}", "do", "drive other loads and slips")
+    said = channels_said(estimator, joint_readings(estimator, table.rows(whole)))
+    said += _worth(estimate, f"all rows of a {by}", "do", "drive other loads and slips")
     if estimate.in_range.any():
         name, rows = groups[i := vaguest(estimate)]
-        readings = _readings(estimator, rows)
-        lines = after_estimate(estimator, estimate.mean[i], estimate.covariance[i], readings)
+        lines = after_estimate(
+            estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
+        )
         said += [f"{by} {name}: {line}" for line in lines]
     for (name, rows), good, one in zip(groups, sound, estimates, strict=True):
         if not one.in_range:
             why = f"{len(rows) - good} of {len(rows)} rows are out of range"
             if good >= LEAST_SOUND * len(rows):
-                why = "its rows contradict each other as rows of one soil hardly ever do"
+                why = "no soil that the file knows explains its rows together"
             said.append(f"{by} {name}: {why}; the answer is the prior")
     return columns, said
-
-
-def _readings(estimator: Estimator, table: Table) -> dict[str, Any]:
-    return {name: table[column(name)] for name in estimator.inputs}
 
 
 def _answers(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
@@ -236,28 +243,6 @@ def _answers(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
         found[f"{key}_p05"] = estimate.low[:, i]
         found[f"{key}_p95"] = estimate.high[:, i]
     return found
-
-
-def _same_wheel(estimator: Estimator, table: Table) -> None:
-    """A table that says which wheel was driven must say the one that the model was trained for."""
-    gear = json.loads(estimator.metadata["gear"])
-    for name in ("radius", "width"):
-        key = QUANTITIES[f"wheel_{name}"].column
-        if key in table and name in gear:
-            _refuse(table, key, np.abs(table[key] / gear[name] - 1.0) > 0.005, f"{gear[name]:g}")
-    effects = json.loads(estimator.metadata["recipe"]).get("effect", [])
-    key = QUANTITIES["grouser_height"].column
-    if key in table and not any(effect["name"] == "grousers" for effect in effects):
-        _refuse(table, key, table[key] > 0.0, "a wheel without lugs")
-
-
-def _refuse(table: Table, key: str, wrong: NDArray[np.bool_], trained: str) -> None:
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(
-            f"{table.place(row)}, column {key}: {table[key][row]:g} given, the model was trained "
-            f"for {trained}; choose rows with --where, or train one for this wheel"
-        )
 
 
 def _stacked(estimates: list[Estimate]) -> Estimate:

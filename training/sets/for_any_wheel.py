@@ -37,7 +37,7 @@ NO_JOINING: dict[str, Any] = {
     "upper": [],
     "std": [],
     "kinds": [],
-    "alone": [],
+    "alone": [1.645] * len(SHEAR),
     "doubt": [],
 }
 
