@@ -70,6 +70,16 @@ def on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list[str]]:
     return found, said + _not_followed(found, case)
 
 
+def for_case(estimator: Estimator, case: Case) -> Estimator:
+    """A file for many wheels on the case's; any other as it is.
+
+    For sets that the case made: the sensor of the torque has no bias.
+    """
+    if estimator.sets is None or not estimator.sets.needs:
+        return estimator
+    return on_case(estimator, case)[0].on(noise={"torque_bias": (0.0, 0.0)})
+
+
 def _log_std(prior: Prior, bearing: float) -> float:
     """Standard deviation of the logarithm of the bearing modulus."""
     if prior.log:

@@ -39,6 +39,8 @@ ORDER = (
     "generate",
     "train",
     "estimate",
+    "advise",
+    "pull",
     "compare",
     "climb",
 )

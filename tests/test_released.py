@@ -10,7 +10,9 @@ import pytest
 from datagen.engine import pieces
 from datagen.recipe import Block, read_recipe
 from soilml import Estimator
+from soilml.any_wheel import for_case
 from soilml.quantities import column
+from training.sets.for_any_wheel import read_any_spec
 from training.spec import read_spec
 
 ROOT = Path(__file__).parents[1]
@@ -24,9 +26,9 @@ RELEASED = {
 
 
 def test_every_released_file_is_listed_and_has_its_card():
-    assert {f.stem for f in (ROOT / "exported").glob("*.onnx")} == set(RELEASED)
+    assert {f.stem for f in (ROOT / "exported").glob("*.onnx")} == {*RELEASED, "any_wheel"}
     page = (ROOT / "exported" / "README.md").read_text()
-    for name in RELEASED:
+    for name in (*RELEASED, "any_wheel"):
         assert (ROOT / "exported" / f"{name}.md").is_file()
         assert f"{name}.onnx" in page
 
@@ -102,3 +104,29 @@ def test_readings_repeated_and_points_held_claim_no_more_than_they_tell(name):
         sound, inside = coverage(estimator, runs(recipe, rows, ()), copies)
         assert sound > 0.97
         assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)
+
+
+def test_the_file_for_any_wheel_comes_from_its_spec():
+    metadata = Estimator.load(ROOT / "exported" / "any_wheel.onnx").metadata
+    assert metadata["spec"] == read_any_spec("any_wheel").text
+    assert metadata["spec_sha256"] in (ROOT / "exported" / "any_wheel.md").read_text()
+
+
+@pytest.mark.parametrize("rows", [1, 6, 24])
+def test_the_file_for_any_wheel_is_as_good_as_that_of_the_reference_wheel(rows):
+    one = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    recipe = read_recipe("wheel")
+    many = for_case(Estimator.load(ROOT / "exported" / "any_wheel.onnx"), recipe.case)
+    columns = runs(recipe, rows, ())
+    truth = np.stack([columns[column(n)][:, 0] for n in one.names], axis=1)
+    error = []
+    for estimator in (one, many):
+        found = [
+            estimator.run(**{n: columns[column(n)][i] for n in one.inputs})
+            for i in range(len(truth))
+        ]
+        assert np.mean([e.in_range for e in found]) > 0.97
+        low, high = np.stack([e.low for e in found]), np.stack([e.high for e in found])
+        assert (np.abs(np.mean((truth >= low) & (truth <= high), axis=0) - 0.9) < 0.06).all()
+        error.append(np.sqrt(np.mean((np.stack([e.mean for e in found]) - truth) ** 2, axis=0)))
+    assert (error[1] < 1.05 * error[0]).all()

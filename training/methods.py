@@ -137,11 +137,12 @@ def prior_alone(priors: Sequence[Prior]) -> Method:
 def trained(label: str, estimator: Estimator) -> list[Method]:
     """A model file's line; two lines where it offers two ways to join the rows of a soil.
 
-    `run` is what the file answers with. Where it has `joined` besides, single readings' estimates
-    joined by the fusion rule, that is a line of its own, in which one row is a plain call.
+    `run` is what the file answers with. Where that is its set posterior, and it estimates single
+    readings too, these joined by the fusion rule are a line of their own, in which one row is a
+    plain call.
     """
     used = ", ".join(estimator.inputs)
-    joined = getattr(estimator, "joined", None)
+    both = estimator.sets is not None and not estimator.sets.alone
 
     def asked(call: Callable[..., Estimate], single: bool) -> Callable[[Table], Answer]:
         def ask(rows: Table) -> Answer:
@@ -153,10 +154,10 @@ def trained(label: str, estimator: Estimator) -> list[Method]:
         return ask
 
     channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
-    if joined is None:
+    if not both:
         return [Method(label, used, channels, asked(estimator.run, True))]
     return [
-        Method(f"{label}{JOINED}", used, channels, asked(joined, True)),
+        Method(f"{label}{JOINED}", used, channels, asked(estimator.joined, True)),
         Method(label, used, channels, asked(estimator.run, False)),
     ]
 

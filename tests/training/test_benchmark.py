@@ -4,6 +4,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -194,6 +195,7 @@ def test_a_file_that_joins_rows_in_two_ways_gets_two_lines(small_model, recipe):
 
     class Both:
         inputs, joined, run = estimator.inputs, estimator.run, estimator.run
+        sets = SimpleNamespace(alone=False)
 
         def __call__(self, **readings):
             return estimator(**readings)

@@ -16,7 +16,7 @@ FILES = ("compare.csv", "compare.png", "compare.md")
 BENCHMARK = ("benchmark.csv", "benchmark.png", "benchmark.md")
 #: Where the benchmark's go without --out, and the files that it is of without arguments.
 FOLDER = "demo/benchmark"
-RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear")
+RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
 HELP = "models against analytic identification and the prior, on the same data"
 DESCRIPTION = """\
@@ -105,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
 def _benchmark(args: argparse.Namespace) -> int:
     from datagen.progress import stages
     from datagen.recipe import read_recipe
+    from soilml.any_wheel import for_case
     from soilml.onboard import Estimator
     from soilml.quantities import SHEAR
     from soilml.table import Table
@@ -116,9 +117,9 @@ def _benchmark(args: argparse.Namespace) -> int:
     from training.goals import goals
 
     files = [Path(file) for file in args.files] or _released()
-    estimators = {file.stem: Estimator.load(file) for file in files}
-    _check_labels(estimators, files)
     case = read_recipe(RECIPE).case
+    estimators = {file.stem: for_case(Estimator.load(file), case) for file in files}
+    _check_labels(estimators, files)
     for note in check_alike(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         print(note, file=sys.stderr)
     with made_folder(args.out or FOLDER) as folder:
@@ -170,6 +171,7 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 def _compare(args: argparse.Namespace) -> int:
     from datagen.progress import stages
+    from soilml.any_wheel import for_case
     from soilml.case import read_case
     from soilml.onboard import Estimator
     from soilml.reading import read_table
@@ -183,7 +185,7 @@ def _compare(args: argparse.Namespace) -> int:
     model, test, *files = args.files
     case = read_case(model)
     table = read_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
-    estimators = {Path(file).stem: Estimator.load(file) for file in files}
+    estimators = {Path(file).stem: for_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names
     for note in check_alike(case, table, estimators, names):

@@ -53,7 +53,7 @@ def draw_answers(
     off = op("Sub", value, mean)
     spread = op("Gemm", op("Mul", off, sample.weights), off, transB=1)
     square = op("MatMul", op("Mul", off, off), op("Transpose", sample.weights))
-    low, high = _ends(graph, _values(graph, family, sample.last[0]), sample.last[1])
+    low, high = _ends(graph, value, sample.weights)
     sound = _sound(graph, sample, counted, limits)
     prior = prior_of(family)
     std = op("Sqrt", square)

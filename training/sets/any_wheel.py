@@ -19,7 +19,7 @@ from soilml.soils import Soil
 from training.graph import Graph
 from training.sets.axis import Axis
 from training.sets.driving import driven
-from training.sets.family import ABSENT, Context, Sets
+from training.sets.family import ABSENT, CLEAR, Context, Sets, draw_log_torque
 from training.sets.response import NEAR
 
 Floats = NDArray[np.float64]
@@ -185,7 +185,7 @@ class AnyWheel:
         return Model(Wheel(radius=r, width=b))(soil, Operating(slip=slip, load=load))
 
     def answers(self, designs: Floats, x: Floats) -> Floats:
-        """See `Family`; the length is the radius."""
+        """See `Family`; torque as the logarithm of T / (W r), and the length is the radius."""
         force = self.force(designs, x)
         r, load = designs[:, RADIUS, None], designs[:, LOAD, None]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -248,8 +248,12 @@ class AnyWheel:
         wide = [graph.reshaped(op("Expand", c, rows), -1, 1) for c in columns]
         near = op("Max", op("Div", readings["bearing_std"], graph.small(STRAY)), graph.small(1e-3))
         one = graph.small(np.ones(1))
+        torque, rise = draw_log_torque(graph, readings, readings["wheel_radius"])
         return Context(
             features=op("Concat", *wide, axis=1),
+            torque=torque,
+            rise=rise,
+            clear=CLEAR,
             length=readings["wheel_radius"],
             scale=graph.reshaped(
                 op("Concat", readings["cohesion_max"], one, readings["shear_modulus_max"], axis=0),

@@ -24,6 +24,9 @@ class Context:
     """Names of graph values that a family computes from its inputs, float32."""
 
     features: str  # (rows, f)
+    torque: str  # (rows,) the reading as the response answers it
+    rise: str  # (rows,) what that gains with torque, 1 / (N m)
+    clear: float  # a torque with more noise than this share of it counts for nothing
     length: str  # that sinkage, and torque over load, are measured in, m
     scale: str  # (q, 1) by which the values of the estimated axes are multiplied
     width: str  # (p, 1) of each axis: 1, or the standard deviation where it is nearly known
@@ -48,6 +51,24 @@ class Sets:
     def given(self, index: int) -> dict[str, float]:
         """The context of one set."""
         return {name: float(values[index]) for name, values in self.context.items()}
+
+
+#: A torque or sinkage with more noise than this share of it has no logarithm to be believed.
+CLEAR = 1.0 / 3.0
+
+
+def draw_log_torque(graph: Graph, readings: dict[str, str], length: str) -> tuple[str, str]:
+    """Logarithm of torque over load and length (rows,), and what it gains with torque.
+
+    The mean of the logarithm of a noisy reading lies below that of the truth by half of the squared
+    share of noise, which is added.
+    """
+    op, small = graph.op, graph.small
+    torque = op("Max", readings["torque"], small(1e-12))
+    share = op("Div", readings["torque_std"], torque)
+    short = op("Min", op("Mul", op("Mul", share, share), small(0.5)), small(0.02))
+    grip = op("Div", torque, op("Mul", readings["load"], length))
+    return op("Add", op("Log", grip), short), op("Div", small(1.0), torque)
 
 
 class Family(Protocol):
@@ -89,8 +110,8 @@ class Family(Protocol):
     def answers(self, designs: Floats, x: Floats) -> Floats:
         """Channels (n, m, 3) at coordinates x (n, m, p).
 
-        They are the logarithm of torque over load and length, the logarithm of sinkage over length,
-        and drawbar pull over load; NaN where there is no equilibrium.
+        They are a rising function of torque along which its noise is the same everywhere, the
+        logarithm of sinkage over length, and drawbar pull over load; NaN without equilibrium.
         """
         ...
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from soilml.quantities import column
 from training.graph import Graph
 from training.sets.axis import Axis
 from training.sets.driving import driven
-from training.sets.family import ABSENT, CHANNELS, Context, Sets
+from training.sets.family import ABSENT, CHANNELS, CLEAR, Context, Sets, draw_log_torque
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +28,12 @@ MOST_AXES = 6
 MARGIN = 0.02
 #: Share of simulated sets in which sinkage and drawbar pull are measured beside torque.
 TOLD = 0.3
+#: Up to so many unknowns are followed to the fourth degree, and the estimated ones always.
+FEW_AXES = 4
+#: Least share of noise for which torque is answered, where its noise is constant.
+STEADY = 0.2
+#: Without a logarithm a torque may have any noise.
+ANY_NOISE = 1e5
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,7 @@ class OneWheel:
     targets: int
     free: int
     degree: tuple[int, int]
+    bend: float = 0.0  # N m, the torque at which its answer turns from a line to a logarithm
 
     @staticmethod
     def of(recipe: Recipe, targets: Sequence[str]) -> OneWheel:
@@ -57,8 +64,12 @@ class OneWheel:
                 "slip, load and soil alone; leave it out of the spec"
             )
         axes = tuple(Axis.of(name, prior[name]) for name in names)
-        degree = (4, 4) if len(axes) <= 3 else (3, 4)
-        return OneWheel(recipe, axes, len(targets), len(axes), degree)
+        degree = (4, 4) if len(axes) <= FEW_AXES else (3, 4)
+        family = OneWheel(recipe, axes, len(targets), len(axes), degree)
+        noise = recipe.case.noise.get(column("torque"), Noise(share=1.0))
+        if noise.constant == 0.0:
+            return family
+        return replace(family, bend=noise.constant / max(noise.share, STEADY))
 
     def designs(self, count: int, seed: int) -> Floats:
         """Slips and loads (count, 2)."""
@@ -74,17 +85,27 @@ class OneWheel:
         return np.log(designs)
 
     def answers(self, designs: Floats, x: Floats) -> Floats:
-        """See `Family`; the length is 1 m."""
+        r"""See `Family`; the length is 1 m.
+
+        Torque is answered as its logarithm over load where its noise is a share of it, and else as
+
+        .. math:: \mathrm{asinh}(T / 2 T_0), \qquad T_0 = \sigma_{constant} / \sigma_{share}
+
+        along which the noise is nearly the same at all torques (Bartlett 1947). Constant noise is
+        taken for noise with a share of a fifth: a straight line in torque would bend too much along
+        the unknowns, and so the noise of a reading still tells that of the truth within 5 %.
+        """
         case = self.recipe.case.with_values(
             {axis.name: axis.value(x[..., i]) for i, axis in enumerate(self.axes)}
         )
         slip, load = (designs[:, None, k] for k in (0, 1))
         force = case.model(case.soil, Operating(slip=slip, load=load))
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.stack(
-                [np.log(force.torque / load), np.log(force.sinkage), force.drawbar_pull / load],
-                axis=-1,
-            )
+            if self.bend:
+                torque = np.arcsinh(force.torque / (2.0 * self.bend))
+            else:
+                torque = np.log(force.torque / load)
+            return np.stack([torque, np.log(force.sinkage), force.drawbar_pull / load], axis=-1)
 
     def inputs(self) -> dict[str, str]:
         """Nothing beside the readings."""
@@ -97,12 +118,26 @@ class OneWheel:
     def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
         """See `Family`."""
         columns = [graph.reshaped(graph.op("Log", readings[k]), -1, 1) for k in ("slip", "load")]
+        length = graph.small(1.0)
+        torque, rise = self._torque(graph, readings, length)
         return Context(
             features=graph.op("Concat", *columns, axis=1),
-            length=graph.small(1.0),
+            torque=torque,
+            rise=rise,
+            clear=ANY_NOISE if self.bend else CLEAR,
+            length=length,
             scale=graph.small(np.ones((self.targets, 1))),
             width=graph.small(np.ones((len(self.axes), 1))),
         )
+
+    def _torque(self, graph: Graph, readings: dict[str, str], length: str) -> tuple[str, str]:
+        """The torque as it is answered, and what that gains with torque, (rows,)."""
+        if not self.bend:
+            return draw_log_torque(graph, readings, length)
+        op, small, torque = graph.op, graph.small, readings["torque"]
+        bent = op("Asinh", op("Div", torque, small(2.0 * self.bend)))
+        square = op("Add", op("Mul", torque, torque), small(4.0 * self.bend**2))
+        return bent, op("Div", small(1.0), op("Sqrt", square))
 
     def sets(self, count: int, rows: int, seed: int) -> Sets:
         """See `Family`; the noise is the recipe's, and channels without noise are not read."""
@@ -116,7 +151,9 @@ class OneWheel:
         kept = np.isfinite(y).all(axis=(1, 2))
         slip, load, y, x = slip[kept], load[kept], y[kept], x[kept]
         readings = {"slip": slip, "load": load}
-        true = (np.exp(y[..., 0]) * load, np.exp(y[..., 1]), y[..., 2] * load)
+        bent = 2.0 * self.bend * np.sinh(y[..., 0])
+        torque = bent if self.bend else np.exp(y[..., 0]) * load
+        true = (torque, np.exp(y[..., 1]), y[..., 2] * load)
         told = rng.random((len(x), 1)) < TOLD
         for name, value in zip(CHANNELS, true, strict=True):
             noise = self.recipe.case.noise.get(column(name))

@@ -48,15 +48,11 @@ FEW, EFFORT_FEW, EFFORT_MANY = 3, Effort(256, 256, 2), Effort(512, 256, 2)
 
 @dataclass(frozen=True)
 class Sample:
-    """Names of graph values: coordinates (p, n), weights (1, n) that sum to 1, least misfit (1,).
-
-    `last` are the same of the last round alone, whose samples lie closest.
-    """
+    """Names of graph values: coordinates (p, n), weights (1, n) that sum to 1, misfit (1,)."""
 
     x: str
     weights: str
     misfit: str
-    last: tuple[str, str]
 
 
 def draw_sample(
@@ -128,7 +124,6 @@ def draw_sample(
         op("Gather", op("Concat", *[x for x, _ in rounds], axis=1), back, axis=0),
         op("Div", joined, op("ReduceSum", joined, keepdims=1)),
         graph.reshaped(op("ReduceMin", op("Concat", *least, axis=1), keepdims=0), 1),
-        (op("Gather", rounds[-1][0], back, axis=0), own),
     )
 
 

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from training.graph import Graph
-from training.sets.family import CHANNELS, Context, Family
+from training.sets.family import CHANNELS, CLEAR, Context, Family
 from training.sets.response import Response
 
-#: A reading of torque or sinkage below this many of its standard deviations has no logarithm that
-#: could be believed; it counts for nothing.
-CLEAR = 3.0
 #: Readings of what stands for all rows of a set, or for none: input name -> default.
 READINGS = ("slip", "load", "torque", "sinkage", "drawbar_pull")
 SPREADS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
@@ -40,9 +37,8 @@ def draw_rows(
 
     .. math:: e_k(x) = \frac{\sum_j a_{kj} b_j(x) - y_k}{\sqrt{\sigma_k^2 + \epsilon_k^2}}
 
-    with y the logarithm of torque over load and length (noise that is a share of the torque is then
-    the same everywhere), that of sinkage over length, or drawbar pull over load; and epsilon the
-    error of the response.
+    with y the torque as the family answers it, the logarithm of sinkage over length, or drawbar
+    pull over load, and epsilon the error of the response.
     """
     op, small = graph.op, graph.small
     context = family.draw(graph, readings)
@@ -53,31 +49,28 @@ def draw_rows(
         op("LessOrEqual", context.features, small(response.upper + slack)),
     )
     inside = op("Cast", graph.reduced("ReduceMin", op("Cast", inside, to=6), 1), to=9)
-    tiny = small(1e-12)
-    torque, sinkage = (op("Max", readings[name], tiny) for name in ("torque", "sinkage"))
-    stray = {
+    torque, sinkage = (op("Max", readings[name], small(1e-12)) for name in ("torque", "sinkage"))
+    shares = {
         "torque": op("Div", readings["torque_std"], torque),
         "sinkage": op("Div", readings["sinkage_std"], sinkage),
         "drawbar_pull": op("Div", readings["drawbar_pull_std"], readings["load"]),
     }
-    excess = op("Mul", op("Mul", stray["torque"], stray["torque"]), small(0.5))
-    excess = op("Min", excess, small(0.02))  # mean of the logarithm of a noisy reading
-    grip = op("Div", torque, op("Mul", readings["load"], context.length))
+    stray = shares | {"torque": op("Mul", readings["torque_std"], context.rise)}
     reading = {
-        "torque": op("Add", op("Log", grip), excess),
+        "torque": context.torque,
         "sinkage": op("Log", op("Div", sinkage, context.length)),
         "drawbar_pull": op("Div", readings["drawbar_pull"], readings["load"]),
     }
-    least = {"torque": 1.0 / CLEAR, "sinkage": 1.0 / CLEAR, "drawbar_pull": 1e3}
+    least = {"torque": context.clear, "sinkage": CLEAR, "drawbar_pull": 1e3}
     weights = []
     for k, name in enumerate(CHANNELS):
         square = op("Mul", stray[name], stray[name])
         total = op("Sqrt", op("Add", square, small(response.error[k] ** 2)))
-        counts = op("And", inside, op("Less", stray[name], small(least[name])))
+        counts = op("And", inside, op("Less", shares[name], small(least[name])))
         weights.append(op("Where", counts, op("Div", small(1.0), total), small(0.0)))
     weight = _columns(graph, weights)
     y = op("Mul", _columns(graph, [reading[name] for name in CHANNELS]), weight)
-    share = op("Div", readings["torque_bias"], torque)
+    share = op("Mul", readings["torque_bias"], context.rise)
     nothing = op("Mul", weights[0], small(0.0))
     bias = op("Mul", _columns(graph, [share, nothing, nothing]), weight)
     scaled = op("Mul", response.draw(graph, context.features), weight)
