@@ -19,6 +19,10 @@ ENDS = (0.05, 0.95)
 LEAST_INSIDE = 0.9
 #: Share of the prior's spread above which an estimate is mostly the prior.
 VAGUE = 0.8
+#: Standard deviations from the mean between which an end of the interval is looked for.
+RUNGS = np.arange(0.5, 3.3, 0.25)
+#: Stands for a factor that is zero, whose logarithm is taken.
+NOTHING = 1e-30
 
 
 @dataclass(frozen=True)
@@ -48,25 +52,23 @@ def draw_answers(
     A set that is not in range, or whose readings no soil explains together, gets the prior.
     """
     op, small, q = graph.op, graph.small, family.targets
-    value = _values(graph, family, sample.x)
-    mean = op("MatMul", value, op("Transpose", sample.weights))
+    value = _values(graph, family, sample)
+    mean = op("Gemm", value, sample.weights, transB=1)
     off = op("Sub", value, mean)
     spread = op("Gemm", op("Mul", off, sample.weights), off, transB=1)
-    square = op("MatMul", op("Mul", off, off), op("Transpose", sample.weights))
-    low, high = _ends(graph, value, sample.weights)
+    square = graph.reduced("ReduceSum", op("Mul", spread, small(np.eye(q))), 1, keep=True)
+    std = op("Sqrt", square)
+    reach = _reach(graph, op("Div", off, std), sample.weights, sample.count)
+    ends_ = op("Add", mean, op("Mul", std, reach))
     sound = _sound(graph, sample, counted, limits)
     prior = prior_of(family)
-    std = op("Sqrt", square)
-    found = {
-        "mean": (mean, prior["mean"]),
-        "std": (std, prior["std"]),
-        "low": (low, prior["low"]),
-        "high": (high, prior["high"]),
-    }
-    for name, (answer, otherwise) in found.items():
-        chosen = op("Where", sound, answer, small(otherwise[:, None]))
-        graph.reshaped(op("Mul", chosen, context.scale), q, out=f"{prefix}set_{name}")
-    outer = op("MatMul", context.scale, op("Transpose", context.scale))
+    names = ("mean", "std", "low", "high")
+    found = op("Concat", mean, std, ends_, axis=1)
+    otherwise = small(np.stack([prior[name] for name in names], axis=1))
+    chosen = op("Mul", op("Where", sound, found, otherwise), context.scale)
+    for name, part in zip(names, graph.ops("Split", 4, chosen, axis=1, num_outputs=4), strict=True):
+        graph.reshaped(part, q, out=f"{prefix}set_{name}")
+    outer = op("Gemm", context.scale, context.scale, transB=1)
     chosen = op("Where", sound, spread, small(np.diag(prior["std"] ** 2)))
     op("Mul", chosen, outer, out=prefix + "set_covariance")
     graph.reshaped(sound, 1, out=prefix + "set_in_range")
@@ -84,38 +86,43 @@ def prior_of(family: Family) -> dict[str, Floats]:
     return {"mean": values.mean(axis=1), "std": values.std(axis=1), "low": low, "high": high}
 
 
-def _values(graph: Graph, family: Family, x: str) -> str:
-    """Estimated parameters (q, n) at coordinates (p, n), without their scale."""
+def _values(graph: Graph, family: Family, sample: Sample) -> str:
+    """Estimated parameters (q, n) of a sample, without their scale."""
     op, small, q = graph.op, graph.small, family.targets
-    ends = [graph.constant(np.asarray([k], dtype=np.int64)) for k in (0, q, 0)]
-    own = op("Slice", x, *ends)
-    column = {
-        key: small([[getattr(axis, key)] for axis in family.axes[:q]])
-        for key in ("shift", "factor", "rate", "slope")
-    }
-    bent = op("Mul", column["factor"], op("Exp", op("Mul", column["rate"], own)))
-    return op("Add", op("Add", column["shift"], bent), op("Mul", column["slope"], own))
+    even, bent = np.zeros((2, q, 1 + len(family.axes)))
+    for k, axis in enumerate(family.axes[:q]):
+        place = 1 + sample.order.index(k)
+        even[k, [0, place]] = axis.shift, axis.slope
+        bent[k, [0, place]] = np.log(max(axis.factor, NOTHING)), axis.rate
+    curve = op("Exp", op("MatMul", small(bent), sample.points))
+    return op("Add", op("MatMul", small(even), sample.points), curve)
 
 
-def _ends(graph: Graph, value: str, weights: str) -> list[str]:
-    """Values (q, 1) below which the fractions `ENDS` of the weights lie."""
-    op = graph.op
-    size = graph.op("Shape", value)
-    one = graph.constant(np.asarray([1], np.int64))
-    count = op("Slice", size, one, graph.constant(np.asarray([2], np.int64)))
-    ranked, order = graph.ops("TopK", 2, value, count, axis=1, largest=0, sorted=1)
-    own = op("GatherElements", op("Expand", weights, size), order, axis=1)
-    below = op("CumSum", own, graph.constant(np.asarray(1, np.int64)))
-    below = op("Sub", below, op("Mul", own, graph.small(0.5)))
-    found = []
-    for end, back in zip(ENDS, (1, 0), strict=True):  # outward, for the samples are few
-        passed = op("Cast", op("Less", below, graph.small(end)), to=7)
-        index = graph.reduced("ReduceSum", passed, 1, keep=True)
-        index = op("Min", index, op("Sub", count, one))
-        if back:
-            index = op("Max", op("Sub", index, one), graph.constant(np.asarray([0], np.int64)))
-        found.append(op("GatherElements", ranked, index, axis=1))
-    return found
+def _reach(graph: Graph, off: str, weights: str, count: int) -> str:
+    """Ends (q, 2) of the interval, of deviations (q, n) over their standard deviation.
+
+    The shares of the weights (1, n) that lie below the rungs are interpolated.
+    """
+    op, small = graph.op, graph.small
+    steps = len(RUNGS) - 1
+    rungs = np.concatenate([-RUNGS[::-1], RUNGS])
+    apart = graph.op("Reshape", off, graph.constant(np.asarray([0, 1, -1], np.int64)))
+    below = op("Cast", op("Less", apart, small(rungs[:, None])), to=1)
+    below = graph.reshaped(below, -1, count)
+    share = graph.reshaped(op("Gemm", below, weights, transB=1), -1, len(rungs))
+    # where between two rungs the share passes that of the end, from 0 to 1
+    start, rise = np.zeros((2, 2 * steps + 2, 2 * steps))
+    step, first = np.zeros((2 * steps, 2)), rungs[[0, steps + 1]]
+    for k in range(2):
+        for i in range(steps):
+            at, rung = k * steps + i, k * (steps + 1) + i
+            start[rung, at] = -1.0
+            rise[rung, at], rise[rung + 1, at] = -1.0, 1.0
+            step[at, k] = rungs[rung + 1] - rungs[rung]
+    left = op("Gemm", share, small(start), small(np.repeat(ENDS, steps)))
+    part = op("Div", left, op("Max", op("MatMul", share, small(rise)), small(1e-6)))
+    part = op("Clip", part, small(0.0), small(1.0))
+    return op("Gemm", part, small(step), small(first))
 
 
 def _sound(graph: Graph, sample: Sample, counted: str, limits: Limits) -> str:

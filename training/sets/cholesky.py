@@ -7,16 +7,20 @@ import numpy as np
 from training.graph import Graph
 
 
-def draw_factor(graph: Graph, matrix: str, p: int) -> str:
-    """Lower factor (p, p) of a positive definite matrix (p, p), column by column."""
+def draw_factor(graph: Graph, matrix: str, count: int) -> str:
+    """First columns (p, count) of the lower factor of a positive definite matrix (p, p).
+
+    The first entry of the matrix is 1: so are moments of points that begin with 1, and the first
+    column of the factor is then their mean, the others the factor of their covariance.
+    """
     op = graph.op
     columns = []
-    for k in range(p):
-        pick = np.zeros((p, 1), np.float32)
-        pick[k] = 1.0
-        column = op("MatMul", matrix, graph.small(pick))
-        pivot = op("MatMul", graph.small(pick.T), column)
-        columns.append(op("Div", column, op("Sqrt", pivot)))
-        if k < p - 1:
-            matrix = op("Gemm", columns[-1], columns[-1], matrix, alpha=-1.0, transB=1)
+    for k in range(count):
+        pick = graph.constant(np.asarray([k], dtype=np.int64))
+        column = op("Gather", matrix, pick, axis=1)
+        if k:
+            column = op("Div", column, op("Sqrt", op("Gather", column, pick, axis=0)))
+        columns.append(column)
+        if k < count - 1:
+            matrix = op("Gemm", column, column, matrix, alpha=-1.0, transB=1)
     return op("Concat", *columns, axis=1)
