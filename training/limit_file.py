@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from soilml.errors import InputError
 from soilml.parquet import read_parquet
 from soilml.quantities import column
 from soilml.saving import replacing
-from training.limit import FRACTIONS, Exact, Job
+from training.limit import FRACTIONS, Exact
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,35 @@ KEYS = ("effect", "design", "set", "rows_hash")
 #: Columns of one number for each set.
 SINGLE = ("log_density", "denser", "flagged")
 HINT = "compute it anew: soilml compare --limit FILE.parquet"
+
+
+class Named(Protocol):
+    """What a set is found by, and the hash of its rows."""
+
+    @property
+    def effect(self) -> str:
+        """What the model lacks, blank where nothing."""
+        ...
+
+    @property
+    def design(self) -> str:
+        """How it was driven."""
+        ...
+
+    @property
+    def number(self) -> int:
+        """Which of the sets driven like this."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is estimated."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """Of its rows."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -54,7 +84,7 @@ def shipped() -> Path:
     return Path(str(resources.files("training").joinpath("benchmark_limit.parquet")))
 
 
-def save(path: str | os.PathLike[str], jobs: Sequence[Job], found: Sequence[Exact]) -> None:
+def save(path: str | os.PathLike[str], jobs: Sequence[Named], found: Sequence[Exact]) -> None:
     """Write one row for each set, as float32."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -67,7 +97,7 @@ def save(path: str | os.PathLike[str], jobs: Sequence[Job], found: Sequence[Exac
         pq.write_table(pa.table(columns), part, compression="zstd", write_page_checksum=True)
 
 
-def load(path: str | os.PathLike[str], jobs: Sequence[Job]) -> Limit:
+def load(path: str | os.PathLike[str], jobs: Sequence[Named], hint: str = HINT) -> Limit:
     """The limit of these sets, in their order.
 
     Raises `InputError` where the file has none for a set, or one of other rows: it is stale.
@@ -76,11 +106,11 @@ def load(path: str | os.PathLike[str], jobs: Sequence[Job]) -> Limit:
     try:
         columns, _ = read_parquet(file)
     except OSError as error:
-        raise InputError(f"{file} cannot be read ({error.strerror}); {HINT}") from None
+        raise InputError(f"{file} cannot be read ({error.strerror}); {hint}") from None
     names = jobs[0].names
     missing = [name for name in (*KEYS, *_names(names)) if name not in columns]
     if missing:
-        raise InputError(f"{file}: column {missing[0]} is missing; {HINT}")
+        raise InputError(f"{file}: column {missing[0]} is missing; {hint}")
     listed = zip(*(columns[key].to_pylist() for key in KEYS), strict=True)
     places = {(e, d, n): (i, h) for i, (e, d, n, h) in enumerate(listed)}
     rows = []
@@ -90,7 +120,7 @@ def load(path: str | os.PathLike[str], jobs: Sequence[Job]) -> Limit:
             stale = "is stale: it holds the limit of other rows than"
             what = "has no limit for" if place < 0 else stale
             driven = f" with {job.effect}" if job.effect else ""
-            raise InputError(f"{file} {what} set {job.number} of {job.design}{driven}; {HINT}")
+            raise InputError(f"{file} {what} set {job.number} of {job.design}{driven}; {hint}")
         rows.append(place)
     flat = {n: columns[n].to_numpy().astype(float)[rows] for n in _names(names)}
     mean = np.stack([flat[column(n)] for n in names], axis=1)

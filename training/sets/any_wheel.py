@@ -19,7 +19,7 @@ from soilml.soils import Soil
 from training.graph import Graph
 from training.sets.axis import Axis
 from training.sets.driving import driven
-from training.sets.family import ABSENT, CLEAR, Context, Sets, draw_log_torque
+from training.sets.family import ABSENT, CLEAR, Context, Origin, Sets, draw_log_torque
 from training.sets.response import NEAR
 
 Floats = NDArray[np.float64]
@@ -168,7 +168,15 @@ class AnyWheel:
         truth = [
             s * a.value(x[:, i]) for i, (a, s) in enumerate(zip(self.axes, scale, strict=False))
         ]
-        return Sets(readings, context, np.stack(truth, axis=1))
+        none = np.zeros_like(load)
+        noise = {
+            "torque": (none, share + none),
+            "sinkage": (none, 0.05 + none),
+            "drawbar_pull": (0.03 * load, none),
+            "torque_bias": (none, bias + none),
+        }
+        origin = Origin(designs, x, near / STRAY, radius[:, 0], noise)
+        return Sets(readings, context, np.stack(truth, axis=1), origin)
 
     def force(self, designs: Floats, x: Floats) -> Force:
         """What the wheel does (n, m) on soils at coordinates x (n, m, p)."""

@@ -33,6 +33,21 @@ class Context:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """How simulated sets came about, for who wants their exact posterior.
+
+    `noise` has for each channel that was read, and for `torque_bias`, its constant part and its
+    share of the true value, (sets, rows) each.
+    """
+
+    designs: Floats  # (sets, rows, d)
+    x: Floats  # (sets, p) coordinates of all unknowns
+    near: Floats  # (sets,) standard deviation of the coordinates of nearly known axes
+    length: Floats  # (sets,) that sinkage, and torque over load, are measured in, m
+    noise: dict[str, tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True)
 class Sets:
     """Simulated sets of one size: the true way they were driven, and what is not known of them.
 
@@ -43,6 +58,7 @@ class Sets:
     readings: dict[str, Floats]
     context: dict[str, Floats]
     truth: Floats
+    origin: Origin
 
     def rows(self, index: int) -> dict[str, Floats]:
         """The readings of one set (rows,)."""
@@ -51,6 +67,17 @@ class Sets:
     def given(self, index: int) -> dict[str, float]:
         """The context of one set."""
         return {name: float(values[index]) for name, values in self.context.items()}
+
+    def only(self, index: int) -> Sets:
+        """One of the sets."""
+        own, part = self.origin, slice(index, index + 1)
+        noise = {name: (a[part], b[part]) for name, (a, b) in own.noise.items()}
+        return Sets(
+            {name: values[part] for name, values in self.readings.items()},
+            {name: values[part] for name, values in self.context.items()},
+            self.truth[part],
+            Origin(own.designs[part], own.x[part], own.near[part], own.length[part], noise),
+        )
 
 
 #: A torque or sinkage with more noise than this share of it has no logarithm to be believed.

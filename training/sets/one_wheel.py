@@ -18,7 +18,15 @@ from soilml.quantities import column
 from training.graph import Graph
 from training.sets.axis import Axis
 from training.sets.driving import driven
-from training.sets.family import ABSENT, CHANNELS, CLEAR, Context, Sets, draw_log_torque
+from training.sets.family import (
+    ABSENT,
+    CHANNELS,
+    CLEAR,
+    Context,
+    Origin,
+    Sets,
+    draw_log_torque,
+)
 
 Floats = NDArray[np.float64]
 
@@ -165,7 +173,19 @@ class OneWheel:
         readings["torque_bias"] = bias.std(true[0])
         readings["torque"] += readings["torque_bias"] * rng.standard_normal((len(x), 1))
         truth = [axis.value(x[:, i]) for i, axis in enumerate(self.axes[: self.targets])]
-        return Sets(readings, {}, np.stack(truth, axis=1))
+        sources = self.recipe.case.noise | {"torque_bias": bias}
+        origin = Origin(
+            designs=np.stack([slip, load], axis=-1),
+            x=x,
+            near=np.zeros(len(x)),
+            length=np.ones(len(x)),
+            noise={
+                name: (np.full_like(slip, own.constant), np.full_like(slip, own.share))
+                for name in (*CHANNELS, "torque_bias")
+                if (own := sources.get(name if name == "torque_bias" else column(name)))
+            },
+        )
+        return Sets(readings, {}, np.stack(truth, axis=1), origin)
 
     def metadata(self) -> dict[str, Any]:
         """See `Family`."""
