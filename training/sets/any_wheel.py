@@ -19,7 +19,7 @@ from soilml.soils import Soil
 from training.graph import Graph
 from training.sets.axis import Axis
 from training.sets.driving import driven
-from training.sets.family import ABSENT, CLEAR, Context, Origin, Sets, draw_log_torque
+from training.sets.family import ABSENT, CLEAR, TINY, Context, Origin, Sets, draw_log_torque
 from training.sets.response import NEAR
 
 Floats = NDArray[np.float64]
@@ -237,28 +237,26 @@ class AnyWheel:
 
     def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
         """See `Family`."""
-        op = graph.op
-        log = {
-            name: op("Log", readings[name])
-            for name in ("slip", "load", "wheel_radius", "wheel_width", "bearing_modulus")
-        }
-        n, rows = readings["n"], op("Shape", readings["slip"])
-        lever = op("Mul", op("Add", n, graph.small(1.0)), log["wheel_radius"])
-        ground = op("Add", op("Add", log["bearing_modulus"], log["wheel_width"]), lever)
-        area = op("Add", log["wheel_radius"], log["wheel_width"])
-        columns = [
-            log["slip"],
-            op("Sub", log["load"], ground),
-            op("Sub", op("Add", op("Log", readings["cohesion_max"]), area), log["load"]),
-            op("Sub", op("Log", readings["shear_modulus_max"]), log["wheel_radius"]),
-            n,
-        ]
-        wide = [graph.reshaped(op("Expand", c, rows), -1, 1) for c in columns]
-        near = op("Max", op("Div", readings["bearing_std"], graph.small(STRAY)), graph.small(1e-3))
-        one = graph.small(np.ones(1))
+        op, small = graph.op, graph.small
+        near = op("Max", op("Div", readings["bearing_std"], small(STRAY)), small(1e-3))
+        one = small(np.ones(1))
+        wheel = ("wheel_radius", "wheel_width")
+        held = (*wheel, "bearing_modulus", "cohesion_max", "shear_modulus_max")
+        logs = op("Log", op("Concat", *[readings[name] for name in held], axis=0))
+        n, lever = readings["n"], op("Mul", readings["n"], op("Log", readings["wheel_radius"]))
+        # features by the logarithms of r, b, k, c max, K max; by n, and n log r
+        by_held = np.zeros((7, 5))
+        by_held[:, 1] = [-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, -1.0]
+        by_held[:, 2] = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        by_held[:, 3] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
+        by_held[5, 4] = 1.0
+        same = op("MatMul", op("Concat", logs, n, lever, axis=0), small(by_held))
+        both = op("Concat", readings["slip"], readings["load"], axis=0)
+        by_row = graph.reshaped(op("Log", op("Max", both, small(TINY))), 2, -1)
+        by_driven = [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0]]
         torque, rise = draw_log_torque(graph, readings, readings["wheel_radius"])
         return Context(
-            features=op("Concat", *wide, axis=1),
+            features=op("Gemm", by_row, small(by_driven), same, transA=1),
             torque=torque,
             rise=rise,
             clear=CLEAR,

@@ -80,6 +80,8 @@ class Sets:
         )
 
 
+#: Stands for what has no logarithm, and is out of range.
+TINY = 1e-12
 #: A torque or sinkage with more noise than this share of it has no logarithm to be believed.
 CLEAR = 1.0 / 3.0
 
@@ -91,7 +93,7 @@ def draw_log_torque(graph: Graph, readings: dict[str, str], length: str) -> tupl
     share of noise, which is added.
     """
     op, small = graph.op, graph.small
-    torque = op("Max", readings["torque"], small(1e-12))
+    torque = op("Max", readings["torque"], small(TINY))
     share = op("Div", readings["torque_std"], torque)
     short = op("Min", op("Mul", op("Mul", share, share), small(0.5)), small(0.02))
     grip = op("Div", torque, op("Mul", readings["load"], length))

@@ -22,6 +22,7 @@ from training.sets.family import (
     ABSENT,
     CHANNELS,
     CLEAR,
+    TINY,
     Context,
     Origin,
     Sets,
@@ -125,11 +126,12 @@ class OneWheel:
 
     def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
         """See `Family`."""
-        columns = [graph.reshaped(graph.op("Log", readings[k]), -1, 1) for k in ("slip", "load")]
+        both = graph.op("Concat", readings["slip"], readings["load"], axis=0)
+        logs = graph.op("Log", graph.op("Max", both, graph.small(TINY)))
         length = graph.small(1.0)
         torque, rise = self._torque(graph, readings, length)
         return Context(
-            features=graph.op("Concat", *columns, axis=1),
+            features=graph.op("Transpose", graph.reshaped(logs, 2, -1)),
             torque=torque,
             rise=rise,
             clear=ANY_NOISE if self.bend else CLEAR,

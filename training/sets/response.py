@@ -71,24 +71,25 @@ class Response:
         return np.asarray(monomials(x, self.these) @ self.coefficients(features))
 
     def draw(self, graph: Graph, features: str) -> str:
-        """Coefficients (rows * channels, terms) as a node of an ONNX graph, float32."""
-        h = graph.op(
-            "Mul",
-            graph.op("Sub", features, graph.small(self.scaling.mean)),
-            graph.small(1.0 / self.scaling.scale),
+        """Coefficients (channels * rows, terms + 1), float32, channel by channel; the last is 0."""
+        op, small = graph.op, graph.small
+        h = op(
+            "Mul", op("Sub", features, small(self.scaling.mean)), small(1.0 / self.scaling.scale)
         )
         pairs = list(zip(self.layers[0::2], self.layers[1::2], strict=True))
         for weights, bias in pairs[:-1]:
-            h = graph.op("Tanh", graph.op("Gemm", h, graph.small(weights), graph.small(bias)))
-        weights, bias = (_by_channel(layer, len(self.these)) for layer in pairs[-1])
-        found = graph.op("Gemm", h, graph.small(weights), graph.small(bias))
-        return graph.reshaped(found, -1, len(self.these))
+            h = op("Tanh", op("Gemm", h, small(weights), small(bias)))
+        count = len(self.these) + 1
+        weights, bias = (_by_channel(layer, count - 1) for layer in pairs[-1])
+        found = graph.reshaped(op("Gemm", h, small(weights), small(bias)), -1, len(CHANNELS), count)
+        return graph.reshaped(op("Transpose", found, perm=[1, 0, 2]), -1, count)
 
 
 def _by_channel(layer: Floats, count: int) -> Floats:
-    """The last layer with its outputs by channel first, then by term."""
+    """The last layer with its outputs by channel first, then by term, and a term that is 0."""
     shape = layer.shape[:-1]
-    return layer.reshape(*shape, count, -1).swapaxes(-1, -2).reshape(*shape, -1)
+    own = layer.reshape(*shape, count, -1).swapaxes(-1, -2)
+    return np.concatenate([own, np.zeros_like(own[..., :1])], axis=-1).reshape(*shape, -1)
 
 
 def learned(family: Family, size: Size, progress: Progress) -> Response:

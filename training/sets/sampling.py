@@ -42,7 +42,7 @@ class Effort:
 
 
 #: Up to so many unknowns, and beyond: the means then stray by 0.1 of a standard deviation.
-FEW, EFFORT_FEW, EFFORT_MANY = 3, Effort(256, 128, 2), Effort(512, 256, 2)
+FEW, EFFORT_FEW, EFFORT_MANY = 3, Effort(256, 128, 2), Effort(256, 256, 3)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from training.graph import Graph
-from training.sets.family import CHANNELS, CLEAR, Context, Family
+from training.sets.family import CHANNELS, CLEAR, TINY, Context, Family
 from training.sets.response import Response
 
 #: Readings of what stands for all rows of a set, or for none: input name -> default.
@@ -42,75 +42,63 @@ def draw_rows(
     """
     op, small = graph.op, graph.small
     context = family.draw(graph, readings)
-    slack = SLACK * (response.upper - response.lower)
-    inside = op(
-        "And",
-        op("GreaterOrEqual", context.features, small(response.lower - slack)),
-        op("LessOrEqual", context.features, small(response.upper + slack)),
-    )
-    inside = op("Cast", graph.reduced("ReduceMin", op("Cast", inside, to=6), 1), to=9)
-    torque, sinkage = (op("Max", readings[name], small(1e-12)) for name in ("torque", "sinkage"))
-    shares = {
-        "torque": op("Div", readings["torque_std"], torque),
-        "sinkage": op("Div", readings["sinkage_std"], sinkage),
-        "drawbar_pull": op("Div", readings["drawbar_pull_std"], readings["load"]),
-    }
-    stray = shares | {"torque": op("Mul", readings["torque_std"], context.rise)}
-    reading = {
-        "torque": context.torque,
-        "sinkage": op("Log", op("Div", sinkage, context.length)),
-        "drawbar_pull": op("Div", readings["drawbar_pull"], readings["load"]),
-    }
-    least = {"torque": context.clear, "sinkage": CLEAR, "drawbar_pull": 1e3}
-    weights = []
-    for k, name in enumerate(CHANNELS):
-        square = op("Mul", stray[name], stray[name])
-        total = op("Sqrt", op("Add", square, small(response.error[k] ** 2)))
-        counts = op("And", inside, op("Less", shares[name], small(least[name])))
-        weights.append(op("Where", counts, op("Div", small(1.0), total), small(0.0)))
-    weight = _columns(graph, weights)
-    y = op("Mul", _columns(graph, [reading[name] for name in CHANNELS]), weight)
+    inside = _inside(graph, response, context.features)
+    # all channels together, (3, rows)
+    one, sinkage = small(1.0), op("Max", readings["sinkage"], small(TINY))
+    per_load = op("Div", one, readings["load"])
+    gain = _stacked(graph, [context.rise, op("Div", one, sinkage), per_load])
+    stray = op("Mul", _stacked(graph, [readings[f"{name}_std"] for name in CHANNELS]), gain)
+    depth = op("Log", op("Div", sinkage, context.length))
+    pull = op("Mul", readings["drawbar_pull"], per_load)
+    y = _stacked(graph, [context.torque, depth, pull])
+    counts = op("And", op("Less", stray, small([[context.clear], [CLEAR], [1e3]])), inside)
+    counted = op("Cast", counts, to=1)
+    total = op("Add", op("Mul", stray, stray), small(response.error[:, None] ** 2))
+    weight = op("Div", counted, op("Sqrt", total))
     share = op("Mul", readings["torque_bias"], context.rise)
-    nothing = op("Mul", weights[0], small(0.0))
-    bias = op("Mul", _columns(graph, [share, nothing, nothing]), weight)
-    scaled = op("Mul", response.draw(graph, context.features), weight)
-    first = op("Pad", y, _ints(graph, [0, 0, 0, len(response.these) - 1]), small(0.0))
-    system = op("Concat", op("Sub", scaled, first), bias, axis=1)
-    present = graph.reshaped(op("Greater", weight, small(0.0)), -1)
-    system = op("Compress", system, present, axis=0)
+    bias = op("Mul", share, small([[1.0], [0.0], [0.0]]))
+    both = graph.reshaped(op("Concat", y, bias, axis=0), 2, -1)
+    ends = np.zeros((2, len(response.these) + 1))
+    ends[0, 0], ends[1, -1] = -1.0, 1.0
+    coefficients = response.draw(graph, context.features)
+    off = op("Gemm", both, small(ends), coefficients, transA=1)
+    scaled = op("Mul", off, graph.reshaped(weight, -1, 1))
+    system = op("Compress", scaled, graph.reshaped(counts, -1), axis=0)
     sums = [
-        op("ReduceSum", op("Cast", present, to=1), keepdims=0),
-        op("Cast", op("Size", inside), to=1),
-        op("ReduceSum", op("Cast", inside, to=1), keepdims=0),
+        graph.reshaped(op("ReduceSum", counted), 1),
+        op("Cast", op("Shape", inside), to=1),
+        op("ReduceSum", op("Cast", inside, to=1)),
     ]
-    counted = op("Concat", *[graph.reshaped(s, 1) for s in sums], axis=0)
-    return context, Rows(system, inside, counted)
+    return context, Rows(system, inside, op("Concat", *sums, axis=0))
+
+
+def _inside(graph: Graph, response: Response, features: str) -> str:
+    """Whether features (rows, f) lie where the response was learned, (rows,)."""
+    op, small = graph.op, graph.small
+    slack = SLACK * (response.upper - response.lower)
+    middle, half = 0.5 * (response.upper + response.lower), 0.5 * (response.upper - response.lower)
+    off = op("Abs", op("Sub", features, small(middle)))
+    beyond = op("Greater", off, small(half + slack))
+    return op("Not", op("Cast", graph.reduced("ReduceMax", op("Cast", beyond, to=6), 1), to=9))
 
 
 def draw_unbiased(graph: Graph, system: str, count: int) -> str:
     r"""The system (m, terms) with the sensor's bias integrated out.
 
     .. math:: I + g g^T = S S^T, \qquad A' = S^{-1} A = A - \kappa g (g^T A), \qquad
-        \kappa = \frac{1 - (1 + g^T g)^{-1/2}}{g^T g}
+        \kappa = \frac{1}{1 + g^T g + (1 + g^T g)^{1/2}}
 
     for a bias whose prior is normal with standard deviation 1 in units of g. `count` terms.
     """
-    op, small = graph.op, graph.small
-    a, g = graph.ops("Split", 2, system, _ints(graph, [count, 1]), axis=1)
-    size = op("ReduceSumSquare", g, keepdims=1)
-    root = op("Sqrt", op("Add", size, small(1.0)))
-    kappa = op(
-        "Div", op("Sub", small(1.0), op("Div", small(1.0), root)), op("Max", size, small(1e-9))
-    )
+    op, one = graph.op, graph.small(1.0)
+    sizes = graph.constant(np.asarray([count, 1], dtype=np.int64))
+    a, g = graph.ops("Split", 2, system, sizes, axis=1)
+    size = op("Add", op("ReduceSumSquare", g, keepdims=1), one)
+    kappa = op("Add", size, op("Sqrt", size))
     along = op("Gemm", g, a, transA=1)
-    return op("Gemm", op("Mul", g, kappa), along, a, alpha=-1.0)
+    return op("Gemm", op("Div", g, kappa), along, a, alpha=-1.0)
 
 
-def _columns(graph: Graph, values: list[str]) -> str:
-    """Values (rows,) of each channel as a column (3 rows, 1), row by row."""
-    parts = [graph.reshaped(value, -1, 1) for value in values]
-    return graph.reshaped(graph.op("Concat", *parts, axis=1), -1, 1)
-
-
-def _ints(graph: Graph, values: list[int]) -> str:
-    return graph.constant(np.asarray(values, dtype=np.int64))
+def _stacked(graph: Graph, values: list[str]) -> str:
+    """Values (rows,) of each channel as rows (3, rows)."""
+    return graph.reshaped(graph.op("Concat", *values, axis=0), len(values), -1)
