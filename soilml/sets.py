@@ -196,8 +196,12 @@ class SetPosterior:
 def once(rows: Mapping[str, Floats]) -> dict[str, Floats]:
     """Rows without those that repeat another in every reading: they are copies, and say nothing."""
     table = np.stack([rows[name] for name in (*NEEDED, *OPTIONAL)], axis=1)
-    _, kept = np.unique(table, axis=0, return_index=True)
-    return {name: values[np.sort(kept)] for name, values in rows.items()}
+    first: dict[bytes, int] = {}
+    for i, row in enumerate(table):
+        first.setdefault(row.tobytes(), i)
+    if len(first) == len(table):
+        return dict(rows)
+    return {name: values[list(first.values())] for name, values in rows.items()}
 
 
 def _broadcast(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
