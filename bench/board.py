@@ -9,7 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from soilml import Estimator
+from datagen.recipe import read_recipe
+from soilml import Estimator, Model, Operating, Wheel, soil
+from soilml.any_wheel import for_case
+from soilml.sets import ANSWER, KEPT
 
 ROOT = Path(__file__).parents[1]
 CALLS = 4000
@@ -25,23 +28,43 @@ print(t, int(status["VmRSS"].split()[0]) / 1024)
 
 
 def latency() -> str:
-    """Median and 99th percentile of one estimate: the runtime alone, and through `Estimator`."""
+    """Median and 99th percentile: the runtime alone, and through `Estimator`; sets of 16."""
     lines = [
-        "| file | runtime alone, us | p99 | Estimator, us | p99 | run of 16 readings, us |",
-        "|---|---:|---:|---:|---:|---:|",
+        "| file | kB | one reading, runtime alone, us | p99 | `Estimator`, us | p99 | 16 readings, "
+        "runtime alone, us | `run`, us | `step` after 16, us |",
+        "|---|---:|" + "---:|" * 7,
     ]
-    for file in sorted((ROOT / "exported").glob("wheel*.onnx")):
-        estimator = Estimator.load(file)
-        feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
-        many = {n: np.full(16, v) for n, v in _reading().items()}
-        raw = _timed(lambda e=estimator, f=feed: e.session.run(OUTPUTS, f))
+    case = read_recipe("wheel").case
+    for file in sorted((ROOT / "exported").glob("*wheel*.onnx")):
+        estimator = for_case(Estimator.load(file), case)
+        size = f"| {file.name} | {file.stat().st_size / 1e3:.0f} "
+        alone = estimator.sets is not None and estimator.sets.alone
         whole = _timed(lambda e=estimator: e(**_reading()))
-        joint = _timed(lambda e=estimator, m=many: e.run(**m), CALLS // 8)
+        if alone:
+            lines.append(f"{size}| | | {whole[0]:.0f} | {whole[1]:.0f} {_joint(estimator)}")
+            continue
+        feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
+        raw = _timed(lambda e=estimator, f=feed: e.session.run(OUTPUTS, f))
         lines.append(
-            f"| {file.name} | {raw[0]:.0f} | {raw[1]:.0f} | {whole[0]:.0f} | {whole[1]:.0f} "
-            f"| {joint[0]:.0f} |"
+            f"{size}| {raw[0]:.0f} | {raw[1]:.0f} | {whole[0]:.0f} | {whole[1]:.0f} "
+            f"{_joint(estimator)}"
         )
     return "\n".join(lines)
+
+
+def _joint(estimator: Estimator) -> str:
+    """Cells for 16 readings: the runtime alone, `run`, and one more by `step`."""
+    many = _readings()
+    run = _timed(lambda: estimator.run(**many), CALLS // 8)
+    if estimator.sets is None:
+        return f"| | {run[0]:.0f} | |"
+    sets = estimator.sets
+    feed = sets.feed(sets.rows(many), sets.start())
+    names = [*(f"set_{name}" for name in ANSWER), *KEPT]
+    raw = _timed(lambda: estimator.session.run(names, feed), CALLS // 8)
+    _, memory = estimator.step(estimator.start(), **many)
+    step = _timed(lambda: estimator.step(memory, **_reading()), CALLS // 8)
+    return f"| {raw[0]:.0f} | {run[0]:.0f} | {step[0]:.0f} |"
 
 
 def cold_start() -> str:
@@ -65,6 +88,15 @@ def cold_start() -> str:
 
 def _reading() -> dict[str, float]:
     return {"slip": 0.3, "torque": 3.0, "load": 60.0}
+
+
+def _readings() -> dict[str, np.ndarray]:
+    """Sixteen readings of one soil."""
+    slip, load = np.linspace(0.08, 0.55, 16), np.tile([40.0, 75.0, 110.0, 90.0], 4)
+    force = Model(Wheel(radius=0.15, width=0.12))(
+        soil("wong1989/dry_sand"), Operating(slip=slip, load=load)
+    )
+    return {"slip": slip, "load": load, "torque": force.torque}
 
 
 def _timed(call, count: int = CALLS) -> tuple[float, float]:  # type: ignore[no-untyped-def]

@@ -10,12 +10,14 @@ import numpy as np
 
 from datagen.engine import generate
 from datagen.recipe import read_recipe
-from soilml import Estimator, read_case, read_table
+from soilml import Estimator
+from soilml.any_wheel import for_case
 from soilml.quantities import SHEAR
-from training.compare import compare
-from training.comparison_report import table
+from training.benchmark import LIMIT, RECIPE, benchmark
+from training.benchmark_report import goal_table, tables
 from training.dataset import read_dataset, split
 from training.fixed_size import FixedSizeLSSVM
+from training.goals import goals
 from training.kernel import rbf
 from training.lssvm import GAMMAS, LSSVM, Factored
 from training.mlp import GaussianMLP
@@ -23,18 +25,33 @@ from training.score import scored
 
 ROOT = Path(__file__).parents[1]
 FEATURES = ("slip", "torque/load", "load")
-ANALYTIC_SETS = 300
 
 
-def comparison(folder: Path) -> str:
-    """The released models and the analytic methods on held-out sets."""
-    generate(read_recipe("wheel_test"), folder / "test.parquet")
-    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
-    names = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear")
-    models = {n: Estimator.load(ROOT / "exported" / f"{n}.onnx") for n in names}
-    test = read_table(folder / "test.parquet", filled=("run",))
-    lines = compare(case, test, models, analytic_sets=ANALYTIC_SETS)
-    return f"```\n{table(lines, SHEAR)}\n```"
+def comparison() -> str:
+    """The released models and the analytic methods on the fixed benchmark, and their goals."""
+    case = read_recipe(RECIPE).case
+    names = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
+    models = {n: for_case(Estimator.load(ROOT / "exported" / f"{n}.onnx"), case) for n in names}
+    results = benchmark(models)
+    return f"```\n{goal_table(goals(results, LIMIT))}\n\n{tables(results)}\n```"
+
+
+def sets(folder: Path) -> str:
+    """The released files beside the exact posterior of the same sets."""
+    from sets import calibration, coverage, densities, errors
+
+    released = ROOT / "exported"
+    return "\n\n".join(
+        f"### {table.__doc__}\n\n{table(released)}"
+        for table in (errors, densities, coverage, calibration)
+    )
+
+
+def flagged() -> str:
+    """Foreign readings: what is flagged beside what could be."""
+    import flags
+
+    return flags.report(ROOT / "exported")
 
 
 def rules() -> str:
