@@ -179,7 +179,10 @@ class Estimator:
         The order of readings changes nothing, and the memory does not grow with their number.
         Raises `InputError` as `run` does.
         """
-        return self._answered(self._ready.rows(measured), memory)
+        sets = self._ready
+        if not (isinstance(memory, Memory) and memory.system.shape[1] == sets.terms + 1):
+            raise InputError("this memory is not of this file: begin with estimator.start()")
+        return self._answered(sets.rows(measured), memory)
 
     @property
     def _ready(self) -> SetPosterior:

@@ -33,6 +33,8 @@ ANSWER = ("mean", "std", "covariance", "low", "high", "in_range", "misfit")
 KEPT = ("memory_out", "counted_out")
 #: A channel that was not measured reads 1 with this standard deviation.
 ABSENT = 1e6
+#: A reading of zero with noise that is a share of it has this standard deviation, and fits nothing.
+LEAST_STD = 1e-12
 #: Rows of the memory beyond which it is turned into a triangle; rows of one call of the graph.
 FULL, PIECE = 192, 256
 
@@ -160,7 +162,8 @@ class SetPosterior:
         constant, share = self.noise.get(kind, (0.0, 0.0))
         if kind in OPTIONAL and not constant + share:
             return np.full_like(reading, ABSENT)
-        return np.hypot(constant, share * np.abs(reading))
+        least = 0.0 if name == "torque_bias" else LEAST_STD
+        return np.maximum(np.hypot(constant, share * np.abs(reading)), least)
 
     def feed(self, rows: Mapping[str, Floats], memory: Memory) -> Feed:
         """Everything that the graph reads, by input name."""
