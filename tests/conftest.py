@@ -113,3 +113,62 @@ def small_model(small_data: Path) -> Path:
     out = small_data.parent / "small.onnx"
     assert main(["train", str(spec), str(small_data), str(out)]) == 0
     return out
+
+
+#: What a set of readings may be off by, generously: nothing of it is measured here.
+LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
+
+
+def _exported(folder: Path, family, posterior, noise) -> Path:
+    from training.sets.for_any_wheel import AnySpec, export
+    from training.sets.response import Size
+
+    path = folder / "small.onnx"
+    export(AnySpec(family, Size(0, 0, 0, 0), noise, "{}"), posterior, {}, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def wheel_posterior():
+    """The set posterior of the packaged wheel, learned from few designs."""
+    from datagen.recipe import read_recipe
+    from soilml.quantities import SHEAR
+    from training.sets.answers import Limits
+    from training.sets.one_wheel import OneWheel
+    from training.sets.posterior import SetPosterior
+    from training.sets.response import Size, learned
+
+    family = OneWheel.of(read_recipe("wheel"), SHEAR)
+    response = learned(family, Size(768, 32, 120, 0), lambda *_: None)
+    return SetPosterior(family, response, Limits(*map(np.asarray, LENIENT)))
+
+
+@pytest.fixture(scope="session")
+def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a model file, without regressors of single readings."""
+    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
+    folder = tmp_path_factory.mktemp("wheel_set")
+    return _exported(folder, wheel_posterior.family, wheel_posterior, noise)
+
+
+@pytest.fixture(scope="session")
+def any_posterior():
+    """The set posterior of wheels of any size, learned from so few designs that it is coarse."""
+    from datagen.recipe import located
+    from soilml.settings import read_settings
+    from training.sets.answers import Limits
+    from training.sets.any_wheel import AnyWheel
+    from training.sets.posterior import SetPosterior
+    from training.sets.response import Size, learned
+
+    settings = read_settings(located("any_wheel", "training", "specs"))
+    family = AnyWheel.take(settings.table("any_wheel"))
+    response = learned(family, Size(768, 32, 60, 0), lambda *_: None)
+    return SetPosterior(family, response, Limits(*map(np.asarray, LENIENT)))
+
+
+@pytest.fixture(scope="session")
+def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a model file."""
+    noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
+    return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)

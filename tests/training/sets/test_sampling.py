@@ -1,0 +1,49 @@
+"""The graph's short sampling finds the posterior that long sampling finds."""
+
+import numpy as np
+import pytest
+
+from training.limit import FRACTIONS
+from training.sets.answers import ENDS
+from training.sets.measured import answered, opened
+from training.sets.of_memory import of_memory
+
+
+def compared(posterior, sets, index, session):
+    """The answer of the graph, and mean, standard deviation and ends of a long sampling."""
+    answer = answered(session, posterior.response, sets, index)
+    found = of_memory(posterior.family, answer["memory_out"].astype(np.float64), sets, index)
+    ends = found.quantiles[[FRACTIONS.index(end) for end in ENDS]]
+    return answer, found.mean, np.sqrt(np.diag(found.covariance)), ends
+
+
+@pytest.mark.parametrize("rows", [1, 4, 16, 32])
+def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior, rows):
+    session, sets = opened(wheel_posterior), wheel_posterior.family.sets(8, rows, 9)
+    apart, ratios, ends = [], [], []
+    for index in range(len(sets.truth)):
+        answer, mean, std, both = compared(wheel_posterior, sets, index, session)
+        if not answer["set_in_range"][0]:
+            continue
+        apart.append((answer["set_mean"] - mean) / std)
+        ratios.append(answer["set_std"] / std)
+        ends += [(answer["set_low"] - both[0]) / std, (answer["set_high"] - both[1]) / std]
+    assert len(apart) >= 5
+    assert np.sqrt(np.mean(np.square(apart))) < 0.15
+    assert 0.95 < np.median(ratios) < 1.08
+    assert np.abs(np.median(ends)) < 0.1
+
+
+def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
+    family, session = wheel_posterior.family, opened(wheel_posterior)
+    drawn = family.sets(60, 16, 2)
+    steady = np.flatnonzero(
+        (np.ptp(drawn.readings["slip"], axis=1) == 0.0)
+        & (np.ptp(drawn.readings["load"], axis=1) == 0.0)
+    )
+    assert len(steady)
+    for index in steady[:3]:
+        answer, mean, std, _ = compared(wheel_posterior, drawn, index, session)
+        if answer["set_in_range"][0]:
+            assert (np.abs(answer["set_mean"] - mean) < 0.3 * std).all()
+            assert (np.abs(np.log(answer["set_std"] / std)) < 0.25).all()
