@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -84,9 +84,15 @@ def references(most: int = COUNT) -> list[Reference]:
     for label, family in families().items():
         for rows in SIZES:
             sets = family.sets(DRAWN * COUNT, rows, SEED)
-            count = min(most, len(sets.truth))
-            found += [Reference(label, i, family, sets.only(i)) for i in range(count)]
+            places = [i for i in range(len(sets.truth)) if _may_be_given(family, sets.given(i))]
+            found += [Reference(label, i, family, sets.only(i)) for i in places[:most]]
     return found
+
+
+def _may_be_given(family: Family, context: Mapping[str, float]) -> bool:
+    """Whether a file takes this context: sets are drawn a little beyond the ends of its range."""
+    ends = family.limits()
+    return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
 
 
 def computed(wanted: Sequence[Reference], progress: Progress) -> Iterator[Found]:
