@@ -16,7 +16,7 @@ from training.sets.polynomial import derivative, monomials, terms
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Degree of the polynomials of three unknowns, points that fix them, and error that they leave.
-DEGREE, POINTS, ERROR = 6, 320, 1e-3
+DEGREE, POINTS, ERROR = 6, 512, 1e-3
 #: Soils among which the search starts, and its steps.
 STARTS, STEPS = 2048, 12
 #: Readings below so many standard deviations have no logarithm to believe.
