@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+#: Share of the prior's spread above which an estimate is mostly the prior.
+VAGUE = 0.8
 #: No row may claim to be surer of nothing than the prior.
 LEAST_SHARE = 1e-3
 #: Cells along the trained range of slip and of load; rows in one or in two that touch are alike.
@@ -36,6 +38,12 @@ class Estimate:
     high: Floats
     in_range: NDArray[np.bool_]
     prior: Known
+
+    @property
+    def abstains(self) -> NDArray[np.bool_]:
+        """Whether what was measured does not tell a quantity, (..., q): it is mostly the prior."""
+        vague = self.std > VAGUE * self.prior_std
+        return np.asarray(vague | ~np.asarray(self.in_range)[..., None])
 
     @property
     def prior_std(self) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.case import Case
+from soilml.estimate import VAGUE
 from soilml.identification.fit import Fit
 from soilml.identification.free import Free
 from soilml.identification.measured import Measured
@@ -16,7 +17,7 @@ from soilml.parameters import unit_text
 from soilml.quantities import column
 
 #: Share of the prior's width above which a parameter counts as not identified, or hardly.
-NOT = 0.8
+NOT = VAGUE
 HARDLY = 0.5
 TRADE_OFF = 0.95
 #: What a warning of residuals beyond the declared noise says.

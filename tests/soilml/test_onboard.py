@@ -208,6 +208,13 @@ def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
             Estimator.load(tmp_path / "more.onnx")
 
 
+def test_what_is_mostly_the_prior_abstains(estimator):
+    near = estimator(slip=0.3, torque=3.0, load=60.0)
+    assert (near.abstains == (near.std > 0.8 * near.prior_std)).all()
+    assert near.abstains.any()
+    assert estimator(slip=0.3, torque=3000.0, load=60.0).abstains.all()
+
+
 def test_the_probe_asks_for_a_row_out_of_range(estimator):
     asked = json.loads(estimator.metadata["probe"])[0]["in_range"]
     assert asked == [True] * 8 + [False]

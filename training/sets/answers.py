@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.estimate import VAGUE
 from training.graph import Graph
 from training.sets.family import Context, Family
 from training.sets.sampling import Sample
@@ -17,8 +18,6 @@ Floats = NDArray[np.float64]
 ENDS = (0.05, 0.95)
 #: A set of which less than this share of the rows is inside the range is not estimated.
 LEAST_INSIDE = 0.9
-#: Share of the prior's spread above which an estimate is mostly the prior.
-VAGUE = 0.8
 #: Standard deviations from the mean between which an end of the interval is looked for.
 RUNGS = np.arange(0.5, 3.3, 0.25)
 #: Stands for a factor that is zero, whose logarithm is taken.
