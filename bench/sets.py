@@ -22,7 +22,7 @@ from training.sets.reference import ANY, ONE, computed, kept, on_one_wheel, refe
 #: Goals: RMSE over the exact posterior's, log density lacking (nat), what 90 % intervals hold, and
 #: the least chance of ranks as uneven.
 RATIO, GAP, HELD, CHANCE = 1.05, 0.1, (0.88, 0.92), 0.01
-#: A figure meets its goal where this many of its standard errors would bring it there.
+#: A figure that misses its goal by less than so many of its standard errors does not settle it.
 DOUBT = 2.0
 SYMBOLS = ("c", "phi", "K")
 HINT = "compute it anew: make limit"
@@ -186,7 +186,7 @@ def _covered(
 
 
 def _met(met: bool, near: bool) -> str:
-    return "met" if met else "met within its error" if near else "MISSED"
+    return "met" if met else "missed, within its error" if near else "MISSED"
 
 
 def _rows(part: Beside) -> int:
