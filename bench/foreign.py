@@ -19,7 +19,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 Readings = dict[str, Floats]
 Told = Callable[[Readings], Readings]
 #: Driving that some effects need: speed in m/s, pass in a rut, slip angle in rad.
-DRIVEN = {"speed": 0.05, "pass_number": 2.0, "slip_angle": 0.2}
+DRIVEN = {"speed": 0.2, "pass_number": 2.0, "slip_angle": 0.2}
 #: Number of rows -> those that one soil explains together.
 Parts = Callable[[int], Sequence[slice]]
 

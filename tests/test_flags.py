@@ -11,6 +11,7 @@ from soilml import Estimator
 from soilml.errors import InputError
 from soilml.operating import Operating
 from soilml.quantities import SHEAR
+from soilml.sets import SetPosterior
 from training.sets.one_wheel import OneWheel
 
 CASE = read_recipe("wheel").case
@@ -174,3 +175,12 @@ def test_channels_may_be_missing_in_some_rows(wheel):
     assert found.in_range
     assert (found.std < 1.02 * wheel.run(**torque_alone(rows)).std).all()
     assert np.prod(found.std) > np.prod(all_of_them.std)
+
+
+def test_a_wheel_beyond_the_range_of_a_file_is_refused():
+    radius = {"wheel_radius": (0.04, 0.5)}
+    file = SetPosterior(terms=35, noise={}, context=radius, given={}, alone=True)
+    assert file.on({"wheel_radius": 0.3}, {}).given == {"wheel_radius": 0.3}
+    for wrong in (0.75, 300.0, -0.1, np.nan):  # too large, in mm, impossible, unknown
+        with pytest.raises(InputError, match="wheel_radius"):
+            file.on({"wheel_radius": wrong}, {})
