@@ -51,7 +51,7 @@ def flagged() -> str:
     """Foreign readings: what is flagged beside what could be."""
     import flags
 
-    return f"{flags.false_flags()}\n\n{flags.table()}"
+    return flags.table()
 
 
 def rules() -> str:

@@ -95,10 +95,8 @@ PARTS = (
     ),
     Part(
         "flags",
-        "What is flagged",
-        "Sets of the reference wheel with something wrong that the file does not know "
-        "(docs/flags.md). `could` is a test of fit at 1 % on the exact model: what looks like "
-        "another soil can be flagged by nobody.",
+        "Foreign readings: what is flagged",
+        "",
         lambda folder: learning.flagged(),
     ),
     Part(
