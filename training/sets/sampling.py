@@ -30,6 +30,8 @@ WIDER, OPEN = 1.3, 0.7
 BEST, APART = 16, 3.0
 #: What a sample outside of the box loses of the logarithm of its density, by its distance.
 OUTSIDE = 1e9
+#: Coordinates are drawn as hyperbolic tangents, up to this.
+MOST = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class Effort:
 
 
 #: Up to so many unknowns, and beyond: the means then stray by 0.1 of a standard deviation.
-FEW, EFFORT_FEW, EFFORT_MANY = 3, Effort(256, 128, 2), Effort(256, 256, 3)
+FEW, EFFORT_FEW, EFFORT_MANY = 3, Effort(256, 128, 2), Effort(512, 256, 3)
 
 
 @dataclass(frozen=True)
@@ -70,12 +72,12 @@ def draw_sample(
     points that are spread over all of it. So all unknowns but one are drawn, and that one, the
     friction angle, which torque follows almost linearly, is first moved onto the sheet by Newton's
     steps, and then drawn about it as widely as the curvature there says. In the first round the
-    others are drawn from the prior; in each later one from a t distribution with the mean and
-    covariance of the round before, under the highest power of the density that enough samples
-    share. Rounds are joined by how many samples they are worth. All draws are fixed numbers, moved
-    and stretched: the same set gives the same answer. References: Cornuet et al., Scandinavian J.
-    Statistics 39(4), 2012, for the rounds; Robert and Casella 2004, chapter 4, for solving one
-    unknown given the others.
+    others are drawn from the prior. In each later one their inverse hyperbolic tangents, which have
+    no ends, are drawn from a t distribution with the mean and covariance of the round before, under
+    the highest power of the density that enough samples share. Rounds are joined by how many
+    samples they are worth. All draws are fixed numbers, moved and stretched: the same set gives the
+    same answer. References: Cornuet et al., Scandinavian J. Statistics 39(4), 2012, for the rounds;
+    Robert and Casella 2004, chapter 4, for solving one unknown given the others.
     """
     op, small = graph.op, graph.small
     p = len(family.axes)
@@ -85,20 +87,25 @@ def draw_sample(
     )
     jitter = small(np.diag([0.0, *[1e-6] * p]))
     z, log_z, spread, log_spread = _moves(p, effort.each)
-    points, logs, misfit = solver.first(*_prior_points(family, solver.order, effort.first))
+    prior, *drawn = _prior_points(family, solver.order, effort.first)
+    points, (near, logs), misfit = solver.first(prior, *drawn)
+    wide = small(np.arctanh(np.clip(prior[:-1], -MOST, MOST)))
     every, shares, least = [points], [], [misfit]
     for _ in range(effort.rounds):
-        power = _power(graph, logs)
+        power = _power(graph, near)
         weights = op("Softmax", op("Mul", logs, power), axis=1)
         worth = op("Div", op("Floor", power), op("ReduceSumSquare", weights, keepdims=1))
         shares.append(op("Mul", weights, worth))  # none where the density had to be tempered
-        moments = op("Gemm", op("Mul", points, weights), points, jitter, transB=1)
+        count = effort.each if every[1:] else effort.first
+        solved = op("Gather", points, graph.constant(np.asarray([p], np.int64)), axis=0)
+        open_ = op("Concat", small(np.ones((1, count))), wide, solved, axis=0)
+        moments = op("Gemm", op("Mul", open_, weights), open_, jitter, transB=1)
         start = op("MatMul", draw_factor(graph, moments, p), small(z))
-        points, logs, misfit = solver.drawn(start, spread, log_z + log_spread)
+        wide, points, (near, logs), misfit = solver.drawn(start, spread, log_z + log_spread)
         every.append(points)
         least.append(misfit)
     # too few samples would look too sure: the last round is tempered until there are some
-    own = op("Softmax", op("Mul", logs, _power(graph, logs)), axis=1)
+    own = op("Softmax", op("Mul", logs, _power(graph, near)), axis=1)
     shares.append(op("Div", own, op("ReduceSumSquare", own, keepdims=1)))
     joined = op("Concat", *shares, axis=1)
     return Sample(
@@ -133,7 +140,7 @@ class _Solver:
 
     def first(
         self, points: Floats, logs: Floats, spread: Floats, log_spread: Floats
-    ) -> tuple[str, str, str]:
+    ) -> tuple[str, list[str], str]:
         """As `drawn`, by fixed points (p, n), the last coordinate 0: all that follows is fixed."""
         op, small = self.graph.op, self.graph.small
         basis = monomials(points[np.argsort(self.order)].T, self.response.these)
@@ -145,18 +152,22 @@ class _Solver:
             solved, bend = self._step(others, solved, len(spread))
         return self._spread(others, solved, bend, spread, logs + log_spread)
 
-    def drawn(self, start: str, spread: Floats, logs: Floats) -> tuple[str, str, str]:
-        """Points (1 + p, n) with the solved coordinate drawn about the sheet.
+    def drawn(self, start: str, spread: Floats, logs: Floats) -> tuple[str, str, list[str], str]:
+        """Unbounded others (p - 1, n), and points with the solved coordinate drawn about the sheet.
 
-        And the logarithm of their weights (1, n), and their misfit (1, n), the sum of squared
-        residuals. `logs` (1, n) is that of the density which others and spread (n,) were drawn by.
+        And the logarithms (1, n) of what they weigh, in the box and at all, and their misfit
+        (1, n), the sum of squared residuals. `logs` (1, n) is that of the density which others and
+        spread (n,) were drawn by.
         """
-        graph = self.graph
+        graph, op, small = self.graph, self.graph.op, self.graph.small
         sizes = graph.constant(np.asarray([1, len(self.order) - 1, 1], dtype=np.int64))
-        _, others, solved = graph.ops("Split", 3, start, sizes, axis=0)
+        _, wide, solved = graph.ops("Split", 3, start, sizes, axis=0)
+        others = op("Tanh", wide)
+        shrunk = op("Sub", small(1.0), op("Mul", others, others))
+        shrunk = op("Log", op("Max", shrunk, small(1.0 - MOST**2)))
         for _ in range(STEPS):
             solved, bend = self._step(others, solved, len(spread))
-        return self._spread(others, solved, bend, spread, logs)
+        return wide, *self._spread(others, solved, bend, spread, logs, shrunk)
 
     def _step(self, others: str, solved: str, count: int) -> tuple[str, str]:
         op, one = self.graph.op, self.graph.small(np.ones((1, count)))
@@ -174,8 +185,8 @@ class _Solver:
         return self._kept(op("Sub", solved, op("Div", pull, bend))), bend
 
     def _spread(
-        self, others: str, solved: str, bend: str, spread: Floats, logs: Floats
-    ) -> tuple[str, str, str]:
+        self, others: str, solved: str, bend: str, spread: Floats, logs: Floats, *shrunk: str
+    ) -> tuple[str, list[str], str]:
         graph, op, small = self.graph, self.graph.op, self.graph.small
         one = small(np.ones((1, len(spread))))
         drawn = op("Add", solved, op("Div", small(WIDER * spread[None]), op("Sqrt", bend)))
@@ -184,9 +195,11 @@ class _Solver:
         found = op("MatMul", self.system, self._basis(points))
         misfit = graph.reduced("ReduceSumSquare", found, 0, keep=True)
         beyond = graph.reduced("ReduceL1", op("Sub", free, points), 0, keep=True)
-        parts = op("Concat", points, op("Log", bend), misfit, beyond, axis=0)
-        each = small([[0.0, *self.tilt, -0.5, -0.5, -OUTSIDE]])
-        return points, op("Gemm", each, parts, small(-logs)), misfit
+        parts = op("Concat", points, op("Log", bend), misfit, *shrunk, beyond, axis=0)
+        # what the sample would be worth inside of the box, and what it is worth
+        own = [0.0, *self.tilt, -0.5, -0.5, *[1.0] * (len(self.order) - 1 if shrunk else 0)]
+        both = op("Gemm", small([[*own, 0.0], [*own, -OUTSIDE]]), parts, small(-logs))
+        return points, graph.ops("Split", 2, both, axis=0, num_outputs=2), misfit
 
     def _kept(self, x: str) -> str:
         return self.graph.op("Clip", x, self.graph.small(-1.0), self.graph.small(1.0))

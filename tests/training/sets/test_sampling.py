@@ -5,6 +5,7 @@ import pytest
 
 from training.limit import FRACTIONS
 from training.sets.answers import ENDS
+from training.sets.family import ABSENT
 from training.sets.measured import answered, opened
 from training.sets.of_memory import of_memory
 
@@ -47,3 +48,23 @@ def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
         if answer["set_in_range"][0]:
             assert (np.abs(answer["set_mean"] - mean) < 0.3 * std).all()
             assert (np.abs(np.log(answer["set_std"] / std)) < 0.25).all()
+
+
+@pytest.mark.parametrize("corner", [(0.97, 0.97, -0.97), (-0.97, -0.97, 0.97)])
+def test_a_soil_in_a_corner_of_the_prior_is_found(wheel_posterior, corner):
+    family, session = wheel_posterior.family, opened(wheel_posterior)
+    sets, rng = family.sets(4, 16, 21), np.random.default_rng(0)
+    apart = []
+    for index in range(len(sets.truth)):
+        x = np.broadcast_to(corner, (16, 1, 3))
+        answers = family.answers(sets.origin.designs[index], x)[:, 0]
+        torque = np.exp(answers[:, 0]) * sets.readings["load"][index]
+        sets.readings["torque_std"][index] = 0.02 * torque
+        sets.readings["torque"][index] = torque * (1.0 + 0.02 * rng.standard_normal(16))
+        for name in ("sinkage", "drawbar_pull"):
+            sets.readings[name][index], sets.readings[f"{name}_std"][index] = 1.0, ABSENT
+        answer, mean, std, _ = compared(wheel_posterior, sets, index, session)
+        if answer["set_in_range"][0]:
+            apart.append((answer["set_mean"] - mean) / std)
+    assert len(apart) >= 2
+    assert np.sqrt(np.mean(np.square(apart))) < 0.5
