@@ -18,7 +18,7 @@ from soilml.quantities import SHEAR
 from training.designs import DIGITS
 from training.sets.density import Found
 from training.sets.exact import exact
-from training.sets.family import Family, Sets
+from training.sets.family import ABSENT, Family, Sets
 from training.sets.for_any_wheel import read_any_spec
 from training.sets.one_wheel import OneWheel
 
@@ -138,4 +138,22 @@ def on_one_wheel(references: Sequence[Reference]) -> list[Reference]:
         context = {name: np.asarray([value]) for name, value in given.items()}
         sets = replace(sets, context=context, origin=replace(sets.origin, x=x))
         found.append(replace(reference, family=other, sets=sets))
+    return found
+
+
+def told_by_reading(references: Sequence[Reference]) -> list[Reference]:
+    """The same sets, told the noise that their sensors have at the reading, as a file takes it.
+
+    The sets themselves tell the noise at the true value, which no rover knows.
+    """
+    found = []
+    for reference in references:
+        sets = reference.sets
+        readings = dict(sets.readings)
+        for name, (constant, share) in sets.origin.noise.items():
+            channel = "torque" if name == "torque_bias" else name
+            key = name if name == "torque_bias" else f"{name}_std"
+            std = np.hypot(constant, share * np.abs(readings[channel]))
+            readings[key] = np.where(readings[key] < ABSENT, std, ABSENT)
+        found.append(replace(reference, sets=replace(sets, readings=readings)))
     return found

@@ -8,7 +8,7 @@ import pytest
 from soilml.errors import InputError
 from training.limit_file import load, save
 from training.sets.exact import exact
-from training.sets.reference import ANY, ONE, kept, on_one_wheel, references
+from training.sets.reference import ANY, ONE, kept, on_one_wheel, references, told_by_reading
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +72,12 @@ def test_a_wheel_among_all_wheels_answers_as_it_does_alone(some):
 def test_sets_of_any_wheel_are_of_many_kinds(some):
     near = [r.sets.origin.near[0] > 0.0 for r in some if r.label == ANY]
     assert any(near) and not all(near)
+
+
+def test_noise_told_by_the_reading_is_the_same_share_of_it(some):
+    for one, other in zip(some, told_by_reading(some), strict=True):
+        before, after = one.sets.readings, other.sets.readings
+        assert np.array_equal(after["torque"], before["torque"])
+        share = one.sets.origin.noise["torque"][1]
+        assert after["torque_std"] / after["torque"] == pytest.approx(share)
+        assert np.array_equal(after["sinkage_std"] > 1.0, before["sinkage_std"] > 1.0)
