@@ -1,9 +1,8 @@
 """Set posteriors beside the exact posterior of the same sets: `python bench/sets.py`.
 
 With --limit the exact posteriors are computed anew, six minutes on two cores, and kept. Noise is a
-share of the true value; sets tell its standard deviation there. A file's own noise is a share of
-the reading, and the logarithm of readings, which its likelihood is normal in, asks for that: told
-the other it overrates torque by twice the square of its relative noise.
+share of the true value, and sets tell its standard deviation there; a file's own noise is a share
+of the reading, which is measured beside it.
 """
 
 from __future__ import annotations
