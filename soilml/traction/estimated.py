@@ -88,4 +88,6 @@ def _height(found: Population, features: Floats, multipliers: Floats) -> tuple[f
     top = float(logs.max())
     weights = found.weights * np.exp(logs - top)
     total = float(weights.sum())
+    if not total > 0.0:
+        return float("inf"), found
     return top + float(np.log(total)), replace(found, weights=weights / total)
