@@ -22,9 +22,8 @@ Progress = Callable[[str, int, int], None]
 #: Sizes of sets, and sets of each, on which the limits are measured and then the figures.
 SIZES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 LIMIT_SETS, FIGURE_SETS = 1500, 600
-#: Share of sets that the model holds for, and that are refused nonetheless; three times as many of
-#: those that are driven steadily, whose rows fix less.
-FALSE = 0.005
+#: Share of sets that the model holds for, and that are refused nonetheless.
+FALSE = 0.01
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,11 @@ class Figures:
 
 
 def with_limits(family: Family, response: Response, progress: Progress) -> SetPosterior:
-    """The set posterior with limits of the misfit that refuse one set in two hundred.
+    """The set posterior with limits of the misfit that refuse at most one sound set in a hundred.
 
     The number of readings orders them; torque alone and torque with other channels are measured
-    together.
+    together. Rows that are driven steadily fix no more than one combination of the unknowns: what
+    is left of n readings follows a chi-squared distribution of n - 1, and no limit lies below its.
     """
     free = Limits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
     session = opened(SetPosterior(family, response, free))
@@ -61,7 +61,8 @@ def with_limits(family: Family, response: Response, progress: Progress) -> SetPo
         near = (count > size / 1.13) & (count < size * 1.13)
         if near.sum() >= 300:
             knots.append(float(size))
-            limits.append(float(np.quantile(value[near], 1.0 - FALSE)))
+            steady = chi2.ppf(1.0 - FALSE, size - 1) if size > 1 else 0.0
+            limits.append(max(float(np.quantile(value[near], 1.0 - FALSE)), float(steady)))
     rising = np.maximum.accumulate(limits)
     return SetPosterior(family, response, Limits(np.asarray(knots), rising))
 

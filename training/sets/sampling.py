@@ -144,10 +144,10 @@ class _Solver:
         """As `drawn`, by fixed points (p, n), the last coordinate 0: all that follows is fixed."""
         op, small = self.graph.op, self.graph.small
         basis = monomials(points[np.argsort(self.order)].T, self.response.these)
-        slope = basis @ derivative(self.response.these, self.order[-1] + 1).T
-        residual, rise = (op("MatMul", self.system, small(b.T)) for b in (basis, slope))
+        both = op("MatMul", self.both, small(basis.T))
+        residual, rise = self.graph.ops("Split", 2, both, axis=0, num_outputs=2)
         others = small(points[:-1])
-        solved, bend = self._moved(small(0.0), residual, rise, 0)
+        solved, bend = self._moved(small(0.0), residual, rise)
         for _ in range(STEPS_FIRST - 1):
             solved, bend = self._step(others, solved, len(spread))
         return self._spread(others, solved, bend, spread, logs + log_spread)
@@ -174,14 +174,14 @@ class _Solver:
         at = self._kept(op("Concat", one, others, solved, axis=0))
         both = op("MatMul", self.both, self._basis(at))
         residual, rise = self.graph.ops("Split", 2, both, axis=0, num_outputs=2)
-        return self._moved(solved, residual, rise, 1)
+        return self._moved(solved, residual, rise)
 
-    def _moved(self, solved: str, residual: str, rise: str, axis: int) -> tuple[str, str]:
+    def _moved(self, solved: str, residual: str, rise: str) -> tuple[str, str]:
         """The solved coordinate after a step, and the curvature (1, n) there."""
         graph, op, small = self.graph, self.graph.op, self.graph.small
-        bend = graph.reduced("ReduceSumSquare", rise, axis, keep=not axis)
+        bend = graph.reduced("ReduceSumSquare", rise, 1)
         bend = op("Add", bend, small(OPEN**-2))
-        pull = graph.reduced("ReduceSum", op("Mul", residual, rise), axis, keep=not axis)
+        pull = graph.reduced("ReduceSum", op("Mul", residual, rise), 1)
         return self._kept(op("Sub", solved, op("Div", pull, bend))), bend
 
     def _spread(
