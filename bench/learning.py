@@ -69,11 +69,12 @@ def rules() -> str:
 
 
 def parity() -> str:
-    """Float32 files against their float64 originals."""
+    """Float32 files against their float64 originals; a set posterior has none but its graph."""
     lines = ["| file | kB | largest difference / prior std |", "|---|---:|---:|"]
     for file in sorted((ROOT / "exported").glob("*.onnx")):
         metadata = Estimator.load(file).metadata
-        lines.append(f"| {file.name} | {file.stat().st_size / 1e3:.0f} | {metadata['parity']} |")
+        off = metadata.get("parity", "")
+        lines.append(f"| {file.name} | {file.stat().st_size / 1e3:.0f} | {off} |")
     return "\n".join(lines)
 
 
