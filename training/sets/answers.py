@@ -31,11 +31,6 @@ class Limits:
     readings: Floats
     misfit: Floats
 
-    def at(self, count: Floats) -> Floats:
-        """The largest misfit that sets of this many readings may have."""
-        place = np.interp(np.log(count), np.log(self.readings), np.arange(len(self.readings)))
-        return np.interp(place, np.arange(len(self.readings)), self.misfit)
-
 
 def draw_answers(
     graph: Graph,
