@@ -44,7 +44,7 @@ models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
 
 limit: $(VENV)/.ready ## the Bayes limit of the benchmark and of the reference sets again, ten minutes on two cores
-	@$(BIN)/soilml compare --limit training/benchmark_limit.parquet
+	@$(BIN)/soilml compare --limit training/benchmark/benchmark_limit.parquet
 	@$(BIN)/python bench/sets.py --limit
 
 kls1: $(VENV)/.ready ## the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data

@@ -10,12 +10,18 @@ import numpy as np
 from place import ROOT
 
 from soilml import Case, Estimator, Operating, identify, read_case
-from soilml.advice import advise, grid, of_moments, of_prior, of_rows
-from soilml.advice.candidate import SLIPS
-from soilml.identification.fit import Fit
-from soilml.identification.free import chosen
-from soilml.identification.measured import measured_rows
-from soilml.table import Table
+from soilml.experiment_design import (
+    advise,
+    candidate_grid,
+    samples_of_moments,
+    samples_of_prior,
+    samples_of_rows,
+)
+from soilml.experiment_design.candidate_rows import SLIPS
+from soilml.identification.fit_result import Fit
+from soilml.identification.free_parameters import select_free
+from soilml.identification.observations import read_observations
+from soilml.io.table import Table
 
 LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)
 SOILS = 120
@@ -46,7 +52,7 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
     with the case's noise, the same draw of it whichever next row is driven.
     """
     rng = np.random.default_rng(seed)
-    free = chosen(case, None)
+    free = select_free(case, None)
     spread = np.asarray([f.prior.std for f in free])
     found = []
     for _ in range(soils):
@@ -55,9 +61,9 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
         first, other = ((rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(2))
         normal = rng.standard_normal(rows + 1)
         table = _measured(case, truth, [first] * rows, normal[:rows])
-        data = measured_rows(case, table)
-        belief = of_rows(case, data, free, samples)
-        best = advise(case, belief, grid(SLIPS, LOADS), reads=("torque",)).best()
+        data = read_observations(case, table)
+        belief = samples_of_rows(case, data, free, samples)
+        best = advise(case, belief, candidate_grid(SLIPS, LOADS), reads=("torque",)).best()
         points = {
             "repeat": first,
             "random": other,
@@ -80,10 +86,10 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
 def planned(case: Case, rows: int, soils: int, seed: int) -> dict[str, np.ndarray]:
     """Std left (s, p) where `rows` are planned before any is driven, or drawn from the grid."""
     rng = np.random.default_rng(seed)
-    free = chosen(case, None)
+    free = select_free(case, None)
     spread = np.asarray([f.prior.std for f in free])
-    ranges = grid(SLIPS, LOADS)
-    plan = advise(case, of_prior(free), ranges, reads=("torque",), count=rows).sequence
+    ranges = candidate_grid(SLIPS, LOADS)
+    plan = advise(case, samples_of_prior(free), ranges, reads=("torque",), count=rows).sequence
     best = [(choice.candidate.slip, choice.candidate.load) for choice in plan]
     left: dict[str, list[np.ndarray]] = {"drawn": [], "planned": []}
     for _ in range(soils):
@@ -158,7 +164,11 @@ def from_file(soils: int = SOILS, seed: int = 5) -> str:
     """What the advice of a trained file is worth by the exact posterior of the same row."""
     case = read_case(ROOT / "examples" / "wheel" / "model.toml")
     estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    rng, free, ranges = np.random.default_rng(seed), chosen(case, None), grid(SLIPS, LOADS)
+    rng, free, ranges = (
+        np.random.default_rng(seed),
+        select_free(case, None),
+        candidate_grid(SLIPS, LOADS),
+    )
     left: dict[str, list[float]] = {"the file's": [], "the posterior's": [], "any": []}
     for _ in range(soils):
         truth = {f.path: float(f.prior.at(rng.random())) for f in free}
@@ -166,9 +176,9 @@ def from_file(soils: int = SOILS, seed: int = 5) -> str:
         table = _measured(case, truth, [point], rng.standard_normal(1))
         readings = {"slip": point[0], "load": point[1], "torque": float(table["torque_Nm"][0])}
         told = estimator(**readings)
-        moments = of_moments(free, estimator.names, told.mean, told.covariance)
+        moments = samples_of_moments(free, estimator.names, told.mean, told.covariance)
         theirs = advise(case, moments, ranges, reads=("torque",)).best().candidate
-        exact = advise(case, of_rows(case, measured_rows(case, table), free), ranges)
+        exact = advise(case, samples_of_rows(case, read_observations(case, table), free), ranges)
         torque = exact.of(("torque",))
         left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
         left["the posterior's"].append(exact.best().overall)

@@ -11,15 +11,15 @@ import numpy as np
 
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, soil
-from soilml.any_wheel import for_case
-from soilml.sets import ANSWER, KEPT
+from soilml.identification.trained_estimator import for_simulated_case
+from soilml.onboard.set_posterior import ANSWER, KEPT
 
 ROOT = Path(__file__).parents[1]
 CALLS = 4000
 OUTPUTS = ("mean", "std", "covariance", "in_range")
 COLD = """
 import time; t = time.perf_counter()
-from soilml.onboard import Estimator
+from soilml.onboard.estimator import Estimator
 e = Estimator.load({path!r}); e(slip=0.3, torque=3.0, load=60.0)
 t = time.perf_counter() - t
 status = dict(line.split(":", 1) for line in open("/proc/self/status"))
@@ -36,7 +36,7 @@ def latency() -> str:
     ]
     case = read_recipe("wheel").case
     for file in sorted((ROOT / "exported").glob("*wheel*.onnx")):
-        estimator = for_case(Estimator.load(file), case)
+        estimator = for_simulated_case(Estimator.load(file), case)
         size = f"| {file.name} | {file.stat().st_size / 1e3:.0f} "
         alone = estimator.sets is not None and estimator.sets.alone
         whole = _timed(lambda e=estimator: e(**_reading()))

@@ -10,8 +10,8 @@ import numpy as np
 from foreign import Readings
 from scipy.stats import qmc
 
-from training.sets.axis import Axis
-from training.sets.polynomial import derivative, monomials, terms
+from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.monomials import derivative, monomials, terms
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -30,7 +30,7 @@ def points(count: int, seed: int) -> Floats:
     return np.asarray(2.0 * qmc.Sobol(3, rng=seed).random(count) - 1.0)
 
 
-def values(axes: Sequence[Axis], x: Floats) -> Floats:
+def values(axes: Sequence[Coordinate], x: Floats) -> Floats:
     """Parameters (n, 3) at coordinates (n, 3)."""
     return np.stack([a.value(x[:, i]) for i, a in enumerate(axes)], axis=1)
 

@@ -21,14 +21,14 @@ from flags_page import ABOUT, CELLS, FALSELY, Cell, heading, short, written
 from foreign import Kind, Readings, driven, kinds
 from place import ROOT
 
-from datagen.progress import bar
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.case import Case
+from soilml.cli.progress import bar
+from soilml.config.case import Case
 from soilml.errors import InputError
-from training.sets.axis import Axis
-from training.sets.family import ABSENT
-from training.sets.one_wheel import OneWheel
+from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.wheel_family import ABSENT
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -81,7 +81,7 @@ def shuffled(sets: int, seed: int) -> Order:
     return (6 * slips + chosen).reshape(sets, 36)
 
 
-def world(kind: Kind, case: Case, axes: Sequence[Axis], seed: int) -> World:
+def world(kind: Kind, case: Case, axes: Sequence[Coordinate], seed: int) -> World:
     """Draw soils of the prior, drive them, and fit what may explain the readings."""
     real, rng = kind.case(case), np.random.default_rng(seed)
     u = rng.random((SETS + SOUND, 3))
@@ -193,7 +193,7 @@ def measured(
 ) -> dict[tuple[Kind, bool, int], Cell]:
     """All cells, by kind, channels and size."""
     case = read_recipe("wheel").case
-    axes = [Axis.of(name, case.prior[name]) for name in SHEAR]
+    axes = [Coordinate.of(name, case.prior[name]) for name in SHEAR]
     estimators, found = opened(case, *files), {}
     wanted = [Kind("-", "no fault"), *filter(only, kinds(case))]
     with bar("driving", len(wanted)) as done:
@@ -212,7 +212,7 @@ def false_flags(files: Sequence[str] = RELEASED) -> str:
     recipe = read_recipe("wheel")
     estimators, shares = opened(recipe.case, *files), []
     for rows in SIZES:
-        sets = OneWheel.of(recipe, SHEAR).sets(MANY, rows, 4711)
+        sets = RecipeFamily.of(recipe, SHEAR).sets(MANY, rows, 4711)
         std = {name: sets.readings[f"{name}_std"] for name in KEYS}
         read = {k: np.where(v < ABSENT, sets.readings[k], np.nan) for k, v in std.items()}
         given = {k: sets.readings[k] for k in ("slip", "load")} | read

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from soilml.case import Case
-from soilml.effects import EFFECTS
-from soilml.effects.base import suits
-from soilml.operating import Operating
+from soilml.config.case import Case
 from soilml.parameters import declared
+from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.base import suits
+from soilml.physics.operating_point import Operating
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 #: slip, load, torque, sinkage, drawbar_pull, arrays of one shape.

@@ -15,9 +15,9 @@ import gap_pages
 from gap_case import judged
 from place import FILE, MARK
 
-from datagen.hidden.plans import matrix
-from datagen.progress import bar
-from soilml.saving import save_text
+from datagen.blind_sets.factorial_plan import matrix
+from soilml.cli.progress import bar
+from soilml.io.atomic_files import save_text
 
 
 def run() -> None:

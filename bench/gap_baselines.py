@@ -6,15 +6,15 @@ import warnings
 
 import numpy as np
 
-from soilml.case import Case
-from soilml.effects import EFFECTS
-from soilml.effects.base import suits
-from soilml.gap.cells import cells_of
-from soilml.gap.predict import linearised, predicted, soil_axis
-from soilml.gap.signatures import signatures
-from soilml.identification.free import chosen
+from soilml.config.case import Case
+from soilml.gap.data.observations import cells_of
+from soilml.gap.statistics.coordinates import linearised, predicted, soil_axis
+from soilml.gap.statistics.signatures import signatures
+from soilml.identification.free_parameters import select_free
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.base import suits
 from soilml.quantities import CHANNELS, column
-from soilml.table import Table
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
@@ -26,7 +26,7 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     r = (cells.reading - y) / cells.std
     g = np.stack([s.column for s in known], axis=1) / cells.std[:, None]
     labels = [s.name for s in known]
-    free = chosen(case, None)
+    free = select_free(case, None)
     axes = [soil_axis(f) for f in free]
     at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
     j = linearised(case, axes, at, cells)[1] / cells.std[:, None]

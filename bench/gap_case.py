@@ -11,14 +11,14 @@ from typing import Any
 import gap_baselines
 import numpy as np
 
-from datagen.hidden.plans import Plan
-from datagen.hidden.sets import draw
-from soilml.case import Case, read_case
-from soilml.effects import EFFECTS
+from datagen.blind_sets.blind_set import draw
+from datagen.blind_sets.factorial_plan import Plan
+from soilml.config.case import Case, read_case
 from soilml.gap import GapReport, gap
-from soilml.identification.driven import operating
+from soilml.identification.operating_points import operating_points
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column
-from soilml.table import Table
 
 #: A wrong name is added on purpose to every so many sets, and the baselines are run there.
 EVERY = 8
@@ -74,7 +74,7 @@ def _soil_only(case: Case, report: GapReport) -> Case:
 
 
 def _predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
-    force = case.model(case.soil, operating(table))
+    force = case.model(case.soil, operating_points(table))
     return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
 
 

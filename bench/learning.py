@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from datagen.engine import generate
+from datagen.generate import generate
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.any_wheel import for_case
+from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import SHEAR
-from training.benchmark import LIMIT, RECIPE, benchmark
-from training.benchmark_report import goal_table, tables
-from training.dataset import read_dataset, split
-from training.fixed_size import FixedSizeLSSVM
-from training.goals import goals
-from training.kernel import rbf
-from training.lssvm import GAMMAS, LSSVM, Factored
-from training.mlp import GaussianMLP
-from training.score import scored
+from training.benchmark.acceptance import goals
+from training.benchmark.report import goal_table, tables
+from training.benchmark.suite import LIMIT, RECIPE, benchmark
+from training.calibration.scores import scored
+from training.data.dataset import read_dataset, split
+from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
+from training.regressors.gaussian_mlp import GaussianMLP
+from training.regressors.lssvm import GAMMAS, LSSVM, Factored
+from training.regressors.rbf_kernel import rbf
 
 ROOT = Path(__file__).parents[1]
 FEATURES = ("slip", "torque/load", "load")
@@ -31,7 +31,9 @@ def comparison() -> str:
     """The released models and the analytic methods on the fixed benchmark, and their goals."""
     case = read_recipe(RECIPE).case
     names = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
-    models = {n: for_case(Estimator.load(ROOT / "exported" / f"{n}.onnx"), case) for n in names}
+    models = {
+        n: for_simulated_case(Estimator.load(ROOT / "exported" / f"{n}.onnx"), case) for n in names
+    }
     results = benchmark(models)
     return f"```\n{goal_table(goals(results, LIMIT))}\n\n{tables(results)}\n```"
 

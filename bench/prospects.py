@@ -10,7 +10,7 @@ from place import ROOT
 from scipy.stats import binom
 
 from soilml import Estimator, SlipSinkage, read_case
-from soilml.traction.coverage import SLIPS, Coverage, coverage
+from soilml.traction.coverage_study import SLIPS, Coverage, coverage
 
 #: Soils that nothing was settled with; a load among those driven, and one that is not (N).
 SEEDS = range(20_000, 20_200)

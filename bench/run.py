@@ -23,7 +23,7 @@ import prospects
 import systems
 from place import FILE, MARK, ROOT
 
-from soilml.saving import save_text
+from soilml.io.atomic_files import save_text
 
 
 def machine() -> str:

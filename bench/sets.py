@@ -17,16 +17,16 @@ import numpy as np
 from place import ROOT
 
 from soilml.quantities import SHEAR
-from training.limit_file import load, save
-from training.sets.beside import Beside, beside, joined, uniform
-from training.sets.reference import (
+from training.benchmark.bayes_limit_file import load, save
+from training.benchmark.sets.agreement import Agreement, agreement, combined, uniform
+from training.benchmark.sets.reference_sets import (
     ANY,
     ONE,
     computed,
     kept,
     on_one_wheel,
     references,
-    told_by_reading,
+    with_noise_of_reading,
 )
 
 #: Goals: RMSE over the exact posterior's, log density lacking (nat), what 90 % intervals hold, and
@@ -41,7 +41,7 @@ RANKS, INTERVAL, QUARTERS = np.linspace(0.1, 0.9, 9), (0.05, 0.95), (0.05, 0.25,
 
 
 @cache
-def measured(folder: Path) -> dict[str, list[Beside]]:
+def measured(folder: Path) -> dict[str, list[Agreement]]:
     """Every file on its sets, by design."""
     wanted = references()
     limit = load(kept(), wanted, HINT)
@@ -50,11 +50,13 @@ def measured(folder: Path) -> dict[str, list[Beside]]:
     assert all(r.label == ANY for r in wanted[every])
     any_wheel = folder / "any_wheel.onnx"
     return {
-        "wheel, reference wheel": beside(folder / "wheel.onnx", wanted[one], limit.rows(one)),
-        "any_wheel, reference wheel": beside(any_wheel, on_one_wheel(wanted[one]), limit.rows(one)),
-        "any_wheel, any wheel": beside(any_wheel, wanted[every], limit.rows(every)),
-        "any_wheel, any wheel, noise told by reading": beside(
-            any_wheel, told_by_reading(wanted[every]), limit.rows(every)
+        "wheel, reference wheel": agreement(folder / "wheel.onnx", wanted[one], limit.rows(one)),
+        "any_wheel, reference wheel": agreement(
+            any_wheel, on_one_wheel(wanted[one]), limit.rows(one)
+        ),
+        "any_wheel, any wheel": agreement(any_wheel, wanted[every], limit.rows(every)),
+        "any_wheel, any wheel, noise told by reading": agreement(
+            any_wheel, with_noise_of_reading(wanted[every]), limit.rows(every)
         ),
     }
 
@@ -112,7 +114,7 @@ def coverage(folder: Path) -> str:
         "|---|---|---:|" + "---:|" * 4 + "---|",
     ]
     for name, parts in measured(folder).items():
-        whole = joined(parts)
+        whole = combined(parts)
         thirds = _thirds(whole)
         for part, label in _split(parts):
             lines.append(_covered(name, label, part, *part.cover90(), part.joint90, goal=True))
@@ -135,7 +137,7 @@ def calibration(folder: Path) -> str:
         "|---|---:|---|" + "---:|" * len(SYMBOLS) + "---|",
     ]
     for name, parts in measured(folder).items():
-        whole = joined(parts)
+        whole = combined(parts)
         there = whole.own.given
         answered = whole.where(there)
         truth = answered.truth
@@ -161,9 +163,9 @@ def _binned(truth: np.ndarray, edges: np.ndarray, ends: Sequence[float]) -> np.n
     return middles[(truth > edges).sum(axis=0)]
 
 
-def _split(parts: Sequence[Beside]) -> list[tuple[Beside, str]]:
+def _split(parts: Sequence[Agreement]) -> list[tuple[Agreement, str]]:
     """All sets, those of each size, of each kind, and of each third of the noise."""
-    whole = joined(parts)
+    whole = combined(parts)
     found = [(whole, "all"), *((part, f"{_rows(part)} rows") for part in parts)]
     found += [(whole.where(m), k) for k, m in whole.kinds.items() if 30 <= m.sum() < len(m)]
     low, high = np.quantile(whole.noise, [1.0 / 3.0, 2.0 / 3.0])
@@ -173,7 +175,7 @@ def _split(parts: Sequence[Beside]) -> list[tuple[Beside, str]]:
     return found
 
 
-def _thirds(whole: Beside) -> dict[str, np.ndarray]:
+def _thirds(whole: Agreement) -> dict[str, np.ndarray]:
     """Sets (n, q) whose truth is in each third of the prior."""
     share = (whole.truth - whole.lower) / (whole.upper - whole.lower)
     names = ("truth in the lower third", "in the middle third", "in the upper third")
@@ -183,7 +185,7 @@ def _thirds(whole: Beside) -> dict[str, np.ndarray]:
 def _covered(
     name: str,
     label: str,
-    part: Beside,
+    part: Agreement,
     own: np.ndarray,
     least: np.ndarray,
     joint: tuple[float, float] | None,
@@ -202,7 +204,7 @@ def _met(met: bool, near: bool) -> str:
     return "met" if met else "missed, within its error" if near else "MISSED"
 
 
-def _rows(part: Beside) -> int:
+def _rows(part: Agreement) -> int:
     return int(part.design.split()[-2])
 
 

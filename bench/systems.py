@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml import Midstance, Model, Operating, Wheel, soil
-from soilml.climbing.coverage import coverage
-from soilml.tracked.robot import WANG2018
-from soilml.wheel_legs.feet import wheel_leg
-from soilml.wheel_legs.ground import Ground
-from soilml.wheel_legs.stepping import explicit
-from soilml.wheel_legs.walk import walk
-from soilml.writing import aligned
+from soilml.io.text_tables import aligned
+from soilml.systems.climbing.coverage_study import coverage
+from soilml.systems.tracked_robot.robot import WANG2018
+from soilml.systems.wheel_legs.walking.geometry import wheel_leg
+from soilml.systems.wheel_legs.walking.integrator import explicit
+from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.walk import walk
 
 ROWS = 50_000
 #: The paper's step, 1e-4 s, at 0.3 rad/s, and a speed below which motion's direction fades: none.

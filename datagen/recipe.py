@@ -12,16 +12,17 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from datagen.stick_slip import StickSlip, take_stick_slip
-from soilml.case import Case, take_case
-from soilml.effects import EFFECTS, Effect
+from datagen.wheel_leg_vibration import StickSlip, take_stick_slip
+from soilml.config.case import Case, take_case
+from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.prior import take_prior
 from soilml.errors import InputError
-from soilml.gears import Midstance
-from soilml.noise import Noise, take_noise
-from soilml.operating import COVARIATES, MOST_SLIP
-from soilml.prior import Prior, take_prior
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.numerics.prior import Prior
+from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.gears import Midstance
+from soilml.physics.operating_point import COVARIATES, MOST_SLIP
 from soilml.quantities import COLUMNS
-from soilml.settings import Settings, read_settings
 
 #: Columns of [operating], in the order in which they are drawn.
 DRIVEN = ("slip", "load_N")

@@ -2,7 +2,7 @@
 
 import sys
 
-from soilml.cli import main
+from soilml.cli.main import main
 
 if __name__ == "__main__":
     sys.exit(main())

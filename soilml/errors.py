@@ -7,7 +7,7 @@
     ├── FitError                the measurements cannot be fitted as asked
     └── MissingLibraryError     a library is not installed; the line says which extra brings it
 
-Nothing *inside* a batch raises: a row that has no answer carries a `soilml.status.Status`.
+Nothing *inside* a batch raises: a row that has no answer carries a `soilml.row_status.Status`.
 """
 
 

@@ -89,7 +89,7 @@ def model_file(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some thousand rows, a quarter of them in runs of 32."""
-    from datagen.engine import generate
+    from datagen.generate import generate
     from datagen.recipe import read_recipe
 
     folder = tmp_path_factory.mktemp("data")
@@ -120,11 +120,11 @@ LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
 
 
 def _exported(folder: Path, family, posterior, noise) -> Path:
-    from training.sets.for_any_wheel import AnySpec, export
-    from training.sets.response import Size
+    from training.export.any_wheel_file import AnySpec, export
+    from training.set_posterior.response_surface import ResponseSettings
 
     path = folder / "small.onnx"
-    export(AnySpec(family, Size(0, 0, 0, 0), noise, "{}"), posterior, {}, path)
+    export(AnySpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}"), posterior, {}, path)
     return path
 
 
@@ -133,14 +133,14 @@ def wheel_posterior():
     """The set posterior of the packaged wheel, learned from few designs."""
     from datagen.recipe import read_recipe
     from soilml.quantities import SHEAR
-    from training.sets.answers import Limits
-    from training.sets.one_wheel import OneWheel
-    from training.sets.posterior import SetPosterior
-    from training.sets.response import Size, learned
+    from training.set_posterior.graph import SetPosteriorGraph
+    from training.set_posterior.posterior_summary import Limits
+    from training.set_posterior.recipe_family import RecipeFamily
+    from training.set_posterior.response_surface import ResponseSettings, fit_response
 
-    family = OneWheel.of(read_recipe("wheel"), SHEAR)
-    response = learned(family, Size(768, 32, 120, 0), lambda *_: None)
-    return SetPosterior(family, response, Limits(*map(np.asarray, LENIENT)))
+    family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
+    response = fit_response(family, ResponseSettings(768, 32, 120, 0), lambda *_: None)
+    return SetPosteriorGraph(family, response, Limits(*map(np.asarray, LENIENT)))
 
 
 @pytest.fixture(scope="session")
@@ -155,16 +155,16 @@ def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) ->
 def any_posterior():
     """The set posterior of wheels of any size, learned from so few designs that it is coarse."""
     from datagen.recipe import located
-    from soilml.settings import read_settings
-    from training.sets.answers import Limits
-    from training.sets.any_wheel import AnyWheel
-    from training.sets.posterior import SetPosterior
-    from training.sets.response import Size, learned
+    from soilml.io.toml_settings import read_settings
+    from training.set_posterior.dimensionless_family import DimensionlessFamily
+    from training.set_posterior.graph import SetPosteriorGraph
+    from training.set_posterior.posterior_summary import Limits
+    from training.set_posterior.response_surface import ResponseSettings, fit_response
 
     settings = read_settings(located("any_wheel", "training", "specs"))
-    family = AnyWheel.take(settings.table("any_wheel"))
-    response = learned(family, Size(768, 32, 60, 0), lambda *_: None)
-    return SetPosterior(family, response, Limits(*map(np.asarray, LENIENT)))
+    family = DimensionlessFamily.take(settings.table("any_wheel"))
+    response = fit_response(family, ResponseSettings(768, 32, 60, 0), lambda *_: None)
+    return SetPosteriorGraph(family, response, Limits(*map(np.asarray, LENIENT)))
 
 
 @pytest.fixture(scope="session")

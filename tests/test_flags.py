@@ -9,10 +9,10 @@ from scipy.stats import binom
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.errors import InputError
-from soilml.operating import Operating
+from soilml.onboard.set_posterior import SetPosterior
+from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
-from soilml.sets import SetPosterior
-from training.sets.one_wheel import OneWheel
+from training.set_posterior.recipe_family import RecipeFamily
 
 CASE = read_recipe("wheel").case
 SLIP = np.tile([0.08, 0.14, 0.21, 0.29, 0.38, 0.48], 2)
@@ -112,7 +112,7 @@ def test_another_wheel_is_flagged_where_sinkage_and_pull_are_read(wheel, factor)
 
 @pytest.mark.parametrize("rows", [1, 3, 6, 16])
 def test_one_sound_set_in_a_hundred_is_flagged(wheel, rows):
-    sets = OneWheel.of(read_recipe("wheel"), SHEAR).sets(300, rows, 991)
+    sets = RecipeFamily.of(read_recipe("wheel"), SHEAR).sets(300, rows, 991)
     count = 0
     for k in range(len(sets.truth)):
         given = sets.rows(k)

@@ -45,7 +45,7 @@ def run(program, *arguments, cwd):
 def test_the_wheel_holds_the_packages_and_their_data(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     for needed in (
-        "soilml/soils/wong1989.toml",
+        "soilml/physics/soils/wong1989.toml",
         "datagen/recipes/wheel.toml",
         "training/specs/fused.toml",
         "soilml/py.typed",

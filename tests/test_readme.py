@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from soilml import read_case, read_table
-from soilml.cli import ORDER, main
-from soilml.reading import RUNS
+from soilml.cli.main import ORDER, main
+from soilml.io.read_table import RUNS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.engine import pieces
+from datagen.generate import pieces
 from datagen.recipe import Block, read_recipe
 from soilml import Estimator
-from soilml.any_wheel import for_case
+from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import column
-from training.sets.for_any_wheel import read_any_spec
+from training.export.any_wheel_file import read_any_spec
 from training.spec import read_spec
 
 ROOT = Path(__file__).parents[1]
@@ -118,7 +118,7 @@ def test_the_file_for_any_wheel_comes_from_its_spec():
 def test_the_file_for_any_wheel_is_as_good_as_that_of_the_reference_wheel(rows):
     one = Estimator.load(ROOT / "exported" / "wheel.onnx")
     recipe = read_recipe("wheel")
-    many = for_case(Estimator.load(ROOT / "exported" / "any_wheel.onnx"), recipe.case)
+    many = for_simulated_case(Estimator.load(ROOT / "exported" / "any_wheel.onnx"), recipe.case)
     columns = runs(recipe, rows, ())
     truth = np.stack([columns[column(n)][:, 0] for n in one.names], axis=1)
     error = []

@@ -9,18 +9,18 @@ from typing import Any
 
 from datagen.recipe import located
 from soilml.errors import InputError
-from soilml.features import inputs_of
-from soilml.fusion import RULES
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.numerics.estimate_fusion import RULES
+from soilml.onboard.features import inputs_of
 from soilml.quantities import SHEAR
-from soilml.settings import Settings, read_settings
-from training.fixed_size import FixedSizeLSSVM
-from training.linear import LinearGaussian
-from training.lssvm import LSSVM
-from training.mlp import GaussianMLP
-from training.reader import Reader
-from training.sets.response import Size
-from training.sets.size import take_size
-from training.targets import PER_ROW, check_targets
+from training.data.targets import PER_ROW, check_targets
+from training.regressors.feature_subset import FeatureSubset
+from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
+from training.regressors.gaussian_mlp import GaussianMLP
+from training.regressors.linear_gaussian import LinearGaussian
+from training.regressors.lssvm import LSSVM
+from training.set_posterior.response_surface import ResponseSettings
+from training.set_posterior.settings import take_response_settings
 
 #: Regressor by the name that `[[regressor]] type` takes: one new file and one line here.
 REGRESSORS: dict[str, type] = {
@@ -45,10 +45,10 @@ class Spec:
     seed: int
     features: tuple[str, ...]
     targets: tuple[str, ...]
-    regressors: tuple[Reader, ...]
+    regressors: tuple[FeatureSubset, ...]
     rule: str
     text: str
-    set_posterior: Size | None = None
+    set_posterior: ResponseSettings | None = None
 
     @property
     def per_row(self) -> bool:
@@ -73,7 +73,7 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     rule = settings.text("rule", "best-linear")
     if rule not in RULES:
         settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
-    regressors: list[Reader] = []
+    regressors: list[FeatureSubset] = []
     for entry in settings.tables("regressor"):
         regressors.append(_reader(entry, seed, features, [r.kind for r in regressors]))
     if not regressors:
@@ -81,7 +81,7 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     read = {k for r in regressors for k in r.columns or range(len(features))}
     for k in set(range(len(features))) - read:
         settings.fail(f"features: no regressor reads {features[k]!r}; leave it out")
-    size = take_size(settings, seed) if "set_posterior" in settings else None
+    size = take_response_settings(settings, seed) if "set_posterior" in settings else None
     settings.finish()
     return Spec(
         name=file.stem,
@@ -104,7 +104,7 @@ def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
     return [str(word) for word in words]
 
 
-def _reader(settings: Settings, seed: int, features: list[str], taken: list[str]) -> Reader:
+def _reader(settings: Settings, seed: int, features: list[str], taken: list[str]) -> FeatureSubset:
     """A regressor and what it reads; two that would have one name are numbered."""
     own = _words(settings, "features", features)
     for name in own:
@@ -115,7 +115,7 @@ def _reader(settings: Settings, seed: int, features: list[str], taken: list[str]
     if own != features:
         kind, columns = f"{kind} of {', '.join(own)}", tuple(features.index(name) for name in own)
     alike = sum(name == kind or name.startswith(f"{kind} #") for name in taken)
-    return Reader(f"{kind} #{alike + 1}" if alike else kind, machine, columns)
+    return FeatureSubset(f"{kind} #{alike + 1}" if alike else kind, machine, columns)
 
 
 def _machine(settings: Settings, seed: int) -> Any:

@@ -11,32 +11,38 @@ from numpy.typing import NDArray
 
 from datagen.recipe import recipe_of
 from soilml.errors import InputError
-from soilml.estimate import Driven, Known, Rule, Together, answered
-from soilml.fusion import RULES
-from training.calibrate import (
+from soilml.numerics.estimate_fusion import RULES
+from soilml.onboard.estimate import (
+    PoolingCalibration,
+    PoolingRule,
+    PriorSummary,
+    RunConditions,
+    pooled_within_prior,
+)
+from training.calibration.recalibration import (
     LEAST_GROUPS,
-    Calibrated,
-    calibrated,
+    CalibratedRegressor,
     covariances,
-    driven_of,
     groups_of,
     long_groups,
     measured_of,
+    pooling_calibration,
+    recalibrate,
+    run_conditions_of,
     runs_that,
-    together,
-    unjoined,
+    without_pooling,
 )
-from training.dataset import Dataset, Split, split
-from training.fused import Fused, fused
-from training.mlp import GaussianMLP
-from training.reader import Reader
-from training.score import NINETY, Score, scored
-from training.sets.measured import Figures, measured, with_limits
-from training.sets.one_wheel import OneWheel
-from training.sets.posterior import SetPosterior
-from training.sets.response import learned
+from training.calibration.scores import NINETY, Score, scored
+from training.calibration.training_domain import TrainingDomain
+from training.data.dataset import Dataset, Split, split
+from training.ensemble import Ensemble, fuse_members
+from training.regressors.feature_subset import FeatureSubset
+from training.regressors.gaussian_mlp import GaussianMLP
+from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.response_surface import fit_response
+from training.set_posterior.validation import SetFigures, validated, with_limits
 from training.spec import Spec
-from training.support import Support
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -47,17 +53,17 @@ class Trained:
     """A trained estimator, everything its file needs, and its figures on unseen rows."""
 
     spec: Spec
-    estimator: Calibrated
-    support: Support
-    together: Together
-    prior: Known
+    estimator: CalibratedRegressor
+    support: TrainingDomain
+    together: PoolingCalibration
+    prior: PriorSummary
     data: Dataset
     parts: Split
     scores: dict[str, Score]
     sets: dict[str, dict[int, Score]]
-    members: tuple[Calibrated, ...]
-    posterior: SetPosterior | None = None
-    figures: dict[int, Figures] = field(default_factory=dict)
+    members: tuple[CalibratedRegressor, ...]
+    posterior: SetPosteriorGraph | None = None
+    figures: dict[int, SetFigures] = field(default_factory=dict)
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Mean, standard deviation (n, q) and in-range flag (n,), as the exported file gives them.
@@ -85,39 +91,45 @@ def train(
     """
     parts = split(data, spec.seed)
     targets = parts.train.targets
-    prior = Known(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
+    prior = PriorSummary(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
     first, second, third = _thirds(parts.calibrate.thinned(), spec.seed)
     unseen = np.isin(parts.calibrate.run, third.run)
     _check_enough(data, parts.calibrate.rows(~unseen))
     members = []
     for regressor in spec.regressors:
         _fit(regressor, parts, partial(progress, f"fitting {regressor.kind}"))
-        members.append(calibrated(regressor, first))
+        members.append(recalibrate(regressor, first))
     scores = {m.regressor.kind: _scored(m, third, prior.std) for m in members}
     if len(members) > 1:
         for rule in RULES:
-            joined = fused(members, rule, first)
+            joined = fuse_members(members, rule, first)
             claimed = joined.predict(third.features)
             scores[f"{rule}, as claimed"] = scored(third.targets, *claimed, prior.std)
-            widened = calibrated(joined, second)
+            widened = recalibrate(joined, second)
             scores[f"{rule}, recalibrated"] = _scored(widened, third, prior.std)
-        estimator = calibrated(fused(members, spec.rule, first), second)
+        estimator = recalibrate(fuse_members(members, spec.rule, first), second)
     else:
         seen = parts.calibrate.thinned()
-        estimator = calibrated(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
+        estimator = recalibrate(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
     scores["estimator"] = _scored(estimator, third, prior.std)
     joint = _together(
-        estimator, parts.calibrate.rows(~unseen), prior, driven_of(parts.train), spec.per_row
+        estimator,
+        parts.calibrate.rows(~unseen),
+        prior,
+        run_conditions_of(parts.train),
+        spec.per_row,
     )
     posterior, figures = None, {}
     if spec.set_posterior is not None:
-        family = OneWheel.of(recipe_of(data.recipe, "recipe of the data"), spec.targets)
-        posterior = with_limits(family, learned(family, spec.set_posterior, progress), progress)
-        figures = measured(posterior, progress)
+        family = RecipeFamily.of(recipe_of(data.recipe, "recipe of the data"), spec.targets)
+        posterior = with_limits(
+            family, fit_response(family, spec.set_posterior, progress), progress
+        )
+        figures = validated(posterior, progress)
     return Trained(
         spec=spec,
         estimator=estimator,
-        support=Support.of(parts.train.features, spec.features, spec.seed),
+        support=TrainingDomain.of(parts.train.features, spec.features, spec.seed),
         together=joint,
         prior=prior,
         data=data,
@@ -141,7 +153,7 @@ def _check_enough(data: Dataset, calibrate: Dataset) -> None:
         )
 
 
-def _fit(reader: Reader, parts: Split, progress: Callable[[int, int], None]) -> None:
+def _fit(reader: FeatureSubset, parts: Split, progress: Callable[[int, int], None]) -> None:
     progress(0, 1)
     machine, shown = reader.machine, reader.read(parts.train.features)
     if isinstance(machine, GaussianMLP):
@@ -168,16 +180,22 @@ def _thirds(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
 
 
 def _together(
-    estimator: Calibrated, data: Dataset, prior: Known, driven: Driven, per_row: bool
-) -> Together:
+    estimator: CalibratedRegressor,
+    data: Dataset,
+    prior: PriorSummary,
+    driven: RunConditions,
+    per_row: bool,
+) -> PoolingCalibration:
     """What joining rows takes; where they have no one value, the interval of one row alone."""
     mean, std = estimator.predict(data.features)
     covariance = covariances(std, estimator.correlation)
-    return (unjoined if per_row else together)(mean, covariance, data, prior, driven)
+    return (without_pooling if per_row else pooling_calibration)(
+        mean, covariance, data, prior, driven
+    )
 
 
 def _set_scores(
-    estimator: Calibrated, joint: Together, data: Dataset, prior: Known
+    estimator: CalibratedRegressor, joint: PoolingCalibration, data: Dataset, prior: PriorSummary
 ) -> dict[str, dict[int, Score]]:
     """Figures of several rows joined, by what the run varied and the number of rows.
 
@@ -198,14 +216,16 @@ def _set_scores(
     return found
 
 
-def _joined(mean: Floats, covariance: Floats, prior: Known, rule: Rule) -> tuple[Floats, Floats]:
+def _joined(
+    mean: Floats, covariance: Floats, prior: PriorSummary, rule: PoolingRule
+) -> tuple[Floats, Floats]:
     """Mean, and the standard deviation of a Gaussian with the interval that is answered."""
-    joint = answered(mean, covariance, prior, rule)
+    joint = pooled_within_prior(mean, covariance, prior, rule)
     return joint.mean, np.sqrt(np.diag(joint.covariance)) * rule.reach / NINETY
 
 
-def _scored(estimator: Calibrated, data: Dataset, prior_std: Floats) -> Score:
+def _scored(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Score:
     return scored(data.targets, *estimator.predict(data.features), prior_std)
 
 
-__all__ = ["Fused", "Trained", "train"]
+__all__ = ["Ensemble", "Trained", "train"]

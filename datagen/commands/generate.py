@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.commands.models import add_effects_option, chosen_effects
-from soilml.saving import named
+from soilml.cli.effects_option import add_effects_option, chosen_effects
+from soilml.io.atomic_files import named
 
 HELP = "synthetic measurements from a recipe, as Parquet"
 DESCRIPTION = """\
@@ -44,12 +44,12 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Generate the file."""
-    from soilml.needs import need
+    from soilml.optional_imports import need
 
-    need("datagen.engine", "generate")
-    from datagen.engine import generate
-    from datagen.progress import bar
+    need("datagen.generate", "generate")
+    from datagen.generate import generate
     from datagen.recipe import read_recipe
+    from soilml.cli.progress import bar
 
     recipe = read_recipe(args.recipe, chosen_effects(args)).sized(args.rows, args.seed)
     with bar("simulating", recipe.rows) as progress:

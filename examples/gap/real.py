@@ -9,11 +9,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from soilml.case import read_case
 from soilml.cli import main
-from soilml.gap.grow import model_text
-from soilml.noise import Noise
-from soilml.saving import save_text
+from soilml.config.case import read_case
+from soilml.config.measurement_noise import Noise
+from soilml.gap.search.updated_case import model_text
+from soilml.io.atomic_files import save_text
 
 HERE = Path(__file__).parent
 KLS1 = HERE.parent / "kls1" / "model.toml"

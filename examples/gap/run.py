@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from datagen.hidden.plans import Plan
-from datagen.hidden.sets import Drawn, draw
+from datagen.blind_sets.blind_set import Drawn, draw
+from datagen.blind_sets.factorial_plan import Plan
 from soilml.cli import main
-from soilml.writing import aligned, csv_text
+from soilml.io.text_tables import aligned, csv_text
 
 #: The plans of the stories; the truth stays in this file and never reaches the analyst.
 PLANS = {

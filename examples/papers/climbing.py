@@ -12,11 +12,11 @@ import matplotlib
 import numpy as np
 
 from soilml.cli import main
-from soilml.climbing import SimulatedRover, modulus_of_each
-from soilml.climbing.climb import Climb, WheelRun
-from soilml.climbing.logged import logged
-from soilml.climbing.simulated import ARTIFICIAL, SLOPES
-from soilml.writing import csv_text
+from soilml.io.text_tables import csv_text
+from soilml.systems.climbing import SimulatedRover, modulus_of_each
+from soilml.systems.climbing.climb import Climb, WheelRun
+from soilml.systems.climbing.files.write_tables import logged
+from soilml.systems.climbing.simulated_rover import ARTIFICIAL, SLOPES
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

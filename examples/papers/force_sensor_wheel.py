@@ -9,9 +9,12 @@ import matplotlib
 import numpy as np
 
 from soilml import Model, Operating, StressShift, Table, Wheel, soil
-from soilml.case import Case
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
 from soilml.gap import gap
-from soilml.measured_stress import (
+from soilml.io.text_tables import aligned
+from soilml.numerics.prior import Prior
+from soilml.systems.force_sensor_wheel import (
     Run,
     SensingWheel,
     Strength,
@@ -26,9 +29,6 @@ from soilml.measured_stress import (
     sensed,
     solve,
 )
-from soilml.noise import Noise
-from soilml.prior import Prior
-from soilml.writing import aligned
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -20,8 +20,8 @@ from lunar.sweep import Floats, bounds, driven, noisy, soils, table, three_loads
 
 from soilml import Case, Estimator, identify, read_case
 from soilml.cli import main
+from soilml.io.text_tables import aligned
 from soilml.quantities import SHEAR
-from soilml.writing import aligned
 
 HERE = Path(__file__).parent.relative_to(Path.cwd()) / "lunar"
 OUT = Path("demo/papers")

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from datagen.engine import generate
+from datagen.generate import generate
 from datagen.recipe import located, read_recipe
 from soilml import Estimator, read_table
-from soilml.combined import ACROSS_FILES, fused_estimates
+from soilml.io.atomic_files import replacing
+from soilml.io.text_tables import aligned
+from soilml.onboard.multi_sensor import ACROSS_FILES, fused_estimates
 from soilml.quantities import column
-from soilml.saving import replacing
-from soilml.writing import aligned
-from training.dataset import read_dataset
-from training.export import export
+from training.data.dataset import read_dataset
+from training.export.model_file import export
 from training.spec import Spec, read_spec
 from training.train import Trained, train
 

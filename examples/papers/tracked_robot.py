@@ -15,12 +15,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from soilml import Case, Model, Operating, soil
-from soilml.noise import Noise
+from soilml.config.measurement_noise import Noise
+from soilml.numerics.prior import Prior
 from soilml.papers.wang2018 import LEVEL, plateau, printed
-from soilml.prior import Prior
-from soilml.tracked.groups import FIVE, Groups, driven, identified, predicted
-from soilml.tracked.regression import Regression, points_behind, regression
-from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance
+from soilml.systems.tracked_robot.group_identification import (
+    FIVE,
+    Groups,
+    driven,
+    identified,
+    predicted,
+)
+from soilml.systems.tracked_robot.pull_regression import Regression, points_behind, regression
+from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance
 
 OUT = Path("demo/papers/tracked_robot.png")
 PRINTED = {("sand", False): 600, ("sand", True): 620, ("clay", False): 800, ("clay", True): 950}

@@ -12,22 +12,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml import Model, Operating, Wheel, soil
-from soilml.case import Case
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
 from soilml.gap import gap
-from soilml.mobility import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
-from soilml.noise import Noise
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
 from soilml.papers import comin2017_slip as chapter
-from soilml.prior import Prior
-from soilml.table import Table
-from soilml.wheel_legs.characterise import from_torque
-from soilml.wheel_legs.feet import wheel_leg
-from soilml.wheel_legs.ground import GROUNDS
-from soilml.wheel_legs.slip_fits import fit_torque_slip
-from soilml.wheel_legs.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
-from soilml.wheel_legs.soil_fusion import PROPERTIES, RULES, SENSES, judged, learned
-from soilml.wheel_legs.stances import FOOT, LOAD, SLIPS, felt, four_soils, torques, varied_soils
-from soilml.wheel_legs.stick_slip import SpringLeg, amplitude, stance
-from soilml.wheel_legs.walk import walk
+from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
+from soilml.systems.wheel_legs.sensing.sensor_fusion import (
+    PROPERTIES,
+    RULES,
+    SENSES,
+    judged,
+    learned,
+)
+from soilml.systems.wheel_legs.sensing.simulated_stances import (
+    FOOT,
+    LOAD,
+    SLIPS,
+    felt,
+    four_soils,
+    torques,
+    varied_soils,
+)
+from soilml.systems.wheel_legs.sensing.slip_fits import fit_torque_slip
+from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
+from soilml.systems.wheel_legs.sensing.soil_from_slip import from_torque
+from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, amplitude, stance
+from soilml.systems.wheel_legs.walking.geometry import wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
+from soilml.systems.wheel_legs.walking.walk import walk
 
 Floats = NDArray[np.float64]
 

@@ -16,12 +16,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from soilml.wheel_legs.feet import wheel_leg
-from soilml.wheel_legs.ground import Ground
-from soilml.wheel_legs.sinkage import fitted_to, simulated
-from soilml.wheel_legs.stresses import stresses
-from soilml.wheel_legs.trends import feet_compared, legs_compared
-from soilml.wheel_legs.walk import walk
+from soilml.systems.wheel_legs.sensing.sinkage_fit import fitted_to, simulated
+from soilml.systems.wheel_legs.walking.gait_metrics import feet_compared, legs_compared
+from soilml.systems.wheel_legs.walking.geometry import wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.plate_stresses import stresses
+from soilml.systems.wheel_legs.walking.walk import walk
 
 OUT = Path("demo/papers/wheel_legs.png")
 SAND = Ground(stiffness=0.7e6)

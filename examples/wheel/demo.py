@@ -12,10 +12,10 @@ import numpy as np
 
 from soilml import Estimator, read_table
 from soilml.cli import main
+from soilml.io.atomic_files import replacing, save_text
+from soilml.io.table import Table
+from soilml.io.text_tables import aligned, csv_text
 from soilml.quantities import QUANTITIES, SHEAR, column
-from soilml.saving import replacing, save_text
-from soilml.table import Table
-from soilml.writing import aligned, csv_text
 
 HERE = Path(__file__).parent.relative_to(Path.cwd())
 OUT = Path("demo")

@@ -8,30 +8,30 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
-from soilml.effects import EFFECTS, Effect
-from soilml.effects.base import suits
+from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.analysis import Analysis, analysed
-from soilml.gap.candidate import Candidate
-from soilml.gap.cells import Cells, cells_of
-from soilml.gap.covariance import FEW_RUNS
-from soilml.gap.fit import GapFit
-from soilml.gap.grow import grown_case
-from soilml.gap.next_runs import next_runs
-from soilml.gap.predict import predicted
-from soilml.gap.remainder import remainder
-from soilml.gap.report import Curves, GapReport, Shrink, Tried
-from soilml.gap.search import REJECTED
-from soilml.gap.shrink import held_out_region, held_out_runs, shrink, unseen
-from soilml.gap.sound import Gate, examined, repeated_noise, without_repeats
-from soilml.gap.verdict import likeness, map_of, named, status_of, values_of
-from soilml.gap.words import not_claimed, sentence
-from soilml.identification.free import Free, chosen
-from soilml.identification.measured import same_wheel
+from soilml.gap.data.checks import Gate, examined, repeated_noise, without_repeats
+from soilml.gap.data.observations import Cells, cells_of
+from soilml.gap.design.discriminating_runs import next_runs
+from soilml.gap.messages import not_claimed, sentence
+from soilml.gap.results import Curves, GapReport, Shrink, Tried
+from soilml.gap.search.candidate_fits import Candidate
+from soilml.gap.search.cross_validation import held_out_region, held_out_runs, shrink, unseen
+from soilml.gap.search.iteration import Analysis, analysed
+from soilml.gap.search.residual_trend import remainder
+from soilml.gap.search.stepwise import REJECTED
+from soilml.gap.search.updated_case import grown_case
+from soilml.gap.search.verdict import likeness, map_of, named, status_of, values_of
+from soilml.gap.statistics.coordinates import predicted
+from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.statistics.reml_covariance import FEW_RUNS
+from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.identification.observations import check_wheel_size
+from soilml.io.table import Table
 from soilml.parameters import declared
+from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.effects.base import suits
 from soilml.quantities import SHEAR, column
-from soilml.table import Table
 
 
 def gap(
@@ -55,14 +55,14 @@ def gap(
     cannot be analysed give a report of status `bad-data`.
     """
     effects = {name: e for name, e in effects.items() if suits(e, case.model.gear)}
-    same_wheel(case, table)
+    check_wheel_size(case, table)
     answered = table.answered
     if not answered.any():
         raise InputError(f"{table.source}: no row has the status ok")
     table, unanswered = table.rows(answered), int(np.count_nonzero(~answered))
     table, repeats = without_repeats(table)
     seen, kept_back, what = _split(table, holdout, seed)
-    wanted = chosen(case, free if free is not None or case.prior else SHEAR)
+    wanted = select_free(case, free if free is not None or case.prior else SHEAR)
     for f in wanted:
         if free is not None and "." in f.path:
             raise InputError(f"--free {f.path} is no soil parameter; only those may differ here")
@@ -133,7 +133,7 @@ def _reported(
     case: Case,
     analysis: Analysis,
     gate: Gate,
-    free: Sequence[Free],
+    free: Sequence[FreeParameter],
     beyond: Cells | None,
     what: str,
     seed: int,
@@ -181,7 +181,7 @@ def _reported(
     )
 
 
-def _held(case: Case, free: Sequence[Free]) -> list[str]:
+def _held(case: Case, free: Sequence[FreeParameter]) -> list[str]:
     """Soil and gear parameters that were believed as the model file has them."""
     freed = {f.path for f in free}
     soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]

@@ -11,19 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.case import Case
+from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gears.rim import RigidWheel
-from soilml.identification.fit import Fit
-from soilml.identification.free import Free, chosen
+from soilml.identification.fit_result import Fit
+from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.linear import linear
-from soilml.identification.measured import Measured, measured_rows
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
+from soilml.identification.observations import Observations, read_observations
 from soilml.identification.posterior import posterior
-from soilml.table import Table
+from soilml.io.table import Table
+from soilml.physics.gears.rigid_wheel import RigidWheel
 
-Method = Callable[[Case, Measured, Sequence[Free]], Fit]
+Method = Callable[[Case, Observations, Sequence[FreeParameter]], Fit]
 
 #: Identification method by the name that `--method` takes.
 METHODS: dict[str, Method] = {
@@ -52,12 +52,12 @@ def identify(
             f"the {method} method has its equations for rigid wheels alone, not for "
             f"{case.model.gear.name}; take nonlinear"
         )
-    data = measured_rows(case, table)
-    fit = METHODS[method](case, data, chosen(case, free))
+    data = read_observations(case, table)
+    fit = METHODS[method](case, data, select_free(case, free))
     return replace(fit, warnings=(*fit.warnings, *_not_followed(fit, data, free), *data.notes))
 
 
-def _not_followed(fit: Fit, data: Measured, free: Sequence[str] | None) -> list[str]:
+def _not_followed(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:
     """What was asked for and a method of fixed unknowns did not do."""
     said = []
     if free is not None and (others := [name for name in fit.names if name not in free]):
@@ -70,4 +70,4 @@ def _not_followed(fit: Fit, data: Measured, free: Sequence[str] | None) -> list[
     return said
 
 
-__all__ = ["METHODS", "Fit", "Free", "Measured", "identify"]
+__all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]

@@ -7,23 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
-from soilml.effects.base import through
-from soilml.equilibrium import prepared
+from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.gears import LinearWheel
-from soilml.identification.fit import Fit
-from soilml.identification.free import Free
-from soilml.identification.given import with_given
-from soilml.identification.measured import Channel, Measured
-from soilml.operating import Operating
-from soilml.scene import Scene
+from soilml.identification.fit_result import Fit
+from soilml.identification.fixed_parameter import with_fixed_parameters
+from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.observations import Channel, Observations
+from soilml.physics.effects.base import through
+from soilml.physics.equilibrium import prepared
+from soilml.physics.gears import LinearWheel
+from soilml.physics.load_case import LoadCase
+from soilml.physics.operating_point import Operating
 
 Floats = NDArray[np.float64]
 ROUNDS = 50
 
 
-def linear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def linear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     r"""Straight line through the stresses at the angle of maximum stress.
 
     With the entry angle from sinkage and K given, load and torque give sigma_m and tau_m of the
@@ -37,10 +37,10 @@ def linear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     rows at different loads or slips. Effects on soil and contact take part; the difference between
     straight lines and the full stresses is not in its std.
     """
-    return with_given(case, "shear_modulus", lambda c: _solved(c, data, free))
+    return with_fixed_parameters(case, "shear_modulus", lambda c: _solved(c, data, free))
 
 
-def _solved(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def _solved(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     torque, sinkage = _channel(data, "torque"), _channel(data, "sinkage")
     usable = np.isfinite(torque.reading) & np.isfinite(sinkage.reading) & (data.slip >= 0)
     radius = float(getattr(case.model.gear, "radius"))  # noqa: B009 - gears of other kinds lack it
@@ -107,7 +107,7 @@ def _line(
     """Rows of the system matrix (n, 2) @ (c, tan phi) = right-hand side (n,), all in Pa."""
     gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)  # type: ignore[attr-defined]
     effects = case.model.effects
-    scene = prepared(Scene(gear, case.soil, Operating(slip=slip, load=load), effects))
+    scene = prepared(LoadCase(gear, case.soil, Operating(slip=slip, load=load), effects))
     shape = gear.shape(z, scene.soil, scene.at)
     contact = gear.contact(through(effects, "on_contact", shape, scene), scene.at)
     mobilised = -np.expm1(-np.abs(contact.sheared) / case.soil.shear_modulus)
@@ -121,14 +121,14 @@ def _line(
     return np.stack([from_c, m1 * sigma_m], axis=1), T / scale
 
 
-def _channel(data: Measured, name: str) -> Channel:
+def _channel(data: Observations, name: str) -> Channel:
     for channel in data.channels:
         if channel.name == name:
             return channel
     raise FitError(f"the linear method needs {name} in every row, with its noise declared or none")
 
 
-def _said(case: Case, free: Sequence[Free], solution: Floats, load: Floats) -> list[str]:
+def _said(case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats) -> list[str]:
     said = [
         f"{f.path} is not identified by the linear method"
         for f in free

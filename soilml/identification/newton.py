@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
+from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.gears import LinearWheel
-from soilml.identification.fit import Fit
-from soilml.identification.free import Free
-from soilml.identification.given import with_given
-from soilml.identification.measured import Measured
-from soilml.identification.prediction import linearised, readings
-from soilml.prior import Prior
+from soilml.identification.fit_result import Fit
+from soilml.identification.fixed_parameter import with_fixed_parameters
+from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.observations import Observations
+from soilml.identification.predictions import linearised, readings
+from soilml.numerics.prior import Prior
+from soilml.physics.gears import LinearWheel
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ STEPS = 60
 LEAST_RANK = 1e-6
 
 
-def newton(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     r"""Newton's iteration on the closed form, cohesion given, three rows or more.
 
     .. math:: \theta \leftarrow \theta - (J^T J)^{-1} J^T r, \quad
@@ -41,15 +41,17 @@ def newton(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     case = replace(case, model=replace(case.model, gear=closed))
     if data.cells < 3:
         raise FitError(f"{data.cells} readings: the Newton-Raphson method needs three or more")
-    return with_given(case, "cohesion", lambda c: _solved(c, data, free))
+    return with_fixed_parameters(case, "cohesion", lambda c: _solved(c, data, free))
 
 
-def _solved(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def _solved(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     soil = case.soil
     unknown = [
-        Free("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle), False),
-        Free("shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus), False),
-        Free("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi), False),
+        FreeParameter("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle), False),
+        FreeParameter(
+            "shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus), False
+        ),
+        FreeParameter("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi), False),
     ]
     reading, std = readings(data)
     known = bool(np.isfinite(std).all())

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
+from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
-from soilml.identification.caveats import caveats, pinned
-from soilml.identification.fit import Fit
-from soilml.identification.free import Free
-from soilml.identification.measured import Measured
-from soilml.identification.prediction import (
-    declared_at,
+from soilml.identification.diagnostics import at_prior_bound, with_warnings
+from soilml.identification.fit_result import Fit
+from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.observations import Observations
+from soilml.identification.predictions import (
     input_noise,
     linearised,
+    noise_at_prediction,
     predicted,
     readings,
-    stacked,
+    stack_readings,
 )
 from soilml.quantities import column
 
@@ -50,7 +50,7 @@ class _Optimum:
         return float(self.residual @ self.residual)
 
 
-def nonlinear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     r"""Weighted, bounded least squares from several starts.
 
     .. math:: \min_\theta \sum_i \left(\frac{y_i - f(s_i, W_i; \theta)}{\sigma_i}\right)^2
@@ -77,20 +77,20 @@ def nonlinear(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     best = _best(case, data, free, reading, std, nominal)
     for _ in range(3 if undeclared else 1):
-        declared = declared_at(case, data, free, best.u)
+        declared = noise_at_prediction(case, data, free, best.u)
         total = np.hypot(declared, input_noise(case, data, free, best.u))
         std = np.where(np.isfinite(total), total, _estimated(data, reading, best, std, len(free)))
         best = _descended(case, data, free, reading, std, best.u)
     centre = best
-    if np.any(pinned(best.u)):
+    if np.any(at_prior_bound(best.u)):
         centre = _descended(case, data, free, reading, std, best.u, UNIFORM)
     return _finished(case, data, free, best, centre, undeclared=bool(undeclared))
 
 
 def _finished(
     case: Case,
-    data: Measured,
-    free: Sequence[Free],
+    data: Observations,
+    free: Sequence[FreeParameter],
     best: _Optimum,
     centre: _Optimum,
     *,
@@ -124,13 +124,15 @@ def _finished(
         misfit=per_reading if surplus else misfit,
         channels=tuple(column(c.name) for c in data.channels),
     )
-    return caveats(fit, case, data, free, best.u, surplus=bool(surplus), undeclared=undeclared)
+    return with_warnings(
+        fit, case, data, free, best.u, surplus=bool(surplus), undeclared=undeclared
+    )
 
 
 def _best(
     case: Case,
-    data: Measured,
-    free: Sequence[Free],
+    data: Observations,
+    free: Sequence[FreeParameter],
     reading: Floats,
     std: Floats,
     nominal: Floats,
@@ -141,7 +143,7 @@ def _best(
     except ImportError:
         raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
     looks = np.vstack([nominal, qmc.Sobol(len(free), scramble=True, rng=7).random(LOOKS)])
-    y = stacked(data, predicted(case, free, looks, data.at))
+    y = stack_readings(data, predicted(case, free, looks, data.at))
     if np.isnan(y).any(axis=1).all():
         raise FitError(
             "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
@@ -160,8 +162,8 @@ def _best(
 
 def _descended(
     case: Case,
-    data: Measured,
-    free: Sequence[Free],
+    data: Observations,
+    free: Sequence[FreeParameter],
     reading: Floats,
     std: Floats,
     start: Floats,
@@ -195,7 +197,7 @@ def _descended(
     return _Optimum(u=found.x, residual=residual, slope=slope)
 
 
-def _first_guess(data: Measured) -> Floats:
+def _first_guess(data: Observations) -> Floats:
     """A twentieth of each channel's size, (cells,), until residuals tell its noise."""
     parts = []
     for channel in data.channels:
@@ -204,7 +206,7 @@ def _first_guess(data: Measured) -> Floats:
     return np.concatenate(parts)
 
 
-def _estimated(data: Measured, reading: Floats, best: _Optimum, std: Floats, p: int) -> Floats:
+def _estimated(data: Observations, reading: Floats, best: _Optimum, std: Floats, p: int) -> Floats:
     """Noise of each channel from its residuals, (cells,)."""
     off, start = best.residual * std, 0
     parts = []

@@ -7,14 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
+from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.caveats import caveats
-from soilml.identification.fit import Fit
-from soilml.identification.free import Free
-from soilml.identification.measured import Measured
-from soilml.identification.population import ENOUGH, Population, population
-from soilml.identification.prediction import input_noise, predicted, readings, stacked
+from soilml.identification.diagnostics import with_warnings
+from soilml.identification.fit_result import Fit
+from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.observations import Observations
+from soilml.identification.predictions import input_noise, predicted, readings, stack_readings
+from soilml.numerics.importance_sampling import (
+    LEAST_EFFECTIVE_SIZE,
+    ImportanceSample,
+    importance_sample,
+)
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -29,7 +33,7 @@ RARE = 3.09
 CELLS = 200_000
 
 
-def posterior(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
+def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
     r"""Mean, covariance and 90 % interval of the exact posterior, by importance sampling.
 
     .. math::
@@ -66,12 +70,12 @@ def posterior(case: Case, data: Measured, free: Sequence[Free]) -> Fit:
         low=low,
         high=high,
     )
-    return caveats(fit, case, data, free, middle, surplus=surplus, undeclared=False)
+    return with_warnings(fit, case, data, free, middle, surplus=surplus, undeclared=False)
 
 
 def settled_samples(
-    case: Case, data: Measured, free: Sequence[Free]
-) -> tuple[Population, float, bool]:
+    case: Case, data: Observations, free: Sequence[FreeParameter]
+) -> tuple[ImportanceSample, float, bool]:
     """Weighted samples of the posterior, misfit, and whether noise had to be taken for larger."""
     found, misfit, cells = sampled(case, data, free)
     surplus = misfit > most_misfit(cells - len(free))
@@ -81,8 +85,12 @@ def settled_samples(
 
 
 def sampled(
-    case: Case, data: Measured, free: Sequence[Free], seed: int = 0, larger: float = 1.0
-) -> tuple[Population, float, int]:
+    case: Case,
+    data: Observations,
+    free: Sequence[FreeParameter],
+    seed: int = 0,
+    larger: float = 1.0,
+) -> tuple[ImportanceSample, float, int]:
     """Weighted fractions of the priors, misfit of the best of them, and how many readings.
 
     `larger` multiplies all noise.
@@ -99,7 +107,7 @@ def sampled(
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def _log(u: Floats) -> Floats:
-        y = stacked(data, predicted(case, free, u, data.at))
+        y = stack_readings(data, predicted(case, free, u, data.at))
         std = _noise(case, data, y, declared)
         if not best:
             first = np.nan_to_num(((y - reading) / std) ** 2, nan=np.inf).sum(axis=1)
@@ -108,7 +116,7 @@ def sampled(
         logs = -0.5 * (((y - reading) / std) ** 2).sum(axis=1) - np.log(std).sum(axis=1)
         return np.where(np.isfinite(logs), logs, -np.inf)
 
-    found = population(log_density, len(free), seed)
+    found = importance_sample(log_density, len(free), seed)
     if not np.isfinite(found.evidence):
         raise FitError(
             "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
@@ -120,13 +128,13 @@ def sampled(
             "[soil.prior]"
         )
     top = found.u[[int(np.argmax(found.weights))]]
-    y = stacked(data, predicted(case, free, top, data.at))
+    y = stack_readings(data, predicted(case, free, top, data.at))
     std = np.hypot(_noise(case, data, y, declared), best["extra"])
     cost = float((((y - reading) / std) ** 2).sum())
     return found, cost / max(reading.size - len(free), 1), reading.size
 
 
-def _noise(case: Case, data: Measured, y: Floats, declared: Floats) -> Floats:
+def _noise(case: Case, data: Observations, y: Floats, declared: Floats) -> Floats:
     """Standard deviations (sets, cells): those of [noise] at the predictions, others as given."""
     std, start = np.broadcast_to(declared, y.shape).copy(), 0
     for c in data.channels:
@@ -141,8 +149,8 @@ def _noise(case: Case, data: Measured, y: Floats, declared: Floats) -> Floats:
     return std
 
 
-def _unsettled(found: Population) -> tuple[str, ...]:
-    if found.effective >= 0.5 * ENOUGH:
+def _unsettled(found: ImportanceSample) -> tuple[str, ...]:
+    if found.effective >= 0.5 * LEAST_EFFECTIVE_SIZE:
         return ()
     return (
         f"the samples are worth {found.effective:.0f} only: the values may stray by "

@@ -14,25 +14,25 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fusion import Fused, inverse_variance, pairwise
-from soilml.gears import Wheel
-from soilml.mobility import pull_efficiency
-from soilml.model import Model
-from soilml.operating import Operating
-from soilml.soils import soil
-from soilml.wheel_legs.slip_fits import (
+from soilml.numerics.estimate_fusion import FusedEstimate, inverse_variance, pairwise
+from soilml.physics.gears import Wheel
+from soilml.physics.model import Model
+from soilml.physics.operating_point import Operating
+from soilml.physics.pull_efficiency import pull_efficiency
+from soilml.physics.soils import soil
+from soilml.systems.wheel_legs.sensing.simulated_stances import SLIPS, four_soils, torques
+from soilml.systems.wheel_legs.sensing.slip_fits import (
     Fitted,
     fit_torque_slip,
     fit_vibration_slip,
 )
-from soilml.wheel_legs.slip_models import (
+from soilml.systems.wheel_legs.sensing.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
     TorqueSlip,
     VibrationSlip,
 )
-from soilml.wheel_legs.stances import SLIPS, four_soils, torques
-from soilml.wheel_legs.stick_slip import GRAVITY, SpringLeg, amplitude
+from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, amplitude
 
 Floats = NDArray[np.float64]
 
@@ -70,13 +70,13 @@ def vibration_fit(planar: bool) -> Fitted[VibrationSlip]:
     return fit_vibration_slip(felt, SLIPS[1:], drop, stiffness, planar)
 
 
-def fused_slip(torque: str, vibration: str) -> Fused:
+def fused_slip(torque: str, vibration: str) -> FusedEstimate:
     """Slips from torque and vibration joined, of errors as table VI prints them (in %)."""
     std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
     return inverse_variance(np.zeros(2), std)
 
 
-def fused_soil(name: str) -> Fused:
+def fused_soil(name: str) -> FusedEstimate:
     """Three estimates of a property joined by eq. 30, of errors as table VIII prints them (%)."""
     return pairwise(np.zeros(3), np.asarray(STD[name]))
 

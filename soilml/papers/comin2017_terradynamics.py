@@ -8,10 +8,21 @@ from functools import cache
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.wheel_legs.ground import Ground
-from soilml.wheel_legs.sinkage import Simulated, SinkageFit, fitted_to, simulated
-from soilml.wheel_legs.terradynamics import stress_gains
-from soilml.wheel_legs.trends import FeetCompared, Gait, falls_until, feet_compared, legs_compared
+from soilml.systems.wheel_legs.sensing.sinkage_fit import (
+    Simulated,
+    SinkageFit,
+    fitted_to,
+    simulated,
+)
+from soilml.systems.wheel_legs.walking.gait_metrics import (
+    FeetCompared,
+    Gait,
+    falls_until,
+    feet_compared,
+    legs_compared,
+)
+from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.resistive_force import stress_gains
 
 #: Ground on which numbers of legs are compared, the middle of the paper's range; not printed.
 MIDDLE = Ground(stiffness=0.7e6)

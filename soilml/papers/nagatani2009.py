@@ -8,9 +8,12 @@ from functools import cache, partial
 
 import numpy as np
 
-from soilml.effects import StressShift
-from soilml.gears import Wheel
-from soilml.measured_stress import (
+from soilml.physics.effects import StressShift
+from soilml.physics.gears import Wheel
+from soilml.physics.load_case import LoadCase
+from soilml.physics.operating_point import Operating
+from soilml.physics.soils import soil
+from soilml.systems.force_sensor_wheel import (
     Run,
     SensingWheel,
     Strength,
@@ -20,9 +23,6 @@ from soilml.measured_stress import (
     sensed,
     solve,
 )
-from soilml.operating import Operating
-from soilml.scene import Scene
-from soilml.soils import soil
 
 GRAVITY = 9.80665
 #: Table I pairs its five slips with the five slopes of section IV.A, in order.
@@ -57,7 +57,7 @@ def _shifted() -> float:
     """The arc in degrees that `stress-shift` leaves of 70 degrees of contact."""
     wheel, at = Wheel(radius=WHEEL.radius, width=WHEEL.width), Operating(slip=0.0, load=WEIGHT)
     depth = np.asarray(WHEEL.radius * (1.0 - math.cos(math.radians(70.0))))
-    scene = Scene(wheel, SAND, at)
+    scene = LoadCase(wheel, SAND, at)
     rim = wheel.shape(depth, SAND, at)
     left = StressShift(shift=SHIFT).on_contact(rim, scene)
     return float(np.rad2deg(left.entry - left.exit))

@@ -2,7 +2,7 @@
 
 The paper prints no measured force, stress or shear modulus as a number: what it claims, that the
 pull on steep slopes follows from slopes of 0 and 4 degrees, is tried on a rover whose ground is
-known (`soilml.climbing.SimulatedRover`), driven as the paper's was.
+known (`soilml.systems.climbing.SimulatedRover`), driven as the paper's was.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from soilml.climbing import (
+from soilml.errors import FitError
+from soilml.quantities import SHEAR
+from soilml.systems.climbing import (
     Ability,
     Climb,
     SimulatedRover,
@@ -21,9 +23,7 @@ from soilml.climbing import (
     identify_ground,
     modulus_of_each,
 )
-from soilml.climbing.simulated import SLOPES
-from soilml.errors import FitError
-from soilml.quantities import SHEAR
+from soilml.systems.climbing.simulated_rover import SLOPES
 
 #: Slopes on which the paper's prediction rests, and repetitions of each.
 GENTLE, REPEATS = SLOPES[:2], 4

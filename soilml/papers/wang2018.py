@@ -10,9 +10,9 @@ from importlib import resources
 
 import numpy as np
 
-from soilml.soils import soil
-from soilml.tracked.regression import points_behind
-from soilml.tracked.robot import BEYOND_PEAK, GROUSERS, WANG2018
+from soilml.physics.soils import soil
+from soilml.systems.tracked_robot.pull_regression import points_behind
+from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
 #: Slips over which a curve of drawbar pull counts as level.
 LEVEL = np.linspace(0.5, 0.9, 9)

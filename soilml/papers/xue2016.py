@@ -13,18 +13,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
-from soilml.contact import Force
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
-from soilml.gears import LinearWheel
 from soilml.identification import identify
-from soilml.model import Model
-from soilml.noise import Noise
-from soilml.operating import Operating
-from soilml.prior import Prior
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+from soilml.physics.contact import Force
+from soilml.physics.gears import LinearWheel
+from soilml.physics.model import Model
+from soilml.physics.operating_point import Operating
+from soilml.physics.soils import Soil, soil
 from soilml.quantities import SHEAR
-from soilml.soils import Soil, soil
-from soilml.table import Table
 
 Floats = NDArray[np.float64]
 

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from soilml.traction.draws import Draws, posterior_draws, prior_draws
-from soilml.traction.estimated import estimated_draws
-from soilml.traction.prediction import Band, Traction, band, traction
-from soilml.traction.prospect import Prospect, prospects
+from soilml.traction.by_load import LoadPrediction, predictions_by_load
+from soilml.traction.moment_draws import estimated_draws
+from soilml.traction.pull_and_slope import QuantileBand, Traction, quantile_band, traction
+from soilml.traction.soil_draws import SoilDraws, posterior_draws, prior_draws
 
 __all__ = [
-    "Band",
-    "Draws",
-    "Prospect",
+    "LoadPrediction",
+    "QuantileBand",
+    "SoilDraws",
     "Traction",
-    "band",
     "estimated_draws",
     "posterior_draws",
+    "predictions_by_load",
     "prior_draws",
-    "prospects",
+    "quantile_band",
     "traction",
 ]

@@ -8,30 +8,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.case import Case
-from soilml.identification.driven import operating
-from soilml.identification.free import chosen
-from soilml.identification.measured import measured_rows, same_wheel
-from soilml.onboard import Estimator
-from soilml.operating import COVARIATES
+from soilml.config.case import Case
+from soilml.identification.free_parameters import select_free
+from soilml.identification.observations import check_wheel_size, read_observations
+from soilml.identification.operating_points import operating_points
+from soilml.io.table import Table
+from soilml.onboard.estimator import Estimator
+from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
-from soilml.table import Table
-from soilml.traction.draws import posterior_draws, prior_draws
-from soilml.traction.onboard_soil import onboard_draws
-from soilml.traction.prediction import LEFT_BEHIND
-from soilml.traction.prospect import Prospect, asked_slips, driven_loads, prospects
-from soilml.traction.words import NEVER, Driven
+from soilml.traction.by_load import LoadPrediction, asked_slips, driven_loads, predictions_by_load
+from soilml.traction.messages import NEVER, DrivenRange
+from soilml.traction.onboard_draws import onboard_draws
+from soilml.traction.pull_and_slope import LEFT_BEHIND
+from soilml.traction.soil_draws import posterior_draws, prior_draws
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Report:
+class PullReport:
     """Prospects under each load; slip, load (N) and pull (N) of rows that measured it, (k,)."""
 
     rows: int
-    driven: Driven
-    prospects: list[Prospect]
+    driven: DrivenRange
+    by_load: list[LoadPrediction]
     measured: tuple[Floats, Floats, Floats]
     warnings: tuple[str, ...]
 
@@ -44,7 +44,7 @@ def pull_report(
     loads: Sequence[float] | None = None,
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
-) -> Report:
+) -> PullReport:
     """Pull and slope of a gear on the soil that the rows were driven on.
 
     The soil is known by the posterior of the rows, or as far as `estimator` knows it. Speed, pass
@@ -53,8 +53,8 @@ def pull_report(
     """
     warnings: list[str] = []
     if estimator is None:
-        wanted = chosen(case, free)
-        data = measured_rows(case, table)
+        wanted = select_free(case, free)
+        data = read_observations(case, table)
         found = posterior_draws(case, data, wanted)
         draws = found.draws
         warnings += data.notes
@@ -68,21 +68,21 @@ def pull_report(
                 "lacks something or the noise is understated; bands are wider, and may miss"
             )
     else:
-        same_wheel(case, table)
+        check_wheel_size(case, table)
         wanted, draws, said = onboard_draws(estimator, case, table.rows(table.answered))
         warnings += said
     left = [e.name for e in case.model.effects if e.about.kind in LEFT_BEHIND]
     if left:
         warnings.append(f"effects of rig and sensors stay behind: {', '.join(left)}")
     table = table.rows(table.answered)
-    at = operating(table)
-    driven = Driven.of(table["slip"], table["load_N"])
+    at = operating_points(table)
+    driven = DrivenRange.of(table["slip"], table["load_N"])
     given = {
         field: float(np.median(values))
         for field in COVARIATES
         if (values := getattr(at, field)) is not None
     }
-    ahead = prospects(
+    ahead = predictions_by_load(
         case,
         draws,
         prior_draws(wanted),
@@ -95,4 +95,4 @@ def pull_report(
     pull = table[key] if key in table else np.full(len(table), np.nan)
     dots = np.isfinite(pull)
     measured = table["slip"][dots], table["load_N"][dots], pull[dots]
-    return Report(len(table), driven, ahead, measured, (*warnings, NEVER))
+    return PullReport(len(table), driven, ahead, measured, (*warnings, NEVER))

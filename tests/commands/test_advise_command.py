@@ -16,7 +16,7 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.commands.advising import _trained_for, after_estimate
+from soilml.cli.advice_text import _trained_for, after_estimate
 
 ROOT = Path(__file__).parents[2]
 RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,2.9\na,0.2,60,2.95\n"
@@ -187,7 +187,7 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
         "            raise ImportError('no ' + name)\n"
         "sys.meta_path.insert(0, No())\n"
         "import argparse\n"
-        "from soilml.commands import estimate\n"
+        "from soilml.cli.commands import estimate\n"
         "parser = argparse.ArgumentParser()\n"
         "estimate.add(parser)\n"
         "estimate.run(parser.parse_args())\n"

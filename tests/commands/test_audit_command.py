@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.effects import EFFECTS
+from soilml.physics.effects import EFFECTS
 
 MODEL = """\
 [gear]

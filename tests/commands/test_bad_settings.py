@@ -5,7 +5,7 @@ import pytest
 from conftest import MODEL, RECIPE
 
 from soilml.cli import main
-from soilml.model_file import checksum
+from soilml.onboard.model_file import checksum
 
 SPEC = '[[regressor]]\ntype = "linear"\n'
 EFFECT = '[[effect]]\nname = "slip-sinkage"\nn1 = 0.1\n'

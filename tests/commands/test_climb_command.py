@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.climbing import SimulatedRover
-from soilml.climbing.logged import logged
-from soilml.climbing.tables import read_driven
-from soilml.noise import Noise
-from soilml.writing import csv_text
+from soilml.config.measurement_noise import Noise
+from soilml.io.text_tables import csv_text
+from soilml.systems.climbing import SimulatedRover
+from soilml.systems.climbing.files.read_tables import read_driven
+from soilml.systems.climbing.files.write_tables import logged
 
 ROVER = """\
 [rover]

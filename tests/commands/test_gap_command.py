@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from soilml.case import read_case
 from soilml.cli import main
-from soilml.effects import EFFECTS
-from soilml.effects.own import load_effects
-from soilml.operating import Operating
+from soilml.config.case import read_case
+from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.user_effects import load_effects
+from soilml.physics.operating_point import Operating
 
 MODEL = """\
 [gear]
@@ -37,7 +37,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 from soilml.arrays import Real
-from soilml.effects import EffectCard
+from soilml.physics.effects import EffectCard
 from soilml.parameters import Parameter
 
 

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
-from datagen.engine import generate, piece, pieces, sizes
+from datagen.generate import generate, piece, pieces, sizes
 from datagen.recipe import read_recipe
 from soilml import Model, Operating, Wheel, read_table, soil
 from soilml.errors import InputError

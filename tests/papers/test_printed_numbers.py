@@ -46,7 +46,7 @@ def test_an_input_that_is_kept_counts_as_no_result():
 
 
 def test_a_person_sees_what_is_computed_and_the_rest_by_reason(monkeypatch, capsys):
-    monkeypatch.setattr("soilml.commands.papers.watched", lambda: True)
+    monkeypatch.setattr("soilml.cli.commands.papers.watched", lambda: True)
     assert main(["papers", "nagatani2009"]) == 0
     short = capsys.readouterr()
     assert main(["papers", "nagatani2009", "--all"]) == 0

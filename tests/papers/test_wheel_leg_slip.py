@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 
 from soilml import Model, Operating, soil
-from soilml.case import Case
-from soilml.fusion import pairwise
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
 from soilml.identification import identify
-from soilml.mobility import CLASSES
-from soilml.noise import Noise
-from soilml.prior import Prior
-from soilml.table import Table
-from soilml.wheel_legs.feet import wheel_leg
-from soilml.wheel_legs.ground import GROUNDS
-from soilml.wheel_legs.stances import FOOT
-from soilml.wheel_legs.walk import walk
+from soilml.io.table import Table
+from soilml.numerics.estimate_fusion import pairwise
+from soilml.numerics.prior import Prior
+from soilml.physics.pull_efficiency import CLASSES
+from soilml.systems.wheel_legs.sensing.simulated_stances import FOOT
+from soilml.systems.wheel_legs.walking.geometry import wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
+from soilml.systems.wheel_legs.walking.walk import walk
 
 ROOT = Path(__file__).parents[2]
 SAND = soil("comin2017/ssc-2", shear_modulus=0.017 * FOOT.area**0.5)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from datagen.engine import generate
+from datagen.generate import generate
 from datagen.recipe import Block, read_recipe
-from soilml.prior import Prior
-from training.dataset import read_dataset
+from soilml.numerics.prior import Prior
+from training.data.dataset import read_dataset
 from training.spec import read_spec
 from training.train import train
 

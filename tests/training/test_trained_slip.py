@@ -5,15 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from datagen.engine import generate
+from datagen.generate import generate
 from datagen.recipe import read_recipe
 from soilml import Estimator, read_table
 from soilml.cli import main
-from soilml.combined import fused_estimates
 from soilml.errors import InputError, TableError
-from soilml.features import computed
-from training.dataset import read_dataset
-from training.export import export
+from soilml.onboard.features import computed
+from soilml.onboard.multi_sensor import fused_estimates
+from training.data.dataset import read_dataset
+from training.export.model_file import export
 from training.spec import read_spec
 from training.train import train
 

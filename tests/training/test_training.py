@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, TableError
-from soilml.estimate import Known
-from training.calibrate import calibrated, covariances, driven_of, together
-from training.dataset import read_dataset, split
-from training.fused import fused
-from training.linear import LinearGaussian
-from training.score import scored
+from soilml.onboard.estimate import PriorSummary
+from training.calibration.recalibration import (
+    covariances,
+    pooling_calibration,
+    recalibrate,
+    run_conditions_of,
+)
+from training.calibration.scores import scored
+from training.data.dataset import read_dataset, split
+from training.ensemble import fuse_members
+from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
 from training.train import train
 
@@ -49,7 +54,7 @@ def test_figures_of_a_known_case():
 def test_recalibration_makes_errors_as_large_as_claimed(data):
     parts = split(data, seed=0)
     machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    shrunken = calibrated(_Overconfident(machine), parts.choose)
+    shrunken = recalibrate(_Overconfident(machine), parts.choose)
     s = scored(
         parts.calibrate.thinned().targets,
         *shrunken.predict(parts.calibrate.thinned().features),
@@ -71,11 +76,11 @@ class _Overconfident:
 def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
     parts = split(data, seed=0)
     machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    member = calibrated(machine, parts.choose)
+    member = recalibrate(machine, parts.choose)
     single = member.predict(parts.calibrate.features)[1]
-    twice = fused([member, member], "best-linear", parts.choose)
+    twice = fuse_members([member, member], "best-linear", parts.choose)
     np.testing.assert_allclose(twice.predict(parts.calibrate.features)[1], single, rtol=0.02)
-    naive = fused([member, member], "inverse-variance", parts.choose)
+    naive = fuse_members([member, member], "inverse-variance", parts.choose)
     np.testing.assert_allclose(
         naive.predict(parts.calibrate.features)[1], single / np.sqrt(2), rtol=1e-9
     )
@@ -83,15 +88,17 @@ def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
 
 def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     parts = split(data, seed=0)
-    member = calibrated(
+    member = recalibrate(
         LinearGaussian().fit(parts.train.features, parts.train.targets), parts.choose
     )
-    prior = Known(data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper)
+    prior = PriorSummary(
+        data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
+    )
     mean, std = member.predict(parts.calibrate.features)
     covariance = covariances(std, member.correlation)
-    driven = driven_of(parts.train)
+    driven = run_conditions_of(parts.train)
     assert driven.names == ("slip", "load")
-    joint = together(mean, covariance, parts.calibrate, prior, driven)
+    joint = pooling_calibration(mean, covariance, parts.calibrate, prior, driven)
     steady, one_slip, one_load, free = joint.kinds
     np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
     assert (free.worth[1:] <= free.worth[0]).all()
@@ -100,7 +107,7 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
         assert np.exp(kind.at(32)[0]) == pytest.approx(1 / 32)
     alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
     mean, std = member.predict(alone.features)
-    unknown = together(mean, covariances(std, member.correlation), alone, prior, driven)
+    unknown = pooling_calibration(mean, covariances(std, member.correlation), alone, prior, driven)
     assert all(np.exp(k.at(32)[0]) == pytest.approx(1 / 32) for k in unknown.kinds)
 
 
@@ -136,7 +143,7 @@ def test_train_writes_model_card_and_picture(small_model):
 def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_path):
     from conftest import RECIPE
 
-    from datagen.engine import generate
+    from datagen.generate import generate
     from datagen.recipe import read_recipe
     from soilml import Estimator, read_table
 

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from soilml.errors import InputError
-from soilml.needs import need
-from soilml.saving import made_folder, named, replacing_all
+from soilml.io.atomic_files import made_folder, named, replacing_all
+from soilml.optional_imports import need
 
 #: What goes into the folder, on one's own test data and of the benchmark.
 FILES = ("compare.csv", "compare.png", "compare.md")
@@ -96,31 +96,31 @@ def _own_data(args: argparse.Namespace) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
-    need("training.benchmark", "compare")
+    need("training.benchmark.suite", "compare")
     if args.limit is not None:
         return _limit(args)
     return _compare(args) if _own_data(args) else _benchmark(args)
 
 
 def _benchmark(args: argparse.Namespace) -> int:
-    from datagen.progress import stages
     from datagen.recipe import read_recipe
-    from soilml.any_wheel import for_case
-    from soilml.onboard import Estimator
+    from soilml.cli.progress import stages
+    from soilml.identification.trained_estimator import for_simulated_case
+    from soilml.io.table import Table
+    from soilml.io.text_tables import csv_text
+    from soilml.onboard.estimator import Estimator
     from soilml.quantities import SHEAR
-    from soilml.table import Table
-    from soilml.writing import csv_text
-    from training import benchmark_report as report
-    from training.alike import check_alike
-    from training.benchmark import LIMIT, RECIPE, benchmark
-    from training.benchmark_picture import draw
-    from training.goals import goals
+    from training.benchmark import report
+    from training.benchmark.acceptance import goals
+    from training.benchmark.plot import draw
+    from training.benchmark.provenance import check_same_provenance
+    from training.benchmark.suite import LIMIT, RECIPE, benchmark
 
     files = [Path(file) for file in args.files] or _released()
     case = read_recipe(RECIPE).case
-    estimators = {file.stem: for_case(Estimator.load(file), case) for file in files}
+    estimators = {file.stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
-    for note in check_alike(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
+    for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         print(note, file=sys.stderr)
     with made_folder(args.out or FOLDER) as folder:
         with stages() as progress:
@@ -147,12 +147,12 @@ def _released() -> list[Path]:
 
 
 def _limit(args: argparse.Namespace) -> int:
-    from datagen.progress import stages
     from datagen.recipe import read_recipe
+    from soilml.cli.progress import stages
     from soilml.quantities import SHEAR
-    from training.benchmark import RECIPE
-    from training.limit import computed, jobs
-    from training.limit_file import save
+    from training.benchmark.bayes_limit import computed, jobs
+    from training.benchmark.bayes_limit_file import save
+    from training.benchmark.suite import RECIPE
 
     if args.files or args.out or args.against:
         raise InputError("--limit writes its file and nothing else: leave the other arguments out")
@@ -170,25 +170,25 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 
 def _compare(args: argparse.Namespace) -> int:
-    from datagen.progress import stages
-    from soilml.any_wheel import for_case
-    from soilml.case import read_case
-    from soilml.onboard import Estimator
-    from soilml.reading import read_table
-    from soilml.writing import csv_text
-    from training import comparison_report as report
-    from training.alike import check_alike
-    from training.compare import compare
+    from soilml.cli.progress import stages
+    from soilml.config.case import read_case
+    from soilml.identification.trained_estimator import for_simulated_case
+    from soilml.io.read_table import read_table
+    from soilml.io.text_tables import csv_text
+    from soilml.onboard.estimator import Estimator
+    from training.benchmark import user_report as report
+    from training.benchmark.provenance import check_same_provenance
+    from training.benchmark.user_comparison import compare
 
     if len(args.files) < 3 or not args.out:
         raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")
     model, test, *files = args.files
     case = read_case(model)
     table = read_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
-    estimators = {Path(file).stem: for_case(Estimator.load(file), case) for file in files}
+    estimators = {Path(file).stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names
-    for note in check_alike(case, table, estimators, names):
+    for note in check_same_provenance(case, table, estimators, names):
         print(note, file=sys.stderr)
     with made_folder(args.out) as folder:
         with stages() as progress:

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from soilml.errors import InputError
-from soilml.needs import need
-from soilml.saving import named, replacing_all
+from soilml.io.atomic_files import named, replacing_all
+from soilml.optional_imports import need
 
 HELP = "fit regressors to data and export one ONNX file"
 DESCRIPTION = """\
@@ -53,7 +53,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
-    from training.sets.for_any_wheel import is_for_any_wheel
+    from training.export.any_wheel_file import is_for_any_wheel
 
     if is_for_any_wheel(args.spec):
         return _any_wheel(args)
@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _any_wheel(args: argparse.Namespace) -> int:
     """Train the file for wheels of any size."""
-    from datagen.progress import stages
-    from training.sets.for_any_wheel import card, export, read_any_spec, trained
+    from soilml.cli.progress import stages
+    from training.export.any_wheel_file import card, export, read_any_spec, trained
 
     if args.data is not None:
         raise InputError(f"{args.data}: {args.spec} simulates its own rows; leave the data out")
@@ -82,12 +82,12 @@ def _any_wheel(args: argparse.Namespace) -> int:
 
 def _from_data(args: argparse.Namespace) -> int:
     """Train what learns from data."""
-    from datagen.progress import stages
-    from soilml.writing import aligned
-    from training.card import card
-    from training.curves import draw_curves
-    from training.dataset import read_dataset
-    from training.export import export
+    from soilml.cli.progress import stages
+    from soilml.io.text_tables import aligned
+    from training.data.dataset import read_dataset
+    from training.export.learning_curves import draw_curves
+    from training.export.model_card import card
+    from training.export.model_file import export
     from training.spec import read_spec
     from training.train import train
 

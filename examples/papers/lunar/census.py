@@ -20,8 +20,8 @@ from lunar.pull import band, everywhere
 from lunar.sweep import Floats, driven, noisy, soils, table, three_loads
 
 from soilml import Case, Estimator, Model, Wheel, identify
+from soilml.io.text_tables import aligned
 from soilml.quantities import SHEAR
-from soilml.writing import aligned
 
 SOILS, FITTED = 200, 25
 SLIPS = np.linspace(0.2, 0.6, 9)

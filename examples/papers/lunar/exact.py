@@ -6,8 +6,8 @@ import numpy as np
 from lunar.sweep import Floats, table
 
 from soilml import Case
-from soilml.identification import measured_rows
-from soilml.identification.free import chosen
+from soilml.identification import read_observations
+from soilml.identification.free_parameters import select_free
 from soilml.identification.posterior import sampled
 
 
@@ -18,7 +18,7 @@ def posterior(
 
     From the weighted samples of `soilml identify --method posterior`.
     """
-    free = chosen(case, None)
-    found, _, _ = sampled(case, measured_rows(case, table(slip, torque, load)), free)
+    free = select_free(case, None)
+    found, _, _ = sampled(case, read_observations(case, table(slip, torque, load)), free)
     drawn = found.u[rng.choice(len(found.u), count, p=found.weights)]
     return np.stack([f.prior.at(drawn[:, k]) for k, f in enumerate(free)], axis=1)

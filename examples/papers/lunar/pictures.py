@@ -11,7 +11,7 @@ from lunar.pull import spread
 from lunar.sweep import Floats
 
 from soilml import Estimate
-from soilml.saving import replacing
+from soilml.io.atomic_files import replacing
 
 #: Factor from SI and unit by parameter, in order.
 SHOWN = ((1e-3, "kPa"), (57.29578, "deg"), (1e3, "mm"))

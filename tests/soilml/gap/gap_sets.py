@@ -8,20 +8,20 @@ from pathlib import Path
 
 import numpy as np
 
-from datagen.hidden import draw, matrix
-from soilml.case import Case, read_case
-from soilml.effects import EFFECTS
-from soilml.effects.base import suits
+from datagen.blind_sets import draw, matrix
+from soilml.config.case import Case, read_case
 from soilml.gap import gap
-from soilml.gap.analysis import SCATTER
-from soilml.gap.candidate import Bench
-from soilml.gap.cells import cells_of
-from soilml.gap.covariance import Scatter, assembled, scatter_columns
-from soilml.gap.predict import soil_axis
-from soilml.identification.free import chosen
-from soilml.operating import Operating
+from soilml.gap.data.observations import cells_of
+from soilml.gap.search.candidate_fits import Bench
+from soilml.gap.search.iteration import SCATTER
+from soilml.gap.statistics.coordinates import soil_axis
+from soilml.gap.statistics.reml_covariance import Scatter, assembled, scatter_columns
+from soilml.identification.free_parameters import select_free
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.base import suits
+from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
-from soilml.table import Table
 
 MODEL = """\
 [gear]
@@ -83,7 +83,7 @@ def bench_of(case, table, scatter=(0.0, 0.0)) -> Bench:
         0.0,
         1e6,
     )
-    axes = tuple(soil_axis(f) for f in chosen(case, None))
+    axes = tuple(soil_axis(f) for f in select_free(case, None))
     effects = {name: e for name, e in EFFECTS.items() if suits(e, case.model.gear)}
     return Bench(case, axes, cells, assembled(cells, columns, known), effects, {})
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from gap_sets import bench_of, case_of, driven
 
-from soilml.effects import EFFECTS
-from soilml.gap.fit import descend
-from soilml.gap.predict import linearised, predicted, size_axis
-from soilml.gap.signatures import grown, signatures
-from soilml.gap.smooth import distinct, places, smooth_columns
+from soilml.gap.statistics.coordinates import linearised, predicted, size_axis
+from soilml.gap.statistics.least_squares import descend
+from soilml.gap.statistics.signatures import grown, signatures
+from soilml.gap.statistics.smooth_basis import distinct, places, smooth_columns
+from soilml.physics.effects import EFFECTS
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, bench_of, case_of, driven
 
-from soilml.gap.cells import cells_of
-from soilml.gap.smooth import smooth_columns
-from soilml.gap.sound import examined, repeated_noise, strays, without_repeats
-from soilml.table import Table
+from soilml.gap.data.checks import examined, repeated_noise, without_repeats
+from soilml.gap.data.observations import cells_of
+from soilml.gap.statistics.outliers import outliers
+from soilml.gap.statistics.smooth_basis import smooth_columns
+from soilml.io.table import Table
 
 
 def gate(table, text=MODEL):
@@ -42,10 +43,10 @@ def test_readings_far_from_all_others_are_found_and_no_others():
         [np.linalg.solve(bench.covariance.whiten, soil.slope), smooth_columns(bench.cells)]
     )
     residual = bench.cells.reading - soil.prediction
-    assert not strays(bench.covariance, residual, space).any()
+    assert not outliers(bench.covariance, residual, space).any()
     struck = np.isin(np.arange(len(residual)), (9, 50, 77))
     far = residual + np.where(struck, 9.0, 0.0) * bench.covariance.std
-    np.testing.assert_array_equal(strays(bench.covariance, far, space), struck)
+    np.testing.assert_array_equal(outliers(bench.covariance, far, space), struck)
 
 
 def test_rows_that_repeat_to_the_last_digit_count_once():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, bench_of, case_of, driven
 
-from soilml.effects import EFFECTS
-from soilml.gap.candidate import coordinates
-from soilml.gap.grow import grown_case, model_text
-from soilml.gap.menu import CHECKS, cells_at, menu
-from soilml.gap.next_runs import next_runs
-from soilml.operating import Operating
+from soilml.gap.design.discriminating_runs import next_runs
+from soilml.gap.design.run_options import CHECKS, cells_at, menu
+from soilml.gap.search.candidate_fits import coordinates
+from soilml.gap.search.updated_case import grown_case, model_text
+from soilml.physics.effects import EFFECTS
+from soilml.physics.operating_point import Operating
 
 AT = Operating(
     slip=np.asarray([-0.3, 0.1, 0.4, 0.7]), load=np.asarray([30.0, 60.0, 90.0, 150.0]), speed=0.05
@@ -143,7 +143,7 @@ def test_suggestions_are_ranked_and_come_with_what_each_explanation_expects(riva
 
 
 def test_a_checked_sensor_tells_a_fault_from_physics(rivals, monkeypatch):
-    monkeypatch.setattr("soilml.gap.next_runs.LISTED", 99)
+    monkeypatch.setattr("soilml.gap.design.discriminating_runs.LISTED", 99)
     found = {run.kind: run for run in next_runs(*rivals)}
     gain = abs(rivals[1][1].fit.values()["torque-gain.gain"])
     assert found["dead-weight torque"].separates == pytest.approx(min(gain / 0.003, 10.0))

@@ -5,7 +5,7 @@ import pytest
 from gap_sets import analysed, hidden
 
 from soilml.gap import STATUSES
-from soilml.identification.driven import operating
+from soilml.identification.operating_points import operating_points
 from soilml.quantities import CHANNELS, column
 
 STRONG = ("slip-sinkage", "bulldozing", "exit-angle")
@@ -13,7 +13,7 @@ STRONG = ("slip-sinkage", "bulldozing", "exit-angle")
 
 def distance(case, table, truth):
     """Root mean square distance of a model to readings without noise, in declared noise."""
-    force = case.model(case.soil, operating(table))
+    force = case.model(case.soil, operating_points(table))
     off = []
     for name in CHANNELS:
         true = np.asarray(truth[column(name)])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from soilml import Case, ExitAngle, Model, Operating, SlipSinkage, Wheel, soil
+from soilml.config.measurement_noise import Noise
 from soilml.gap import gap
-from soilml.noise import Noise
-from soilml.prior import Prior
-from soilml.table import Table
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
 
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 SAND = soil("wong1989/dry_sand")

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from gap_sets import bench_of, case_of, driven
 
-from soilml.gap.cells import cells_of
-from soilml.gap.covariance import (
+from soilml.gap.data.observations import cells_of
+from soilml.gap.statistics.coordinates import linearised
+from soilml.gap.statistics.reml_covariance import (
     SCATTER,
     Scatter,
     assembled,
     estimated,
     scatter_columns,
 )
-from soilml.gap.predict import linearised
-from soilml.gap.smooth import smooth_columns
+from soilml.gap.statistics.smooth_basis import smooth_columns
 
 LOADS = (40.0, 65.0, 100.0, 150.0) * 4
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.gap.score import outside, scores
+from soilml.gap.statistics.score_test import outside, scores
 
 
 def family(seed=1, cells=40, space=3, columns=12):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from gap_sets import bench_of, case_of, driven
 
-from soilml.effects import EFFECTS
-from soilml.gap.candidate import coordinates
-from soilml.gap.search import EARNS, _dropped, predicted_gains, search
-from soilml.gap.shrink import held_out_region, held_out_runs, shrink, unseen
-from soilml.gap.signatures import signatures
+from soilml.gap.search.candidate_fits import coordinates
+from soilml.gap.search.cross_validation import held_out_region, held_out_runs, shrink, unseen
+from soilml.gap.search.stepwise import EARNS, _dropped, predicted_gains, search
+from soilml.gap.statistics.signatures import signatures
+from soilml.physics.effects import EFFECTS
 
 DIGGING = EFFECTS["slip-sinkage"]
 FEW = ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")

@@ -7,10 +7,10 @@ import pytest
 from gap_sets import MODEL, analysed, case_of, driven, hidden
 
 from soilml.cli import main
-from soilml.effects import EFFECTS
 from soilml.errors import InputError, TableError
 from soilml.gap import gap
-from soilml.gap.grow import model_text
+from soilml.gap.search.updated_case import model_text
+from soilml.physics.effects import EFFECTS
 
 FEW = {n: EFFECTS[n] for n in ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")}
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from soilml import SlipSinkage, read_case
-from soilml.noise import Noise
-from soilml.traction.coverage import coverage
+from soilml.config.measurement_noise import Noise
+from soilml.traction.coverage_study import coverage
 
 SOILS = 10
 

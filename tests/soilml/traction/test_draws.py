@@ -5,15 +5,15 @@ import pytest
 
 from soilml import read_case
 from soilml.errors import InputError
-from soilml.identification.free import chosen
-from soilml.identification.population import Population
+from soilml.identification.free_parameters import select_free
+from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.traction import estimated_draws, prior_draws
-from soilml.traction.draws import systematic
+from soilml.traction.soil_draws import systematic_resampling
 
 
 @pytest.fixture
 def free(model_file):
-    return chosen(read_case(model_file), None)
+    return select_free(read_case(model_file), None)
 
 
 def fractions(free, values):
@@ -25,7 +25,9 @@ def test_a_sample_is_drawn_as_often_as_its_weight_says():
     rng = np.random.default_rng(1)
     weights = rng.random(500) ** 4
     weights /= weights.sum()
-    times = np.bincount(systematic(Population(np.zeros((500, 1)), weights, 0.0), 900, rng))
+    times = np.bincount(
+        systematic_resampling(ImportanceSample(np.zeros((500, 1)), weights, 0.0), 900, rng)
+    )
     times = np.pad(times, (0, 500 - len(times)))
     assert times.sum() == 900
     assert (np.abs(times - 900 * weights) < 1.0).all()

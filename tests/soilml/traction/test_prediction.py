@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_case
-from soilml.case import Case
+from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.traction import Draws, band, prior_draws, traction
-from soilml.traction.prospect import asked_slips, driven_loads, prospects
-from soilml.traction.words import Driven
+from soilml.traction import SoilDraws, prior_draws, quantile_band, traction
+from soilml.traction.by_load import asked_slips, driven_loads, predictions_by_load
+from soilml.traction.messages import DrivenRange
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
-EVERYWHERE = Driven((0.0, 0.99), (1.0, 1e4))
+EVERYWHERE = DrivenRange((0.0, 0.99), (1.0, 1e4))
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 
 
@@ -21,7 +21,7 @@ def case(model_file):
 
 
 def soils(*rows):
-    return Draws(NAMES, np.asarray(rows, dtype=float))
+    return SoilDraws(NAMES, np.asarray(rows, dtype=float))
 
 
 def with_effect(case, effect):
@@ -53,14 +53,14 @@ def test_a_heavier_wheel_pulls_more_and_climbs_less(case):
 
 def test_a_light_wheel_on_sticky_soil_climbs_walls_which_is_doubted(case):
     sticky = soils((2e4, 0.7, 0.002))
-    (one,) = prospects(case, sticky, sticky, [5.0], SLIPS, EVERYWHERE)
+    (one,) = predictions_by_load(case, sticky, sticky, [5.0], SLIPS, EVERYWHERE)
     assert one.known.steepest[0] == pytest.approx(1.5)
     assert any("vehicles tip before" in text for text in one.warnings)
 
 
 def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
     one = (900.0, 0.6, 0.012)
-    found = band(traction(case, soils(one, one, one), 60.0, SLIPS).pull)
+    found = quantile_band(traction(case, soils(one, one, one), 60.0, SLIPS).pull)
     true = case.with_values(dict(zip(NAMES, one, strict=True)))
     pull = true.model(true.soil, Operating(slip=SLIPS, load=60.0)).drawbar_pull
     for part in (found.lower, found.middle, found.upper):
@@ -88,45 +88,47 @@ def test_the_best_slip_is_inside_where_digging_costs_more_than_slip_brings(case)
 
 def test_the_prior_alone_is_said_to_tell_nothing(case):
     before = prior_draws([free_of(case, name) for name in NAMES], 60)
-    (one,) = prospects(case, before, before, [60.0], SLIPS, EVERYWHERE)
+    (one,) = predictions_by_load(case, before, before, [60.0], SLIPS, EVERYWHERE)
     assert one.left == (1.0, 1.0)
     assert sum("is not known" in text for text in one.warnings) == 2
-    (sure,) = prospects(case, soils((900.0, 0.6, 0.012)), before, [60.0], SLIPS, EVERYWHERE)
+    (sure,) = predictions_by_load(
+        case, soils((900.0, 0.6, 0.012)), before, [60.0], SLIPS, EVERYWHERE
+    )
     assert sure.left == (0.0, 0.0)
     assert not any("known" in text for text in sure.warnings)
 
 
 def free_of(case, name):
-    from soilml.identification.free import chosen
+    from soilml.identification.free_parameters import select_free
 
-    return chosen(case, [name])[0]
+    return select_free(case, [name])[0]
 
 
 def test_what_was_not_driven_is_said(case):
     one = soils((900.0, 0.6, 0.012))
-    driven = Driven((0.3, 0.35), (50.0, 60.0))
-    (far,) = prospects(case, one, one, [120.0], SLIPS, driven)
+    driven = DrivenRange((0.3, 0.35), (50.0, 60.0))
+    (far,) = predictions_by_load(case, one, one, [120.0], SLIPS, driven)
     text = " ".join(far.warnings)
     for said in ("no slip above 0.35", "no slip below 0.3", "no load above 60 N", "asked is 120 N"):
         assert said in text
-    (near,) = prospects(case, one, one, [55.0], np.asarray([0.3, 0.4]), driven)
+    (near,) = predictions_by_load(case, one, one, [55.0], np.asarray([0.3, 0.4]), driven)
     assert not any("was driven" in said for said in near.warnings)
 
 
 def test_a_load_that_the_soil_does_not_carry_is_refused_with_what_it_carries(case):
     one = soils((900.0, 0.6, 0.012))
     with pytest.raises(InputError, match="at most about") as refused:
-        prospects(case, one, one, [1e6], SLIPS, EVERYWHERE)
+        predictions_by_load(case, one, one, [1e6], SLIPS, EVERYWHERE)
     limit = float(str(refused.value).split("at most about ")[1].split(" N")[0])
-    prospects(case, one, one, [0.9 * limit], SLIPS[:1], EVERYWHERE)
+    predictions_by_load(case, one, one, [0.9 * limit], SLIPS[:1], EVERYWHERE)
 
 
 def test_soils_that_do_not_carry_the_load_are_left_out_and_counted(case):
-    draws = Draws(("kphi",), np.asarray([[1.5e6], [1.5e6], [1e4]]))
-    (one,) = prospects(case, draws, draws, [60.0], SLIPS, EVERYWHERE)
+    draws = SoilDraws(("kphi",), np.asarray([[1.5e6], [1.5e6], [1e4]]))
+    (one,) = predictions_by_load(case, draws, draws, [60.0], SLIPS, EVERYWHERE)
     assert one.known.sunk == pytest.approx(1 / 3)
     assert any("do not carry 60 N" in text for text in one.warnings)
-    assert np.isfinite(band(one.known.pull).lower).all()
+    assert np.isfinite(quantile_band(one.known.pull).lower).all()
     assert np.isnan(one.known.steepest[2]) and np.isnan(one.known.best_slip[2])
 
 
@@ -138,7 +140,7 @@ def test_loads_of_rows_that_are_alike_are_one():
 
 def test_slips_end_where_asked():
     assert asked_slips(0.3, EVERYWHERE)[-1] == 0.3
-    assert asked_slips(None, Driven((0.1, 0.2), (1.0, 2.0)))[-1] == 0.6
+    assert asked_slips(None, DrivenRange((0.1, 0.2), (1.0, 2.0)))[-1] == 0.6
     for limit in (0.0, 1.0, -0.2, float("nan")):
         with pytest.raises(InputError, match="between 0 and 1"):
             asked_slips(limit, EVERYWHERE)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from soilml import Operating, SlipSinkage, read_case
-from soilml.noise import Noise
-from soilml.table import Table
+from soilml.config.measurement_noise import Noise
+from soilml.io.table import Table
 from soilml.traction.report import pull_report
 
 
@@ -28,4 +28,4 @@ def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(cas
     same, digging = found["same"], found["digging"]
     assert not any("lacks something" in text for text in same.warnings)
     assert any("lacks something" in text for text in digging.warnings)
-    assert digging.prospects[0].left[0] > 2.0 * same.prospects[0].left[0]
+    assert digging.by_load[0].left[0] > 2.0 * same.by_load[0].left[0]

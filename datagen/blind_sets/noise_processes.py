@@ -1,0 +1,69 @@
+"""How the readings of a hidden set stray from the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from datagen.blind_sets.wheel_state import Floats
+
+#: Constant part of the noise in a column's unit, for each percent of the reading: drawbar pull
+#: passes through zero.
+FLOOR = {"torque_Nm": 0.0, "drawbar_pull_N": 0.2, "sinkage_m": 0.0}
+CHANNELS = tuple(FLOOR)
+#: Correlation of a sample with the one before, in tier N2.
+RHO = 0.7
+#: Share of readings that are outliers in tier N3, and how many standard deviations they are off.
+OUTLIERS, FAR = 0.02, 8.0
+#: Declared noise / true noise in tier N4.
+UNDERSTATED = 0.85
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Noise of one channel as it is declared: a share of the reading and a constant."""
+
+    share: float
+    constant: float
+
+    def std(self, true: Floats) -> Floats:
+        """One standard deviation at these true readings (n,), in their unit."""
+        return np.asarray(np.hypot(self.constant, self.share * np.abs(true)))
+
+    def as_setting(self) -> str:
+        """As a model file writes it."""
+        floor = f" + {self.constant:g}" if self.constant else ""
+        return f"{100.0 * self.share:g} %{floor}"
+
+
+def sensors(level: float) -> dict[str, Sensor]:
+    """The sensors of a set whose noise is `level`, a share of the reading (0.01 is 1 %)."""
+    return {name: Sensor(level, 100.0 * level * floor) for name, floor in FLOOR.items()}
+
+
+def strayed(
+    true: Floats,
+    sensor: Sensor,
+    run: NDArray[np.int64],
+    tier: str,
+    generator: np.random.Generator,
+) -> Floats:
+    """Readings (n,) of true values; `run` numbers the run of each row, in the order of sampling.
+
+    Each tier strays in its own way: N2 from sample to sample, N3 with outliers, N4 by more than is
+    declared, all others independently by what is declared.
+    """
+    std = sensor.std(true)
+    unit = generator.standard_normal(true.size)
+    if tier == "N2":
+        for i in range(1, true.size):
+            if run[i] == run[i - 1]:
+                unit[i] = RHO * unit[i - 1] + np.sqrt(1.0 - RHO**2) * unit[i]
+    if tier == "N3":
+        struck = generator.random(true.size) < OUTLIERS
+        unit = np.where(struck, FAR * np.where(unit < 0.0, -1.0, 1.0), unit)
+    if tier == "N4":
+        unit = unit / UNDERSTATED
+    return np.asarray(true + std * unit)

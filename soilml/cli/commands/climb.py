@@ -1,0 +1,190 @@
+"""`soilml climb`: what a rover can climb on ground that it has only begun to drive."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from math import pi
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from soilml.cli.output import put, watched
+from soilml.errors import InputError
+from soilml.io.atomic_files import made_folder, named, replacing_all, save_text
+from soilml.io.text_tables import aligned, csv_text
+
+if TYPE_CHECKING:
+    from soilml.systems.climbing.ability import Band
+    from soilml.systems.climbing.files.report import ClimbingReport
+
+#: What a folder gets.
+FILES = ("climb.json", "curve.csv", "climbs.csv")
+#: Slips of the printed curve.
+SHOWN = 9
+#: Units for people: factor and name.
+_UNITS = {"rad": (180.0 / pi, "deg"), "m": (1e3, "mm")}
+
+HELP = "steepest slope a rover with force sensors in its wheels can climb"
+DESCRIPTION = """\
+From climbs of gentle slopes and the stress on the rims of a front and a rear wheel: cohesion,
+friction angle and shear modulus of the ground, drawbar pull against slip, and the steepest slope.
+
+  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv
+  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv --slip-limit 0.3 --out DIR
+
+ROVER.toml: [rover] mass, radius, width (kg, m), and where known front_share of the weight and
+height_ratio of the centre of mass to the wheelbase; [soil] cohesion = 0.0 for what is given,
+[soil.prior] shear_modulus = [0.001, 0.05] for what is sought; [noise] speed_m_s = "0.9 %",
+slope_rad = 0.005, normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load. Of four wheels.
+
+RUNS.csv: run, wheel (front or rear), slope_rad, and slip or speed_m_s and rim_speed_m_s; one row
+for each wheel of each steady climb, each repetition a run. STRESS.csv: run, wheel, angle_rad,
+normal_Pa, a row for each sample; slip too where the run is no climb (artificial slip on the flat).
+Each slope brings one equation: three unknowns need three slopes. Bands hold nine tenths of what
+noise leaves possible.
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("rover", metavar="ROVER.toml")
+    parser.add_argument("runs", metavar="RUNS.csv", help="climbs, CSV or Parquet")
+    parser.add_argument("--stress", metavar="STRESS.csv", required=True, help="stress on the rims")
+    parser.add_argument(
+        "--slip-limit", type=float, metavar="S", help="steepest slope at slips up to this, too"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of all draws; 0 by default")
+    parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
+    parser.add_argument("--out", metavar="DIR", help="folder for three files, or FILE.json")
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes, where their folder is there already."""
+    if args.out is None or args.out.lower().endswith(".json"):
+        return named(args.out, ".json")
+    if not args.out:
+        raise InputError("--out is empty; needed is a folder, or a name ...json")
+    folder = Path(args.out)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {args.out} is a file; needed is a folder, or a name ...json")
+    return [folder / name for name in FILES] if folder.is_dir() else []
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify, predict and deliver."""
+    from soilml.systems.climbing.files.read_tables import read_driven
+    from soilml.systems.climbing.files.report import climbing_report
+    from soilml.systems.climbing.files.rover_file import read_rover
+
+    if args.seed < 0:
+        raise InputError(f"--seed is {args.seed}; needed is a whole number, 0 or more")
+    if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
+        raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip from 0 to 1")
+    file = read_rover(args.rover)
+    driven = read_driven(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
+    report = climbing_report(file, driven, slip_limit=args.slip_limit, seed=args.seed)
+    text = json.dumps(report.as_json(), indent=2, allow_nan=False) + "\n"
+    if args.out is None and not watched():
+        put(text)
+        return 0
+    if args.out is not None and args.out.lower().endswith(".json"):
+        save_text(args.out, text)
+    elif args.out is not None:
+        texts = (text, csv_text(_curve(report)), csv_text(_runs(report)))
+        with (
+            made_folder(args.out) as folder,
+            replacing_all([folder / name for name in FILES]) as parts,
+        ):
+            for part, content in zip(parts, texts, strict=True):
+                part.write_text(content, encoding="utf-8")
+    print(_for_people(report))
+    return 0
+
+
+def _curve(report: ClimbingReport) -> dict[str, Any]:
+    pull, slope = report.pull, report.slope
+    return {
+        "slip": report.ability.slip,
+        "drawbar_pull_N": pull.middle,
+        "drawbar_pull_N_p05": pull.lower,
+        "drawbar_pull_N_p95": pull.upper,
+        "slope_rad": slope.middle,
+        "slope_rad_p05": slope.lower,
+        "slope_rad_p95": slope.upper,
+    }
+
+
+def _runs(report: ClimbingReport) -> dict[str, Any]:
+    from soilml.systems.climbing.files.report import SPEED_ERROR
+
+    climbs = report.driven.climbs
+    return {
+        "run": [c.name for c in climbs],
+        "slope_rad": [c.slope for c in climbs],
+        "slip_front": [c.front.slip for c in climbs],
+        "slip_rear": [c.rear.slip for c in climbs],
+        "off_N": report.ground.off,
+        "off_N_std": report.ground.off_std,
+        "shear_modulus_m_if_speed_low": report.each[-SPEED_ERROR],
+        "shear_modulus_m": report.each[0.0],
+        "shear_modulus_m_if_speed_high": report.each[SPEED_ERROR],
+    }
+
+
+def _for_people(report: ClimbingReport) -> str:
+    from soilml.systems.climbing.ability import band
+
+    fit, ability = report.ground.fit, report.ability
+    best, where = band(ability.steepest), band(ability.steepest_slip)
+    found = [
+        f"steepest slope {_of_band(best, _UNITS['rad'][0], '.1f')} deg, at slip "
+        f"{_of_band(where, 1.0, '.2f')}"
+    ]
+    if report.slip_limit is not None:
+        within = band(ability.steepest_within(report.slip_limit))
+        text = _of_band(within, _UNITS["rad"][0], ".1f")
+        found.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
+    climbs, slopes = fit.rows_used, report.ground.slopes
+    parts = [
+        f"{climbs} climb{'s'[: climbs > 1]} on {slopes} slope{'s'[: slopes > 1]}",
+        aligned(("parameter", "value", "std", "unit", "left of range"), _parameters(report)),
+        aligned(
+            ("slip", "pull_N", "p05", "p95", "slope_deg", "p05", "p95"),
+            [_point(report, i * (len(ability.slip) - 1) // (SHOWN - 1)) for i in range(SHOWN)],
+            text_columns=0,
+        ),
+        "\n".join(found),
+        "\n".join(f"! {text}" for text in report.warnings),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _parameters(report: ClimbingReport) -> list[tuple[str, ...]]:
+    from soilml.identification.diagnostics import NOT
+
+    fit = report.ground.fit
+    rows: list[tuple[str, ...]] = []
+    units = {"cohesion": "Pa", "friction_angle": "rad", "shear_modulus": "m"}
+    for (name, unit), value in zip(units.items(), report.ground.shear, strict=True):
+        factor, shown = _UNITS.get(unit, (1.0, unit))
+        if name in fit.names:
+            std = f"{factor * fit.std[fit.names.index(name)]:.2g}"
+            left = fit.left[name]
+            said = "not identified" if left > NOT else f"{factor * value:.4g}"
+            rows.append((name, said, std, shown, f"{left:.0%}"))
+        else:
+            rows.append((name, f"{factor * value:.4g}", "given", shown, ""))
+    return rows
+
+
+def _point(report: ClimbingReport, i: int) -> tuple[str, ...]:
+    """A line of the curve."""
+    cells = [f"{report.ability.slip[i]:.3f}"]
+    for values, factor in ((report.pull, 1.0), (report.slope, _UNITS["rad"][0])):
+        cells += [f"{factor * v[i]:.1f}" for v in (values.middle, values.lower, values.upper)]
+    return tuple(cells)
+
+
+def _of_band(found: Band, factor: float, form: str) -> str:
+    low, middle, high = (factor * float(v) for v in (found.lower, found.middle, found.upper))
+    return f"{middle:{form}} ({low:{form}} to {high:{form}})"

@@ -1,0 +1,127 @@
+"""`soilml papers`: every printed number of the source papers beside the computed one."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import textwrap
+from collections import Counter
+from pathlib import Path
+
+from soilml.cli.output import deliver, watched
+from soilml.io.atomic_files import named
+from soilml.io.text_tables import aligned
+from soilml.optional_imports import need
+from soilml.papers import PAPERS, TITLES
+from soilml.papers.published import Compared, published
+
+HELP = "the source papers' printed numbers beside the computed ones"
+DESCRIPTION = """\
+Compute what the source papers print as numbers, and show it beside what they print.
+
+  soilml papers                        all; takes about ten seconds
+  soilml papers nagatani2009           one paper
+  soilml papers comin2017 --all        every number, also those that nothing computes
+  soilml papers --out papers.csv       every number, for programs
+
+holds: yes           computed, and the difference is within the tolerance
+       known         computed, and known to miss it: the reason stands under the table
+       NO            computed, should be within the tolerance, and is not: exit status 1
+       given         an input that the model keeps as printed; no result
+       not computed  rests on measurements or settings that are not printed: the reason is given
+
+Tolerance is the largest difference allowed, in the number's unit or in per cent of it.
+"""
+WIDTH = 110
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("paper", nargs="?", help=f"one of: {', '.join(PAPERS)}")
+    parser.add_argument("--all", action="store_true", help="a line for every number")
+    parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return named(args.out, ".csv")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compute and deliver the table."""
+    need("scipy", "papers")
+    rows = list(published(args.paper))
+    found = []
+    for i, row in enumerate(rows):
+        if sys.stderr.isatty():
+            print(
+                f"\r\033[K{i + 1}/{len(rows)} {row.what[:60]}", end="", file=sys.stderr, flush=True
+            )
+        found.append(row.compared())
+    if sys.stderr.isatty():
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    if args.out is not None or not watched():
+        deliver(_columns(found), args.out)
+    else:
+        papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
+        print("\n\n".join(_page(paper, its, args.all) for paper, its in papers.items()), end="\n\n")
+    count = Counter(c.said for c in found)
+    print(
+        f"{len(found)} printed numbers: {count['yes']} reproduced within their tolerance, "
+        f"{count['known']} known to miss it, {count['NO']} wrong; {count['given']} inputs kept as "
+        f"printed; {count['not computed']} that nothing computes",
+        file=sys.stderr,
+    )
+    return 1 if count["NO"] else 0
+
+
+def _page(paper: str, found: list[Compared], every: bool) -> str:
+    """One paper as an aligned table with the reasons under it; the rest in a line a reason."""
+    shown = [c for c in found if every or c.said in ("yes", "known", "NO")]
+    notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
+    lines = []
+    for c in shown:
+        row = c.row
+        mark = f" [{notes.index(row.reason) + 1}]" if row.reason else ""
+        allowed = f"{100 * row.tolerance:.3g} %" if row.relative else f"{row.tolerance:.3g}"
+        computed = "" if math.isnan(c.computed) else f"{c.computed:.4g}"
+        numbers = (f"{row.published:.4g}", computed, "" if c.said == "not computed" else allowed)
+        lines.append((f"{c.said}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
+    header = ("holds", "unit", "printed", "computed", "tolerance", "what (where)")
+    page = [TITLES[paper], aligned(header, lines, text_columns=2, last_left=True)]
+    page += [_wrapped(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
+    return "\n".join(page + ([] if every else _rest(found)))
+
+
+def _rest(found: list[Compared]) -> list[str]:
+    """What the table leaves out: inputs, and numbers that nothing computes, by reason."""
+    given = [c.row.what for c in found if c.said == "given"]
+    said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
+    why: dict[str, list[str]] = {}
+    for c in found:
+        if c.said == "not computed":
+            why.setdefault(c.row.reason, []).append(c.row.source)
+    for reason, sources in why.items():
+        where = "; ".join(dict.fromkeys(sources))
+        said.append(_wrapped(f"{len(sources)} not computed ({where}): {reason}"))
+    return said
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+
+
+def _columns(found: list[Compared]) -> dict[str, list[object]]:
+    return {
+        "paper": [c.row.paper for c in found],
+        "key": [c.row.key for c in found],
+        "what": [c.row.what for c in found],
+        "source": [c.row.source for c in found],
+        "unit": [c.row.unit for c in found],
+        "holds": [c.said for c in found],
+        "reason": [c.row.reason for c in found],
+        "published": [c.row.published for c in found],
+        "computed": [c.computed for c in found],
+        "allowed": [c.row.allowed for c in found],
+    }

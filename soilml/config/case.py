@@ -1,0 +1,152 @@
+"""A case: gear, soil, what is known of them beforehand, and the sensors; a model file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any
+
+from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.prior import take_prior
+from soilml.errors import InputError
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.numerics.prior import Prior
+from soilml.parameters import Parameter, check, declared, located, with_values
+from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.gears import GEARS
+from soilml.physics.model import Model
+from soilml.physics.soils import Soil, soil
+from soilml.quantities import COLUMNS
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model on a soil, with priors by parameter path and sensor noise by column.
+
+    Paths are those of `parameters()`: `cohesion`, `kphi`, `gear.radius`, `slip-sinkage.n1`.
+    """
+
+    model: Model
+    soil: Soil
+    prior: dict[str, Prior] = field(default_factory=dict)
+    noise: dict[str, Noise] = field(default_factory=dict)
+
+    def parameters(self) -> dict[str, tuple[Parameter, Any]]:
+        """Every parameter by path, with its declaration and its value."""
+        own = located(self.soil)
+        for path, entry in located(self.model).items():
+            own[path.removeprefix("effects.")] = entry
+        return own
+
+    def with_values(self, new: dict[str, Any]) -> Case:
+        """The same case with some parameters replaced, by path."""
+        unknown = sorted(new.keys() - self.parameters().keys())
+        if unknown:
+            raise InputError(
+                f"no parameter {unknown[0]!r}; this model has: {', '.join(self.parameters())}"
+            )
+        soils = located(self.soil)
+        model = {
+            path if path.startswith("gear.") else f"effects.{path}": value
+            for path, value in new.items()
+            if path not in soils
+        }
+        return Case(
+            model=with_values(self.model, model),
+            soil=with_values(self.soil, {p: v for p, v in new.items() if p in soils}),
+            prior=self.prior,
+            noise=self.noise,
+        )
+
+
+def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
+    """The case in a TOML file; raises `InputError` naming file, table and key.
+
+    `effects` are those that [[effect]] may name.
+    """
+    settings = read_settings(path)
+    case = take_case(settings, effects)
+    settings.finish()
+    return case
+
+
+def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
+    """Read [gear], [soil], [[effect]] and [noise], leaving other keys to the caller."""
+    gear_settings = settings.table("gear")
+    kind = gear_settings.text("type")
+    if kind not in GEARS:
+        gear_settings.fail(f"type is {kind!r}; there are: {', '.join(GEARS)}")
+    gear = _filled(GEARS[kind], gear_settings)
+    gear_settings.finish()
+    the_soil, prior = _take_soil(settings.table("soil"))
+    model = Model(gear)
+    for entry in settings.tables("effect"):
+        name = entry.text("name")
+        if name not in effects:
+            entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
+        priors = entry.table("prior")
+        try:
+            model = model + _filled(effects[name], entry)
+        except InputError as error:
+            entry.fail(str(error).removeprefix(f"{entry.where}: "))
+        entry.finish()
+        prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, effects[name]).items()}
+    noise = {}
+    noise_settings = settings.table("noise")
+    noise_settings.knows(COLUMNS)
+    for key in COLUMNS:
+        if key in noise_settings:
+            noise[key] = take_noise(noise_settings, key)
+    noise_settings.finish()
+    return Case(model=model, soil=the_soil, prior=prior, noise=noise)
+
+
+def _filled(cls: type, settings: Settings) -> Any:
+    """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
+    given = {
+        f.name: settings.number(f.name)
+        for f in fields(cls)
+        if f.name in settings or f.default is MISSING
+    }
+    settings.knows(declared(cls))
+    try:
+        made = cls(**given)
+    except InputError as error:
+        settings.fail(str(error))
+    check(made, f"{settings.where}: ")
+    return made
+
+
+def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
+    priors = settings.table("prior")
+    if "name" in settings:
+        name = settings.text("name")
+        try:
+            base = soil(name)
+        except InputError as error:
+            settings.fail(str(error))
+        given = {k: settings.number(k) for k in declared(Soil) if k in settings}
+        settings.knows(declared(Soil))
+        made = with_values(base, given)
+        check(made, f"{settings.where}: ")
+    else:
+        made = _filled(Soil, settings)
+    settings.finish()
+    return made, _take_priors(priors, Soil)
+
+
+def _take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
+    found = {}
+    settings.knows(declared(cls))
+    for key, parameter in declared(cls).items():
+        if key in settings:
+            prior = take_prior(settings, key)
+            if not parameter.lower <= prior.lower < prior.upper <= parameter.upper:
+                settings.fail(
+                    f"{key} is [{prior.lower:g}, {prior.upper:g}]; it must lie between "
+                    f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
+                )
+            found[key] = prior
+    settings.finish()
+    return found

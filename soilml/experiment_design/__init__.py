@@ -1,0 +1,26 @@
+"""Which measurement to make next: what each would leave open, and what none has told yet."""
+
+from soilml.experiment_design.candidate_rows import CandidateGrid, CandidateRow, candidate_grid
+from soilml.experiment_design.design import Advice, RatedRow, advise
+from soilml.experiment_design.messages import abstention_message, is_identified
+from soilml.experiment_design.parameter_samples import (
+    ParameterSamples,
+    samples_of_moments,
+    samples_of_prior,
+    samples_of_rows,
+)
+
+__all__ = [
+    "Advice",
+    "CandidateGrid",
+    "CandidateRow",
+    "ParameterSamples",
+    "RatedRow",
+    "abstention_message",
+    "advise",
+    "candidate_grid",
+    "is_identified",
+    "samples_of_moments",
+    "samples_of_prior",
+    "samples_of_rows",
+]

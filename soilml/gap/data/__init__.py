@@ -1,0 +1,1 @@
+"""Readings as vectors, and the checks that they must pass before an analysis."""

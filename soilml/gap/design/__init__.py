@@ -1,0 +1,1 @@
+"""Experiments for a gap analysis: discriminating runs and the identifiability audit."""

@@ -1,0 +1,1 @@
+"""Search for missing effects: candidate fits, stepwise selection, cross-validation, verdict."""

@@ -1,0 +1,1 @@
+"""Statistics of a gap analysis: generalised least squares, covariance, score tests, signatures."""

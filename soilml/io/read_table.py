@@ -1,0 +1,190 @@
+"""Reading tables, with every fault named by file, line and column."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from soilml.errors import TableError
+from soilml.io.parquet import own_columns, plain_column, read_parquet
+from soilml.io.table import TEXT, Column, Table
+from soilml.quantities import COLUMNS
+
+#: What a table of measured runs must hold; a blank cell is not measured.
+RUNS = ("run", "slip", "load_N", "torque_Nm")
+#: Columns in which every row must have a value.
+FILLED = ("run", "slip", "load_N")
+#: column -> (lower, upper, what is needed); a number must lie strictly between.
+_LIMITS = {
+    "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a share and not in percent"),
+    "load_N": (0.0, np.inf, "a load above zero, in N"),
+    "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
+    "slip_angle_rad": (-3.2, 3.2, "an angle in rad"),
+    "slope_rad": (-1.4, 1.4, "a slope in rad, positive uphill"),
+    "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
+    "wheel_radius_m": (0.0, np.inf, "a radius above zero, in m"),
+    "wheel_width_m": (0.0, np.inf, "a width above zero, in m"),
+}
+
+
+def read_table(
+    path: str | os.PathLike[str],
+    need: Sequence[str] = (),
+    *,
+    filled: Sequence[str] = FILLED,
+    ignore_extra: bool = False,
+) -> Table:
+    """A CSV or Parquet file of measured rows; raises `TableError` for the first fault.
+
+    `need` names columns that must be there, `filled` those that may not have blank cells. A column
+    that soilml does not know is an error unless `ignore_extra`: a misspelt one would otherwise be
+    dropped in silence.
+    """
+    file = Path(path)
+    read = _read_parquet if file.suffix == ".parquet" else _read_csv
+    try:
+        table = read(file, ignore_extra)
+    except FileNotFoundError:
+        raise TableError(f"{file}: there is no such file") from None
+    except OSError as error:
+        raise TableError(f"{file} cannot be read: {error.strerror or error}") from None
+    for name in need:
+        if name not in table:
+            raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
+    if len(table) == 0:
+        raise TableError(f"{file}: there is a header but no row")
+    _check_values(table, filled)
+    return table
+
+
+def _read_csv(file: Path, ignore_extra: bool) -> Table:
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TableError(f"{file} cannot be read as text: {error}") from None
+    if "\0" in text:
+        raise TableError(f"{file} is not a CSV file: it holds binary data")
+    reader = csv.reader(io.StringIO(text))
+    try:
+        header = [name.strip() for name in next(reader)]
+    except StopIteration:
+        raise TableError(f"{file} is empty; needed is a header: {', '.join(RUNS)}, ...") from None
+    kept = _known_columns(file, header, ignore_extra)
+    cells: dict[str, list[str]] = {name: [] for name in kept}
+    lines = []
+    try:
+        for row in reader:
+            if not any(cell.strip() for cell in row):
+                continue
+            if len(row) != len(header):
+                raise TableError(
+                    f"{file} line {reader.line_num}: {len(row)} cells, the header has {len(header)}"
+                )
+            lines.append(reader.line_num)
+            for name, cell in zip(header, row, strict=True):
+                if name in cells:
+                    cells[name].append(cell.strip())
+    except csv.Error as error:
+        raise TableError(f"{file} line {reader.line_num}: {error}") from None
+    columns = {name: _column(file, name, column, lines) for name, column in cells.items()}
+    return Table(columns, str(file), np.asarray(lines, dtype=np.int64))
+
+
+def _known_columns(
+    file: Path, header: list[str], ignore_extra: bool, own: Sequence[str] = ()
+) -> list[str]:
+    kept = []
+    for name in header:
+        if header.count(name) > 1:
+            raise TableError(f"{file}: column {name} stands twice")
+        base = name.removesuffix("_std")
+        if name in own or (base in COLUMNS and (base == name or base not in TEXT)):
+            kept.append(name)
+        elif hint := _misnamed(name):
+            raise TableError(f"{file}: column {name!r}: {hint}")
+        elif not ignore_extra:
+            raise TableError(
+                f"{file}: column {name!r} is not known; take it out, or pass --ignore-extra"
+            )
+    return kept
+
+
+def _misnamed(name: str) -> str:
+    """What a column's name should have been, in words; nothing where it is like no other."""
+    if ";" in name or "\t" in name:
+        return "the separator must be a comma"
+    for quantity in COLUMNS.values():
+        if name == quantity.name:
+            return f"the unit is missing, name it {quantity.column}"
+        if quantity.unit == "-" or len(quantity.name) <= 2:
+            continue
+        if name.startswith(f"{quantity.name}_"):
+            return (
+                f"{quantity.name.replace('_', ' ')} is read in {quantity.unit}; "
+                f"convert it and name the column {quantity.column}"
+            )
+    near = difflib.get_close_matches(name.lower(), [c.lower() for c in COLUMNS], 1, 0.75)
+    if near:
+        return f"did you mean {next(c for c in COLUMNS if c.lower() == near[0])!r}?"
+    return ""
+
+
+def _column(file: Path, name: str, cells: list[str], lines: list[int]) -> Column:
+    if name in TEXT:
+        return np.asarray(cells, dtype=np.str_)
+    values = np.full(len(cells), np.nan)
+    for i, cell in enumerate(cells):
+        if cell:
+            try:
+                values[i] = float(cell)
+            except ValueError:
+                values[i] = np.inf
+            if not np.isfinite(values[i]):
+                raise TableError(
+                    f"{file} line {lines[i]}, column {name}: {cell!r} is not a number; "
+                    "needed is a finite number, or nothing where it was not measured"
+                )
+    return values
+
+
+def _check_values(table: Table, filled: Sequence[str]) -> None:
+    for name, values in table.columns.items():
+        if name in TEXT:
+            bad, needed = values == "", "a name"
+            blank = bad
+        else:
+            low, high, needed = _LIMITS.get(name, (-np.inf, np.inf, "a number"))
+            if name.endswith("_std"):
+                low, needed = 0.0, "a standard deviation above zero"
+            blank = np.isnan(values)
+            bad = ~blank & ~((values > low) & (values < high))
+        if name in filled and blank.any():
+            row = int(np.argmax(blank))
+            raise TableError(f"{table.place(row)}, column {name}: is blank; needed is {needed}")
+        if name not in TEXT and bad.any():
+            row = int(np.argmax(bad))
+            raise TableError(
+                f"{table.place(row)}, column {name}: {values[row]:g} given; needed is {needed}"
+            )
+
+
+def _instead(name: str, table: Table) -> str:
+    if name == "torque_Nm":
+        return " add it, with blank cells where torque was not measured"
+    if name == "run":
+        return " add it, with one name for all rows that were driven together"
+    return f" found: {', '.join(table.columns) or 'no column'}"
+
+
+def _read_parquet(file: Path, ignore_extra: bool) -> Table:
+    found, metadata = read_parquet(file)
+    kept = _known_columns(file, list(found), ignore_extra, own_columns(metadata))
+    columns = {name: plain_column(file, name, found[name]) for name in kept}
+    rows = len(next(iter(found.values()))) if found else 0
+    return Table(columns, str(file), np.arange(1, rows + 1), metadata)

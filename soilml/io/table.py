@@ -1,0 +1,96 @@
+"""Tables of measurements: columns whose names carry their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import TableError
+from soilml.row_status import Status
+
+Column = NDArray[Any]
+
+#: Columns that hold text; all others hold numbers, NaN where a cell is blank.
+TEXT = ("run", "status", "source", "wheel")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of one length, by name; `line` is where each row stands in its file."""
+
+    columns: dict[str, Column]
+    source: str = "table"
+    line: Column = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    metadata: dict[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()))) if self.columns else 0
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def __getitem__(self, name: str) -> Column:
+        if name not in self.columns:
+            raise TableError(f"{self.source}: column {name} is missing; found: {self._found()}")
+        return self.columns[name]
+
+    def _found(self) -> str:
+        return ", ".join(self.columns) or "no column"
+
+    @property
+    def answered(self) -> NDArray[np.bool_]:
+        """Rows whose status, where there is one, is not that they have no answer."""
+        if "status" not in self:
+            return np.ones(len(self), dtype=bool)
+        return np.isin(self["status"], ("", Status.OK.reason))
+
+    def rows(self, index: Column) -> Table:
+        """The rows of a boolean mask or of indices, in that order."""
+        return Table(
+            {name: values[index] for name, values in self.columns.items()},
+            self.source,
+            self.line[index] if len(self.line) else self.line,
+            self.metadata,
+        )
+
+    def where(self, name: str, value: str) -> Table:
+        """The rows whose column `name` has this value; raises `TableError` where there are none."""
+        column = self[name]
+        if name in TEXT:
+            mask = column == value
+        else:
+            try:
+                mask = column == float(value)
+            except ValueError:
+                raise TableError(
+                    f"{self.source}: column {name} holds numbers, {value!r} is none"
+                ) from None
+        if not mask.any():
+            some = ", ".join(str(v) for v in np.unique(column)[:6])
+            raise TableError(f"{self.source}: no row has {name} = {value}; there are: {some}, ...")
+        return self.rows(mask)
+
+    def groups(self, name: str = "run") -> Iterator[tuple[str, Table]]:
+        """(value, rows) for each value of a column, in order of first appearance.
+
+        Raises `TableError` for a blank cell: its row belongs to no group.
+        """
+        column = self[name]
+        blank = column == "" if name in TEXT else np.isnan(column)
+        if blank.any():
+            place = self.place(int(np.argmax(blank)))
+            raise TableError(f"{place}, column {name}: is blank; rows cannot be grouped by it")
+        values, first, code = np.unique(column, return_index=True, return_inverse=True)
+        order = np.argsort(code, kind="stable")
+        ends = np.cumsum(np.bincount(code))
+        members = np.split(order, ends[:-1])
+        for position in np.argsort(first):
+            yield str(values[position]), self.rows(members[position])
+
+    def place(self, row: int) -> str:
+        """Where a row stands, for a message."""
+        return f"{self.source} line {self.line[row]}" if len(self.line) else f"row {row + 1}"

@@ -1,0 +1,1 @@
+"""Mathematics that knows no soil: roots, quadrature, sampling, fusion of estimates."""

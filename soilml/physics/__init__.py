@@ -1,0 +1,1 @@
+"""The forward model: load case to equilibrium to forces."""

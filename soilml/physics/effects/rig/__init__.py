@@ -1,0 +1,1 @@
+"""Effects whose cause sits in the test rig."""

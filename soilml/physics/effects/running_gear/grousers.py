@@ -1,0 +1,51 @@
+"""Grousers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Real
+from soilml.parameters import Parameter
+from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.load_case import LoadCase
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Grousers(SlipLoadScaling):
+    r"""Lugs carry the soil between them around: it shears further out than the rim.
+
+    .. math:: r_s = r + \lambda h
+
+    in the shear displacement and in the lever arm of the torque. The displacement, as the source
+    prints it, is that of a cylinder of radius r_s: the slip must be that of the shearing radius,
+    1 - v / (r_s omega). Slip reckoned with the rim's radius r is converted by
+    1 - s' = (1 - s) r / r_s; left as it is, the thrust at small slip comes out too low: for
+    r = 0.15 m, h = 10 mm in dry sand under 60 N at s = 0.1 of the rim, T = 1.30 N m where the
+    converted slip of 0.143 gives 1.59. References: Ding, Gao, Deng,
+    Nagatani and Yoshida, J. Terramechanics 48(1), 2011, shearing radius, lambda 0.5 to 1. For lugs
+    so close that the soil between them moves with the wheel. The passive thrust of single lugs
+    (Wong, Theory of Ground Vehicles, chapter 2) is the other limit, for lugs far apart; the two
+    must not be added, and with all lugs at full passive failure it asks for several times the
+    drawbar pull that small lugged wheels show.
+    """
+
+    name: ClassVar[str] = "grousers"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="lugs carry the soil around: it shears further out than the rim",
+        source="Ding et al. 2011, J. Terramechanics 48(1)",
+        kind="wheel",
+        wheel=True,
+        reference={"height": 0.01},
+        signs={"torque": +1, "drawbar_pull": +1},
+        isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
+    )
+    height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a lug above the rim")] = 0.0
+    shearing: Annotated[Real, Parameter("1", 0.0, 1.0, "lambda, share of h added to r")] = 0.75
+
+    def on_contact(self, rim: WheelArc, scene: LoadCase) -> WheelArc:
+        out = self.shearing * self.grown(self.height, scene)
+        return replace(rim, shear_radius=rim.shear_radius + out, lever=rim.lever + out)

@@ -1,0 +1,46 @@
+"""Depth-cohesion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Real, namespace
+from soilml.parameters import Parameter
+from soilml.physics.contact import Stress
+from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.load_case import LoadCase
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class DepthCohesion(SlipLoadScaling):
+    r"""The soil holds together better further down, where it is packed more densely.
+
+    .. math:: c(z) = c + c_1 z, \qquad \tau \leftarrow \tau + c_1 z (1 - e^{-|j| / K})
+
+    with z the depth that sets the pressure of a point, and the sign of the slip on tau.
+    References: Carrier, Olhoeft and Mendell, Lunar Sourcebook, 1991, chapter 9, cohesion of
+    regolith by depth; the straight line is ours. Where n = 1 pressure too is proportional to z,
+    and no run can tell it from a larger friction angle.
+    """
+
+    name: ClassVar[str] = "depth-cohesion"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="cohesion grows with depth: more shear stress under deeper wheels",
+        source="Lunar Sourcebook 1991, ch. 9",
+        kind="soil",
+        reference={"c1": 2e4},
+        signs={"torque": +1, "drawbar_pull": +1, "sinkage": -1},
+        isolate="shear tests of soil taken from several depths; a wide range of loads",
+    )
+    c1: Annotated[Real, Parameter("Pa/m", 0.0, 1e6, "growth of cohesion with depth")] = 0.0
+
+    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
+        contact, slip = stress.contact, scene.at.slip
+        xp = namespace(contact.depth)
+        mobilised = -xp.expm1(-xp.abs(contact.sheared) / scene.soil.shear_modulus)
+        sign = xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
+        more = self.grown(self.c1, scene) * contact.depth
+        return replace(stress, shear=stress.shear + sign * more * mobilised)

@@ -1,0 +1,46 @@
+"""Multipass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Real, namespace
+from soilml.parameters import Parameter
+from soilml.physics.effects.base import EffectCard, covariate
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.load_case import LoadCase
+from soilml.physics.soils.soil import Soil
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Multipass(SlipLoadScaling):
+    r"""A rut is firmer than virgin soil: each wheel that passed has compacted it.
+
+    .. math:: k \leftarrow k N^a, \quad k \in \{k_c, k_\varphi\}
+
+    with N the number of the pass; sinkage is then measured from the bottom of the rut.
+    References: Holm, J. Terramechanics 6, 1969, multi-pass behaviour of tyres; Senatore and
+    Sandu, J. Terramechanics 48(4), 2011, soil parameters by pass. The power of N is ours: theirs
+    are curves fitted to each soil. It knows nothing of the slip of the passes before, and density
+    and shear strength stay those of virgin soil.
+    """
+
+    name: ClassVar[str] = "multipass"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="soil in a rut is firmer than virgin soil",
+        source="Holm 1969; Senatore and Sandu 2011, J. Terramechanics 48(4)",
+        kind="soil",
+        reference={"growth": 0.5},
+        signs={"sinkage": -1},
+        isolate="the same runs again in the same rut, and on soil prepared anew",
+        needs=("pass_number",),
+    )
+    growth: Annotated[Real, Parameter("1", 0.0, 3.0, "a, power of the pass number")] = 0.0
+
+    def on_soil(self, soil: Soil, scene: LoadCase) -> Soil:
+        passes = covariate(scene, "pass_number", self.name)
+        xp = namespace(passes)
+        firmer = xp.exp(self.grown(self.growth, scene) * xp.log(passes))
+        return replace(soil, kc=soil.kc * firmer, kphi=soil.kphi * firmer)

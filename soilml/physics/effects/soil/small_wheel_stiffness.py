@@ -1,0 +1,49 @@
+"""Small-wheel stiffness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Real, namespace
+from soilml.parameters import Parameter
+from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.load_case import LoadCase
+from soilml.physics.soils.soil import Soil
+
+#: Diameter (m) from which the curve of a plate holds for wheels.
+LARGE = 0.5
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SmallWheelStiffness(SlipLoadScaling):
+    r"""The pressure-sinkage curve depends on how large the wheel is.
+
+    .. math:: \sigma = k z^n (D / D_0)^m, \quad D = 2 r, \quad D_0 = 0.5 m
+
+    References: Meirion-Griffith and Spenko, J. Terramechanics 48(2), 2011, the pressure-sinkage
+    model for small wheels, sigma = k z^n D^m; dividing by half a metre, above which they find
+    Bekker's curve to hold, is ours and keeps the units of k. With wheels of one size it is a
+    change of k_c and k_phi and of nothing else.
+    """
+
+    name: ClassVar[str] = "small-wheel-stiffness"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="the soil's stiffness depends on the diameter of the wheel",
+        source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
+        kind="soil",
+        wheel=True,
+        reference={"exponent": -0.3},
+        signs={"sinkage": -1},
+        varied="wheels of several diameters: with one it is a change of kc and kphi",
+        isolate="the same runs with a wheel of another diameter; plate tests of the soil",
+    )
+    exponent: Annotated[Real, Parameter("1", -2.0, 0.0, "m, power of the diameter")] = 0.0
+
+    def on_soil(self, soil: Soil, scene: LoadCase) -> Soil:
+        xp = namespace(scene.at.slip)
+        diameter = 2.0 * scene.gear.radius  # type: ignore[attr-defined]
+        stiffer = xp.exp(self.grown(self.exponent, scene) * xp.log(diameter / LARGE))
+        return replace(soil, kc=soil.kc * stiffer, kphi=soil.kphi * stiffer)

@@ -1,0 +1,52 @@
+"""How well a wheel pulls on a soil, and whether a rover should drive there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Array, Real, namespace, to_numpy
+from soilml.errors import InputError
+from soilml.parameters import check
+from soilml.physics.equilibrium import at_rest, prepared, stressed
+from soilml.physics.load_case import LoadCase
+from soilml.physics.model import Model, flattened
+from soilml.physics.operating_point import Operating
+from soilml.physics.soils.soil import Soil
+
+#: Pull efficiency at which the next class begins. References: Comin and Saaj 2017, section V-C.
+THRESHOLDS = (0.35, 0.50, 0.65)
+CLASSES = ("non-trafficable", "unsafe", "safe", "trafficable")
+
+
+def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
+    r"""What is left of a driving wheel's thrust when the soil has resisted; arrays broadcast.
+
+    .. math::
+        \eta = \frac{F_T - F_R}{F_T} = \frac{DP}{F_T}, \quad F_T = \int \tau \cos\theta \, dA
+
+    Below zero where the wheel cannot pull itself along; NaN where the soil does not carry the
+    load. What effects take off the drawbar pull counts as resistance. References: Comin and Saaj
+    2017, eq. 32. Raises `InputError` for slip that does not drive: there is no thrust.
+    """
+    check(at)
+    check(soil, "soil ")
+    check(model)
+    scene, shape = flattened(LoadCase(model.gear, soil, at, model.effects))
+    xp = namespace(scene.at.slip)
+    if not bool(xp.all(scene.at.slip > 0)):
+        raise InputError(
+            f"slip is {float(xp.min(scene.at.slip)):g}; pull efficiency needs slip above 0"
+        )
+    with np.errstate(all="ignore"):
+        force = at_rest(scene)
+        _, stresses = stressed(prepared(scene), force.sinkage)
+    thrust = xp.sum(stresses.shear * stresses.contact.up, axis=0)
+    return xp.reshape(force.drawbar_pull / thrust, shape)
+
+
+def traffic_class(efficiency: Real) -> NDArray[np.str_]:
+    """Class of each pull efficiency, of `CLASSES`; NaN (nothing carried) is of the first."""
+    value = np.nan_to_num(to_numpy(efficiency), nan=-np.inf)
+    place = np.searchsorted(THRESHOLDS, value, side="right")
+    return np.asarray(np.asarray(CLASSES)[place])

@@ -1,0 +1,1 @@
+"""Robots and instruments of the source papers, built on the forward model."""

@@ -1,0 +1,1 @@
+"""Tables, settings and results of a climb, in and out."""

@@ -1,0 +1,176 @@
+"""Tables of climbs and of rim stresses, joined wheel by wheel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError, TableError
+from soilml.io.read_table import read_table
+from soilml.io.table import Table
+from soilml.systems.climbing.climb import Climb, WheelRun
+from soilml.systems.climbing.rover import WHEELS
+from soilml.systems.force_sensor_wheel import StressProfile
+
+Floats = NDArray[np.float64]
+
+#: What the tables must hold; slip, or speed_m_s and rim_speed_m_s.
+CLIMBS = ("run", "wheel", "slope_rad")
+STRESSES = ("run", "wheel", "angle_rad", "normal_Pa")
+#: Slips of a run in both tables must agree so well.
+ALIKE = 1e-3
+
+Key = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Climbs, and every stress that was measured at a slip, on climbs or not."""
+
+    climbs: tuple[Climb, ...]
+    front: tuple[WheelRun, ...]
+    rear: tuple[WheelRun, ...]
+
+
+def read_driven(runs: str, stresses: str, noise: Noise, *, ignore_extra: bool = False) -> Driven:
+    """Join a table of climbs and one of stresses; raises `TableError` naming file and row.
+
+    A climb has a row for its front and one for its rear wheel, and both have stresses. Stresses
+    of other runs, such as artificial slip on the flat, need a slip of their own. `noise` is that
+    of the stress where the table has no normal_Pa_std.
+    """
+    filled = (*CLIMBS, "slip", "speed_m_s", "rim_speed_m_s")
+    climbed = read_table(runs, CLIMBS, filled=filled, ignore_extra=ignore_extra)
+    felt = read_table(stresses, STRESSES, filled=STRESSES, ignore_extra=ignore_extra)
+    for table, known in ((climbed, ()), (felt, ("normal_Pa_std",))):
+        for name in table.columns:
+            if name.endswith("_std") and name not in known:
+                raise TableError(f"{table.source}: column {name} is not read; say it in [noise]")
+        _check_wheels(table)
+    slips = _slips(climbed)
+    wheels = _wheel_runs(felt, slips, noise, str(runs))
+    return Driven(
+        climbs=tuple(
+            Climb(name, _slope(rows, name), *(_wheel(wheels, name, w, felt) for w in WHEELS))
+            for name, rows in climbed.groups()
+            if _has_both(rows, name)
+        ),
+        front=tuple(run for (_, wheel), run in wheels.items() if wheel == "front"),
+        rear=tuple(run for (_, wheel), run in wheels.items() if wheel == "rear"),
+    )
+
+
+def _check_wheels(table: Table) -> None:
+    odd = ~np.isin(table["wheel"], WHEELS)
+    if odd.any():
+        row = int(np.argmax(odd))
+        raise TableError(
+            f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r} given; needed is "
+            "front or rear"
+        )
+
+
+def _slips(climbed: Table) -> dict[Key, float]:
+    """The slip of each wheel of each climb."""
+    if "slip" in climbed:
+        slip, from_column = climbed["slip"], "slip"
+    elif "speed_m_s" in climbed and "rim_speed_m_s" in climbed:
+        slip, from_column = _slip_of_speeds(climbed), "speed_m_s"
+    else:
+        raise TableError(
+            f"{climbed.source}: column slip is missing; needed is slip, or speed_m_s and "
+            "rim_speed_m_s of each wheel"
+        )
+    found: dict[Key, float] = {}
+    for row, key in enumerate(zip(climbed["run"], climbed["wheel"], strict=True)):
+        if key in found:
+            raise TableError(
+                f"{climbed.place(row)}: run {key[0]} has a second row for its {key[1]} wheel; "
+                "give each repetition a name of its own"
+            )
+        if not abs(slip[row]) < 1.0:
+            raise TableError(
+                f"{climbed.place(row)}, column {from_column}: gives slip {slip[row]:.3g}; needed "
+                "is a slip between -1 and 1"
+            )
+        found[key] = float(slip[row])
+    return found
+
+
+def _slip_of_speeds(climbed: Table) -> Floats:
+    """Slip (rows,): driving 1 - v / (r omega), braking r omega / v - 1; 1 where neither turns."""
+    speed, rim = climbed["speed_m_s"], climbed["rim_speed_m_s"]
+    largest = np.maximum(speed, rim)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(largest > 0.0, (rim - speed) / largest, np.nan)
+
+
+def _wheel_runs(
+    felt: Table, slips: dict[Key, float], noise: Noise, runs: str
+) -> dict[Key, WheelRun]:
+    """The stress of each wheel in each run, at its slip."""
+    found: dict[Key, WheelRun] = {}
+    for name, rows in felt.groups():
+        for wheel in dict.fromkeys(rows["wheel"].tolist()):
+            own = rows.rows(rows["wheel"] == wheel)
+            where = f"{felt.source} lines {own.line[0]} to {own.line[-1]}, run {name}, {wheel}"
+            order = np.argsort(own["angle_rad"], kind="stable")
+            try:
+                profile = StressProfile(own["angle_rad"][order], own["normal_Pa"][order])
+            except InputError as error:
+                raise TableError(f"{where}: {error}") from None
+            std = noise.std(profile.normal)
+            if "normal_Pa_std" in own:
+                read = own["normal_Pa_std"][order]
+                std = np.where(np.isnan(read), std, read)
+            slip = _slip(own, slips.get((name, wheel)), where, runs)
+            found[name, wheel] = WheelRun(slip, profile, np.asarray(std, dtype=np.float64))
+    return found
+
+
+def _slip(rows: Table, climbed: float | None, where: str, runs: str) -> float:
+    """The slip of one wheel in one run, which the table of climbs or that of stresses gives."""
+    read = rows["slip"] if "slip" in rows else np.full(len(rows), np.nan)
+    read = read[~np.isnan(read)]
+    if len(read) and np.ptp(read) > 0.0:
+        raise TableError(f"{where}: slip runs from {read.min():g} to {read.max():g}; needed is one")
+    if climbed is None and len(read) == 0:
+        raise TableError(
+            f"{where}: no slip; needed is column slip here, or this run and wheel in {runs}"
+        )
+    if climbed is None:
+        return float(read[0])
+    if len(read) and abs(read[0] - climbed) > ALIKE:
+        raise TableError(f"{where}: slip is {read[0]:.4g} here and {climbed:.4g} in {runs}")
+    return climbed
+
+
+def _slope(rows: Table, name: str) -> float:
+    slope = rows["slope_rad"]
+    if np.ptp(slope) > 0.0:
+        raise TableError(
+            f"{rows.place(1)}, column slope_rad: run {name} stands on {slope[0]:g} and on "
+            f"{slope[1]:g} rad; needed is one slope for a run"
+        )
+    return float(slope[0])
+
+
+def _has_both(rows: Table, name: str) -> bool:
+    missing = [wheel for wheel in WHEELS if wheel not in rows["wheel"]]
+    if missing:
+        raise TableError(
+            f"{rows.place(0)}: run {name} has no row for its {missing[0]} wheel; both carry the "
+            "rover"
+        )
+    return True
+
+
+def _wheel(wheels: dict[Key, WheelRun], name: str, wheel: str, felt: Table) -> WheelRun:
+    if (name, wheel) not in wheels:
+        raise TableError(
+            f"{felt.source}: no stress of the {wheel} wheel in run {name}, which was a climb"
+        )
+    return wheels[name, wheel]

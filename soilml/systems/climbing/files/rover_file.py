@@ -1,0 +1,115 @@
+"""A rover's file: its size, what is known of the ground, and its sensors."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+from typing import Annotated, final
+
+from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.prior import take_prior
+from soilml.errors import InputError
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.numerics.prior import Prior
+from soilml.parameters import Parameter, check, declared
+from soilml.systems.climbing.climb import Uncertainty
+from soilml.systems.climbing.rover import Rover
+
+#: Share by which a stress reading errs, where [noise] does not say.
+STRESS = Noise(share=0.05)
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """Shear parameters of the ground that are known."""
+
+    cohesion: Annotated[float | None, Parameter("Pa", 0.0, 1e6, "c")] = None
+    friction_angle: Annotated[float | None, Parameter("rad", 0.02, 1.4, "phi")] = None
+    shear_modulus: Annotated[float | None, Parameter("m", 1e-5, 1.0, "k_x")] = None
+
+
+@dataclass(frozen=True)
+class RoverFile:
+    """What a rover's file says."""
+
+    rover: Rover
+    given: dict[str, float]
+    prior: dict[str, Prior]
+    noise: Uncertainty
+    stress: Noise
+
+
+def read_rover(path: str | os.PathLike[str]) -> RoverFile:
+    """Read [rover], [soil] and [noise]; raises `InputError` naming file, table and key."""
+    settings = read_settings(path)
+    own = settings.table("rover")
+    names = [f.name for f in fields(Rover)]
+    needed = ("mass", "radius", "width")
+    values = {name: own.number(name) for name in names if name in own or name in needed}
+    own.knows(names)
+    own.finish()
+    try:
+        rover = Rover(**values)
+        check(rover)
+    except InputError as error:
+        own.fail(str(error))
+    given, prior = _take_ground(settings.table("soil"))
+    noise, stress = _take_noise(settings.table("noise"))
+    settings.finish()
+    return RoverFile(rover, given, prior, noise, stress)
+
+
+def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]]:
+    """Numbers are held; ranges in [soil.prior] are searched."""
+    ranges, prior = settings.table("prior"), {}
+    given = {name: settings.number(name) for name in declared(Held) if name in settings}
+    settings.knows(declared(Held))
+    settings.finish()
+    check(Held(**given), f"{settings.where} ")
+    ranges.knows(declared(Held))
+    for name, parameter in declared(Held).items():
+        if name not in ranges:
+            continue
+        if name in given:
+            ranges.fail(f"{name} is a number in [soil] and has a range here; one of both must go")
+        taken = take_prior(ranges, name)
+        if not parameter.lower <= taken.lower < taken.upper <= parameter.upper:
+            ranges.fail(
+                f"{name} is [{taken.lower:g}, {taken.upper:g}]; it must lie between "
+                f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
+            )
+        if name == "shear_modulus" and not taken.log:
+            taken = Prior(taken.lower, taken.upper, log=True)
+        prior[name] = taken
+    ranges.finish()
+    return given, prior
+
+
+def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
+    """Standard deviations by column, and two that no column has."""
+    usual = Uncertainty()
+    stress = take_noise(settings, "normal_Pa") if "normal_Pa" in settings else STRESS
+    speed = usual.speed
+    if "speed_m_s" in settings:
+        taken = take_noise(settings, "speed_m_s")
+        if taken.constant:
+            settings.fail("speed_m_s must be a share, such as '0.9 %': slip needs no more")
+        speed = taken.share
+    numbers = {
+        name: settings.number(key, getattr(usual, name))
+        for name, key in (
+            ("slope", "slope_rad"),
+            ("entry_angle", "entry_angle_rad"),
+            ("speed_scale", "speed_scale"),
+            ("front_load", "front_load"),
+        )
+        if key in settings
+    }
+    settings.knows(("speed_m_s", "normal_Pa", "slope_rad", "entry_angle_rad"))
+    settings.knows(("speed_scale", "front_load"))
+    settings.finish()
+    for name, value in numbers.items():
+        if not 0.0 <= value < 1.0:
+            settings.fail(f"{name} is {value:g}; a standard deviation lies between 0 and 1")
+    return Uncertainty(speed=speed, **numbers), stress

@@ -1,0 +1,141 @@
+"""What force sensors in the rim of a wheel read while it turns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Real
+from soilml.errors import InputError
+from soilml.parameters import Parameter, check
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
+
+Floats = NDArray[np.float64]
+
+#: Points across the diameter of a sensor.
+CHORDS = 48
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SensingWheel:
+    """A wheel with a row of round force sensors across its rim.
+
+    The defaults are the wheel of Nagatani et al. 2009, sections III and IV. Where the sensors of
+    the row sit and their noise are not printed: evenly spread, and 0.02 N, are assumed.
+    """
+
+    radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r")] = 0.055
+    width: Annotated[Real, Parameter("m", 0.002, 5.0, "b")] = 0.064
+    sensors: Annotated[Real, Parameter("1", 1, 1000, "in the row")] = 4
+    diameter: Annotated[Real, Parameter("m", 1e-4, 0.1, "of the sensing area")] = 0.0095
+    interval: Annotated[Real, Parameter("s", 1e-5, 10.0, "between samples")] = 0.05
+    rim_speed: Annotated[Real, Parameter("m/s", 1e-5, 10.0, "r omega")] = 0.0104
+    deadband: Annotated[Real, Parameter("N", 0.0, 1e3, "less reads as nothing")] = 0.1
+    saturation: Annotated[Real, Parameter("N", 1e-3, 1e5, "more reads as this")] = 4.4
+    noise: Annotated[Real, Parameter("N", 0.0, 1e3, "standard deviation of a sample")] = 0.02
+
+    def __post_init__(self) -> None:
+        check(self, "sensing wheel: ")
+        if int(self.sensors) != self.sensors:
+            raise InputError(f"the row has {self.sensors:g} sensors; needed is a whole number")
+        if self.deadband >= self.saturation:
+            raise InputError(
+                f"the deadband ({self.deadband:g} N) must lie below saturation "
+                f"({self.saturation:g} N)"
+            )
+
+    @property
+    def area(self) -> float:
+        """Sensing area of one sensor, m^2."""
+        return 0.25 * math.pi * float(self.diameter) ** 2
+
+    @property
+    def step(self) -> float:
+        """Angle (rad) that the rim turns between two samples."""
+        return float(self.interval * self.rim_speed / self.radius)
+
+    @property
+    def across(self) -> Floats:
+        """Where the sensors sit across the rim, in half widths from its middle, (sensors,)."""
+        count = int(self.sensors)
+        return np.asarray((2.0 * np.arange(count) + 1.0) / count - 1.0)
+
+    def chords(self, count: int) -> tuple[Floats, Floats]:
+        """Angles (rad) from the middle of a sensor and the shares of its area there, (count,)."""
+        turn = math.pi * np.arange(1, count + 1) / (count + 1)
+        share = np.sin(turn) ** 2
+        return 0.5 * self.diameter / self.radius * np.cos(turn), share / share.sum()
+
+
+@final
+@dataclass(frozen=True)
+class Readings:
+    """What the sensors read over some turns.
+
+    `angle` (turns, samples) in rad from straight down, positive forward; `force` (turns, samples,
+    sensors) in N.
+    """
+
+    angle: Floats
+    force: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("angle", "force"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+        if self.angle.ndim != 2 or self.force.shape[:2] != self.angle.shape or self.force.ndim != 3:
+            raise InputError(
+                f"readings have angles of shape {self.angle.shape} and forces of shape "
+                f"{self.force.shape}; needed are (turns, samples) and (turns, samples, sensors)"
+            )
+        if not (np.isfinite(self.angle).all() and np.isfinite(self.force).all()):
+            raise InputError("readings hold numbers that are not finite; leave such samples out")
+        if float(np.abs(self.angle).max(initial=0.0)) > math.pi + 1e-6:
+            raise InputError(
+                f"readings reach to {float(np.abs(self.angle).max()):g} rad, more than half a "
+                "turn; angles are in radians from straight down (np.deg2rad turns degrees into "
+                "them)"
+            )
+
+
+def sensed(
+    profile: StressProfile,
+    wheel: SensingWheel,
+    *,
+    turns: int = 9,
+    crown: float = 0.0,
+    lugs: tuple[float, float] = (0.0, 0.0),
+    seed: int = 0,
+) -> Readings:
+    r"""What the sensors read of a true stress, at random phases of `turns` turns.
+
+    A sensor feels the mean over its disc, less what the lugs carry, then noise, deadband and
+    saturation. Across the rim, at y half widths from its middle, the stress is
+    (1 + crown (1 - 3 y^2)) times the profile's, whose mean it keeps: more in the middle.
+    `lugs` are the shares that the lugs carry at the entry and at the exit of the arc. References:
+    Nagatani et al. 2009, sections III to V; the laws across the rim and along the lugs are ours.
+    """
+    if turns < 1:
+        raise InputError(f"{turns} turns; needed is one or more")
+    if not all(0.0 <= share < 1.0 for share in lugs):
+        raise InputError(f"lugs carry the shares {lugs}; each must lie from 0 to below 1")
+    rng = np.random.default_rng(seed)
+    samples = int(2.0 * math.pi / wheel.step)
+    phase = rng.uniform(0.0, 1.0, (turns, 1))
+    angle = math.pi - (np.arange(samples) + phase) * wheel.step
+    at, normal = profile.angle, profile.normal
+    forward = np.clip(
+        (at - profile.exit_angle) / (profile.entry_angle - profile.exit_angle), 0.0, 1.0
+    )
+    felt = normal * (1.0 - (lugs[1] + (lugs[0] - lugs[1]) * forward))
+    offset, share = wheel.chords(CHORDS)
+    mean = np.interp(angle[..., None] + offset, at, felt, left=0.0, right=0.0) @ share
+    over = 1.0 + crown * (1.0 - 3.0 * wheel.across**2)
+    force = wheel.area * mean[..., None] * over
+    force = force + rng.normal(0.0, 1.0, force.shape) * wheel.noise
+    force = np.where(force < wheel.deadband, 0.0, np.minimum(force, wheel.saturation))
+    return Readings(angle=angle, force=force)

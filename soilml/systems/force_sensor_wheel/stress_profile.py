@@ -1,0 +1,101 @@
+"""The normal stress that sensors found along the rim of a wheel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.numerics.quadrature import gauss
+
+Floats = NDArray[np.float64]
+
+#: Gauss points between two samples: between these the stress is a straight line, but the shear
+#: curve bends.
+BETWEEN = 3
+
+
+@final
+@dataclass(frozen=True)
+class StressProfile:
+    """Normal stress against the angle on the rim, a straight line between samples.
+
+    `angle` (p,) in rad from straight down, positive forward, rising; `normal` (p,) in Pa. Samples
+    may reach beyond the stressed arc, where they are zero. References: Nagatani et al. 2009,
+    section IV. Holds where the stress is the same over the width, or `normal` its mean.
+    """
+
+    angle: Floats
+    normal: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("angle", "normal"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
+        _refuse(self.angle, self.normal)
+
+    @cached_property
+    def exit_angle(self) -> float:
+        """Where the stress ends behind, rad."""
+        first = int(np.flatnonzero(self.normal > 0)[0])
+        return float(self.angle[max(first - 1, 0)])
+
+    @cached_property
+    def entry_angle(self) -> float:
+        """Where the stress begins in front, rad; the soil is sheared from here on."""
+        last = int(np.flatnonzero(self.normal > 0)[-1])
+        return float(self.angle[min(last + 1, len(self.angle) - 1)])
+
+    @cached_property
+    def peak_angle(self) -> float:
+        """Where the stress is largest, rad."""
+        return float(self.angle[int(np.argmax(self.normal))])
+
+    @cached_property
+    def nodes(self) -> tuple[Floats, Floats, Floats]:
+        """Angles (q,), the arcs (rad) that they stand for, and the stress there, exit to entry."""
+        inside = (self.angle >= self.exit_angle) & (self.angle <= self.entry_angle)
+        angle, normal = self.angle[inside], self.normal[inside]
+        share, weight = gauss(BETWEEN)
+        step = np.diff(angle)[:, None]
+        at = (angle[:-1, None] + step * share).ravel()
+        return at, (step * weight).ravel(), np.interp(at, angle, normal)
+
+
+def _refuse(angle: Floats, normal: Floats) -> None:
+    """Raise `InputError` for what is no profile."""
+    if angle.ndim != 1 or angle.shape != normal.shape:
+        raise InputError(
+            f"a stress profile has angles of shape {angle.shape} and stresses of shape "
+            f"{normal.shape}; both must be (points,)"
+        )
+    if len(angle) < 3:
+        raise InputError(f"a stress profile of {len(angle)} points; it needs three or more")
+    if not (np.isfinite(angle).all() and np.isfinite(normal).all()):
+        raise InputError(
+            "a stress profile holds numbers that are not finite; leave such samples out"
+        )
+    if (farthest := float(np.abs(angle).max())) > math.pi + 1e-9:
+        raise InputError(
+            f"a stress profile reaches to {farthest:g} rad, more than half a turn; angles are in "
+            "radians from straight down (np.deg2rad turns degrees into them)"
+        )
+    if not (np.diff(angle) > 0).all():
+        raise InputError("the angles of a stress profile must rise from one sample to the next")
+    if (least := float(normal.min())) < 0:
+        raise InputError(
+            f"a stress profile holds {least:g} Pa; soil does not pull at a rim, so take off the "
+            "sensor's zero and set what is left below it to 0"
+        )
+    stressed = angle[normal > 0]
+    if len(stressed) == 0:
+        raise InputError("a stress profile without contact: every stress is zero")
+    if float(np.abs(stressed).max()) >= 0.5 * math.pi:
+        raise InputError(
+            f"a stress profile has stress at {float(stressed[np.abs(stressed).argmax()]):.3g} rad, "
+            "above the axle; angles are from straight down, positive forward"
+        )

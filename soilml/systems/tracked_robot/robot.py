@@ -1,0 +1,153 @@
+"""A robot on two tracks: its pull, and what holds each track in balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from soilml.errors import InputError
+from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
+from soilml.physics.gears import Track
+from soilml.physics.gears.track_geometry import FRONT, MIDDLE, REAR, gone
+from soilml.physics.model import Model
+from soilml.physics.operating_point import Operating
+from soilml.physics.soils import Soil
+
+Floats = NDArray[np.float64]
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Two equal track units that carry a mass (kg) together."""
+
+    track: Track
+    mass: float
+
+    @property
+    def load(self) -> float:
+        """What one track carries, N."""
+        return 0.5 * self.mass * GRAVITY
+
+    def pull(self, soil: Soil, slip: ArrayLike, effects: tuple[Effect, ...] = ()) -> Floats:
+        """Drawbar pull (N) of both tracks at these slips; NaN where the soil does not carry."""
+        at = Operating(slip=np.asarray(slip, dtype=np.float64), load=self.load)
+        return np.asarray(2.0 * Model(self.track, effects)(soil, at).drawbar_pull)
+
+
+#: The robot of Wang, Yan and Du 2018: mass as printed. Its tracks are not printed, nor what the
+#: belt and soil do when unloaded; with round numbers that fit into 0.820 m x 0.589 m they are: end
+#: wheels of 0.1 m radius 0.6 m apart, belts 0.08 m wide, and the defaults of `Track`.
+WANG2018 = Robot(Track(radius=0.1, width=0.08, base=0.6), mass=130.0)
+#: Its grousers: 12 mm high as printed, tips on a fifth of the pitch as assumed.
+GROUSERS = TrackGrousers(spacing=0.8, height=0.012)
+#: How the paper's soils shear beyond the peak: eq. 6 has its peak at the printed modulus; loose
+#: sand has no peak, firm clay falls to the usual residual. The ratio is not printed.
+BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
+    "sand": (),
+    "clay": (ShearSoftening(share=1.0, residual=0.7, peak=1.0),),
+}
+
+
+@dataclass(frozen=True)
+class Balance:
+    """How one track stands; arrays of the operating points' shape."""
+
+    front: Any  # share of the load under the front wheel
+    middle: Any  # share under the belt between the wheels
+    rear: Any  # share under the rear wheel
+    trim: Any  # rad, psi, tail down
+    arc_radius: Any  # m, R_t
+    tension: Any  # N, mean tension that the middle arc's pressure and radius ask for
+    gained: Any  # N, what shear adds to the tension from one end of the middle arc to the other
+    centre: Any  # m, centre of pressure behind the middle of the base
+
+
+def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Balance:
+    r"""Shares of the load, tension and centre of pressure of a track at rest.
+
+    .. math::
+        T = b R_t \bar\sigma, \quad \Delta T = b \int \tau \, ds, \quad
+        x = \frac{1}{W} \int (X - x) \, dW
+
+    A belt without stiffness that takes a circular arc has the tension b R_t sigma at every point:
+    with a pressure that changes along the arc no one tension fits, and the mean is given. The trim
+    comes from the balance of displacements; a robot whose centre of mass stands behind the middle
+    of its base by `centre` less (hitch height) DP / W has it. References: Wang et al. 2018,
+    eqs. 3, 8 and 9, in which the tensions at the joints cancel. Raises `InputError` as a model.
+    """
+    track, force = _track(model), model(soil, at)
+    if points < 3:
+        raise InputError(f"points is {points}; needed are 3 or more along the belt")
+    belt = track.shape(force.sinkage, soil, at)
+    profile = model.profile(soil, at, points)
+    ends = [gone(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
+    step = gone(belt, REAR, -belt.exit)[0] / (points - 1)
+    way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
+    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
+    front, rear = way < ends[0][0], way > ends[1][0]
+    middle = ~front & ~rear
+    weight = np.full_like(way, 1.0) * step
+    weight[[0, -1]] *= 0.5
+    load = np.sum(lift * weight, axis=0)
+    level = np.cos(profile.angle) * step
+    ahead = np.cumsum(level, axis=0) - 0.5 * (level + level[:1])  # behind the entry
+    below_front = track.radius * np.sin(belt.entry)
+    centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
+    length = belt.arc_radius * (belt.leave + belt.meet)
+    return Balance(
+        front=np.sum(lift * weight * front, axis=0) / load,
+        middle=np.sum(lift * weight * middle, axis=0) / load,
+        rear=np.sum(lift * weight * rear, axis=0) / load,
+        trim=belt.trim,
+        arc_radius=belt.arc_radius,
+        tension=track.width
+        * belt.arc_radius
+        * np.sum(profile.normal * weight * middle, axis=0)
+        / length,
+        gained=track.width * np.sum(profile.shear * weight * middle, axis=0),
+        centre=centre - 0.5 * track.base * np.cos(belt.trim),
+    )
+
+
+def settled_by_moments(
+    model: Model, soil: Soil, at: Operating, *, behind: float = 0.0, hitch: float = 0.0
+) -> Floats:
+    r"""Settling R_1f at which moments balance about the belt below the middle of the base.
+
+    .. math:: W x(R_{1f}) = W x_m + h \, DP
+
+    with x the centre of pressure, x_m `behind` (m) that of mass behind the middle, h `hitch` (m)
+    the height above the belt at which the payload pulls back. By bisection, to a
+    hundred-thousandth; the shape is that of the operating point, NaN where no settling between 0
+    and 0.5 balances: a robot whose nose digs in. The trim then follows from the load instead of a
+    constant of the soil. Own derivation; Wang et al. 2018 print no balance of moments.
+    """
+    if not np.isfinite([behind, hitch]).all():
+        raise InputError(f"behind is {behind:g} m and hitch {hitch:g} m; both must be numbers")
+    track = _track(model)
+    shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
+    driven = replace(at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape))
+
+    def excess(settling: Floats) -> Floats:
+        there = replace(model, gear=replace(track, settling=settling))
+        need = behind + hitch * there(soil, driven).drawbar_pull / driven.load
+        return np.asarray(balance(there, soil, driven, points=801).centre - need)
+
+    low, high = np.zeros(shape), np.full(shape, 0.5)
+    found = (excess(low) <= 0.0) & (excess(high) >= 0.0)
+    for _ in range(16):
+        middle = 0.5 * (low + high)
+        short = excess(middle) < 0.0
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return np.where(found, 0.5 * (low + high), np.nan)
+
+
+def _track(model: Model) -> Track:
+    """The gear; raises `InputError` where it is no track."""
+    if not isinstance(model.gear, Track):
+        raise InputError(f"the gear is a {model.gear.name}; this needs a track")
+    return model.gear

@@ -1,0 +1,1 @@
+"""Slip and soil from the torque, vibration and sinkage of a wheel-leg."""

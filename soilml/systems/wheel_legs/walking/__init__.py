@@ -1,0 +1,1 @@
+"""A wheel-leg walking over time, by resistive-force theory."""

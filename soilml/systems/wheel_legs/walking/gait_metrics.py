@@ -1,0 +1,117 @@
+"""How a walk depends on the number of legs, on the feet and on the ground's stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from soilml.arrays import Array
+from soilml.errors import InputError
+from soilml.systems.wheel_legs.walking.geometry import FEET, MOST_LEGS, wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.walk import Walk, walk
+
+#: Stiffnesses over which the paper compares feet, N/m^3: alpha_z from 0.4 to 1.0 N/cm^3.
+STIFFNESSES = (0.4e6, 0.6e6, 0.8e6, 1.0e6)
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Gait:
+    """Figures of the last full turn of every case, (cases,); NaN for a case that has stopped."""
+
+    most_sinkage: Array  # m
+    rms_sinkage: Array  # m
+    mean_sinkage: Array  # m
+    rms_slip: Array
+    rms_slip_propelled: Array  # without the instants at which nothing propels, slip 1
+    mean_slip: Array
+    mean_torque: Array  # N m
+    midstance_sinkage: Array  # m
+    status: Array
+
+
+def gait(walked: Walk) -> Gait:
+    """Figures of the last full turn of a walk; `InputError` where it is shorter than a turn."""
+    if walked.angle[-1] < TURN - 1e-9:
+        raise InputError(
+            f"a walk of {walked.angle[-1] / TURN:.2g} turns; a gait needs one full turn or more"
+        )
+    last = walked.after(float(walked.angle[-1]) - TURN)
+    sinkage, slip = last.sinkage, last.slip
+    propelled = slip < 1.0
+    return Gait(
+        most_sinkage=sinkage.max(axis=0),
+        rms_sinkage=_rms(sinkage),
+        mean_sinkage=sinkage.mean(axis=0),
+        rms_slip=_rms(slip),
+        rms_slip_propelled=np.sqrt(
+            np.sum(np.where(slip >= 1.0, 0.0, slip) ** 2, axis=0) / np.maximum(propelled.sum(0), 1)
+        ),
+        mean_slip=slip.mean(axis=0),
+        mean_torque=last.torque.mean(axis=0),
+        midstance_sinkage=last.at_midstance(sinkage),
+        status=last.status,
+    )
+
+
+def _rms(values: Array) -> Array:
+    return np.sqrt(np.mean(values**2, axis=0))
+
+
+def legs_compared(ground: Ground, foot: str = "none", turns: float = 2.0) -> Gait:
+    """Wheel-legs of 1 to `MOST_LEGS` legs on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
+    return gait(walk([wheel_leg(foot, legs=n + 1) for n in range(MOST_LEGS)], ground, turns=turns))
+
+
+@dataclass(frozen=True)
+class FeetCompared:
+    """Sinkage (m) and slip of feet over the ground's stiffness (Comin and Saaj 2017, fig. 6).
+
+    `sinkage`, `slip`, `rms_slip`: (feet, stiffnesses), means of a turn but for the last.
+    """
+
+    feet: tuple[str, ...]
+    stiffness: Array  # N/m^3
+    sinkage: Array
+    slip: Array
+    rms_slip: Array
+    status: Array
+
+    def sensitivity(self, values: Array) -> tuple[Array, Array]:
+        """Straight slope of values over stiffness, per N/m^3, and its standard error, (feet,)."""
+        centred = self.stiffness - self.stiffness.mean()
+        spread = np.sum(centred**2)
+        slope = values @ centred / spread
+        rest = values - values.mean(axis=1, keepdims=True) - slope[:, None] * centred
+        return slope, np.sqrt(np.sum(rest**2, axis=1) / (centred.size - 2) / spread)
+
+
+def feet_compared(
+    stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET), legs: int = 5
+) -> FeetCompared:
+    """Wheel-legs with each of the feet, rolling freely on each of three or more grounds."""
+    cases = list(product(feet, stiffnesses))
+    wheels = [wheel_leg(foot, legs=legs) for foot, _ in cases]
+    found = gait(walk(wheels, [Ground(stiffness=alpha) for _, alpha in cases]))
+    shape = (len(feet), len(stiffnesses))
+    return FeetCompared(
+        feet=tuple(feet),
+        stiffness=np.array(stiffnesses, float),
+        sinkage=found.mean_sinkage.reshape(shape),
+        slip=found.mean_slip.reshape(shape),
+        rms_slip=found.rms_slip.reshape(shape),
+        status=found.status.reshape(shape),
+    )
+
+
+def falls_until(values: Array, least: float = 0.0) -> int:
+    """Number of the entry, from 1, up to which each is lower than the one before.
+
+    By more than a share `least`; 1 where the second is not.
+    """
+    falls = values[1:] < values[:-1] * (1.0 - least)
+    return 1 + (int(np.argmin(falls)) if not np.all(falls) else falls.size)

@@ -1,0 +1,230 @@
+"""Hidden sets: a second wheel that agrees with the first, causes that act, sets that hide them."""
+
+import json
+from collections import Counter
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from datagen.blind_sets import CAUSES, Plan, draw, matrix, write
+from datagen.blind_sets.catalogue import hidden, keys
+from datagen.blind_sets.noise_processes import CHANNELS, sensors
+from datagen.blind_sets.reference_wheel import settled
+from datagen.blind_sets.run_schedules import COLUMN
+from datagen.blind_sets.soil_families import FAMILIES, FREE, RADIUS, WIDTH
+from datagen.blind_sets.wheel_state import Rows
+from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
+from soilml.config.case import read_case
+
+PLAN = Plan("A", "slip-sinkage", 1.0, 0.01, 8, "dry-sand", 3, 7)
+OF_SOILML = {**CAUSES["A"], **CAUSES["S"]}
+PUSHED = ("torque", "pull", "sinkage")
+
+
+def batch(count, seed):
+    """Rows all over the families, with every covariate varied."""
+    rng = np.random.default_rng(seed)
+    soils = [list(FAMILIES.values())[i % 3].soil(rng) for i in range(count)]
+    return Rows(
+        slip=rng.uniform(0.05, 0.6, count),
+        load=rng.uniform(40.0, 240.0, count),
+        radius=np.full(count, RADIUS),
+        width=np.full(count, WIDTH),
+        speed=rng.uniform(0.01, 0.2, count),
+        pass_number=rng.integers(1, 4, count).astype(float),
+        slip_angle=rng.uniform(0.0, 0.3, count),
+        **{name: np.array([s[name] for s in soils]) for name in soils[0]},
+    )
+
+
+def of_soilml(rows, effects=()):
+    """Torque, drawbar pull and sinkage as the package has them, (3, n)."""
+    soil = Soil(**{f.name: getattr(rows, f.name) for f in fields(Soil)})
+    at = Operating(**{f.name: getattr(rows, f.name) for f in fields(Operating)})
+    force = Model(Wheel(radius=RADIUS, width=WIDTH), tuple(effects))(soil, at)
+    return np.stack([force.torque, force.drawbar_pull, force.sinkage])
+
+
+def of_hidden(rows, acting=()):
+    push = settled(rows, acting)
+    return np.stack([getattr(push, name) for name in PUSHED])
+
+
+def apart(one, other):
+    """Largest difference of each channel, as a share of the channel's typical size."""
+    typical = np.sqrt(np.mean(other**2, axis=1, keepdims=True))
+    return np.abs((one - other) / np.maximum(typical, np.abs(other))).max(axis=1)
+
+
+def test_the_wheel_is_the_packages():
+    rows = batch(400, seed=1)
+    assert apart(of_hidden(rows), of_soilml(rows)).max() < 1e-5
+
+
+def test_a_load_that_nothing_carries_has_no_answer():
+    rows = replace(batch(4, seed=2), load=np.array([60.0, 1e7, 60.0, 1e7]))
+    answered = np.isfinite(of_hidden(rows))
+    assert (answered == [True, False, True, False]).all()
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
+    if name not in OF_SOILML:
+        pytest.skip("not hidden in any set")
+    cause, cls, rows = OF_SOILML[name], EFFECTS[name], batch(120, seed=3)
+    effect = cls(**{cls.about.size: cause.reference})
+    ours, theirs = of_hidden(rows, ((cause, cause.reference),)), of_soilml(rows, [effect])
+    assert np.isfinite(ours).all()
+    assert apart(ours, theirs).max() < 1e-5
+    assert apart(of_soilml(rows), theirs).max() > 1e-4  # it does act
+
+
+@pytest.mark.parametrize(("tier", "key"), [(tier, key) for tier in CAUSES for key in CAUSES[tier]])
+def test_a_cause_acts_and_without_size_does_not(tier, key):
+    (cause,) = hidden(tier, key)
+    rows = batch(60, seed=4)
+    bare = of_hidden(rows)
+    if cause.form not in ("constant", "proportional"):
+        assert apart(of_hidden(rows, ((cause, 0.0),)), bare).max() < 1e-9
+    for share in (0.5, 1.0, 2.0):
+        acted = of_hidden(rows, ((cause, share * cause.reference),))
+        assert np.isfinite(acted).mean() > 0.9
+        assert np.nanmax(np.abs(acted - bare) / np.abs(bare)) > 2e-3
+
+
+def test_lyasko_s_wheel_stands_as_deep_as_he_says():
+    rows = batch(40, seed=5)
+    deep = settled(rows, ((CAUSES["B"]["slip-sinkage/lyasko"], 1.0),))
+    expected = settled(rows).sinkage * (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
+    ok = np.isfinite(deep.sinkage)
+    assert ok.mean() > 0.9
+    np.testing.assert_allclose(deep.sinkage[ok], expected[ok], rtol=1e-9)
+
+
+def test_the_same_plan_gives_the_same_set_and_another_seed_another():
+    one, again, other = draw(PLAN), draw(PLAN), draw(replace(PLAN, seed=8))
+    assert one.truth == again.truth and one.model == again.model
+    for name, values in one.columns.items():
+        np.testing.assert_array_equal(values, again.columns[name])
+    assert not np.array_equal(one.columns["torque_Nm"], other.columns["torque_Nm"])
+
+
+@pytest.mark.parametrize("runs", [4, 8, 16])
+def test_runs_sweep_the_slip_at_one_of_several_loads(runs):
+    drawn = draw(replace(PLAN, runs=runs))
+    columns = drawn.columns
+    assert list(columns)[:6] == ["run", "slip", "load_N", *CHANNELS]
+    assert {v.shape for v in columns.values()} == {(64,)}
+    names = np.unique(columns["run"])
+    assert len(names) == runs
+    assert len(np.unique(columns["load_N"])) >= 3
+    assert columns["load_N"].min() == 40.0 and columns["load_N"].max() == 150.0
+    for name in names:
+        mine = columns["run"] == name
+        assert mine.sum() == 64 // runs
+        assert len(np.unique(columns["load_N"][mine])) == 1
+        assert (np.diff(columns["slip"][mine]) > 0).all()
+    assert columns["slip"].min() >= 0.05 and columns["slip"].max() <= 0.6
+    heavier = drawn.region["load_N"] / columns["load_N"].max()
+    assert heavier.min() == pytest.approx(1.3) and heavier.max() == pytest.approx(1.6)
+    assert list(drawn.region) == list(columns)
+
+
+@pytest.mark.parametrize("tier", ["A", "B"])
+def test_what_a_cause_needs_varies(tier):
+    needy = [key for key in keys(tier) if hidden(tier, key)[0].needs]
+    assert needy
+    for key in needy:
+        plan = replace(PLAN, tier=tier, cause=key)
+        column = draw(plan).columns[COLUMN[hidden(tier, key)[0].needs]]
+        assert len(np.unique(column)) > 1
+
+
+def test_a_column_betrays_no_cause():
+    drawn = [draw(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)]
+    share = np.mean([len(d.columns) > 6 for d in drawn])
+    assert 0.1 < share < 0.6
+
+
+def strays(tier, count=60):
+    """Readings less truth in declared standard deviations, (sets, channels, rows)."""
+    found = []
+    for i in range(count):
+        plan = replace(PLAN, tier=tier, cause="", size=0.0, noise=0.02, seed=i)
+        drawn, declared = draw(plan), sensors(0.02)
+        true = {name: np.array(drawn.truth["runs_true"][name]) for name in CHANNELS}
+        found.append([(drawn.columns[c] - true[c]) / declared[c].std(true[c]) for c in CHANNELS])
+    return np.array(found)
+
+
+def test_readings_stray_as_the_tier_says():
+    plain, linked, struck, louder = (strays(tier) for tier in ("N0", "N2", "N3", "N4"))
+    assert plain.std() == pytest.approx(1.0, abs=0.03)
+    assert plain.std(axis=(0, 2)) == pytest.approx(np.ones(3), abs=0.06)
+    assert linked.std() == pytest.approx(1.0, abs=0.05)
+    assert louder.std() == pytest.approx(1.0 / 0.85, abs=0.04)
+    assert np.mean(np.abs(struck) > 7.0) == pytest.approx(0.02, abs=0.006)
+    runs = linked.reshape(60, 3, 8, 8)  # 8 runs of 8 samples
+    assert np.mean(runs[..., 1:] * runs[..., :-1]) == pytest.approx(0.7, abs=0.06)
+    assert abs(np.mean(plain[..., 1:] * plain[..., :-1])) < 0.03
+
+
+def test_soil_differs_from_run_to_run_where_the_tier_says_so():
+    drawn = draw(replace(PLAN, tier="N1", cause="", size=0.0, runs=16))
+    scatter = drawn.truth["scatter"]["runs"]
+    assert len(scatter["modulus_factor"]) == 16
+    assert 0.02 < np.std(scatter["modulus_factor"]) < 0.09
+    assert drawn.truth["runs_true"] != drawn.truth["runs_without"]
+    calm = draw(replace(PLAN, tier="N0", cause="", size=0.0))
+    assert not calm.truth["scatter"]
+    assert calm.truth["runs_true"] == calm.truth["runs_without"]
+
+
+def test_what_is_written_is_read_by_the_package_and_the_truth_lies_apart(tmp_path):
+    given, kept = tmp_path / "given", tmp_path / "kept"
+    write(replace(PLAN, free=5), given, kept)
+    assert sorted(p.name for p in given.iterdir()) == ["model.toml", "region.csv", "runs.csv"]
+    case = read_case(given / "model.toml")
+    assert tuple(case.prior) and set(case.prior) == set(FREE)
+    assert set(case.noise) == set(CHANNELS)
+    for name, prior in case.prior.items():
+        assert prior.lower < getattr(case.soil, name) < prior.upper
+    for name in ("runs.csv", "region.csv"):
+        assert len(read_table(given / name, ("run", "slip", "load_N", *CHANNELS))) in (64, 24)
+    truth = json.loads((kept / "truth.json").read_text())
+    assert truth["causes"][0]["name"] == "slip-sinkage"
+    assert truth["causes"][0]["parameters"]["n1"]["value"] == pytest.approx(0.4)
+    assert "sinkage" not in (given / "model.toml").read_text().split("[noise]")[0]
+    for name in FREE:
+        assert getattr(case.soil, name) == pytest.approx(truth["soil"][name], rel=0.16)
+        assert case.prior[name].lower < truth["soil"][name] < case.prior[name].upper
+    with pytest.raises(ValueError, match="apart"):
+        write(PLAN, given, given)
+
+
+def test_only_what_is_free_is_wrong_in_the_model(tmp_path):
+    write(PLAN, tmp_path / "given", tmp_path / "kept")
+    soil = read_case(tmp_path / "given" / "model.toml").soil
+    truth = json.loads((tmp_path / "kept" / "truth.json").read_text())["soil"]
+    right = {n for n in truth if getattr(soil, n) == pytest.approx(truth[n], rel=1e-5)}
+    assert right == set(truth) - set(FREE[:3])
+
+
+def test_the_matrix_is_balanced():
+    plans = matrix(True)
+    assert 1400 < len(plans) < 1700
+    assert len({plan.seed for plan in plans}) == len(plans)
+    assert plans == matrix(True)
+    for tier in ("A", "B", "C", "S", "M"):
+        for key in keys(tier):
+            own = [p for p in plans if (p.tier, p.cause) == (tier, key)]
+            for field in ("noise", "size", "runs", "soil_family"):
+                assert set(Counter(getattr(p, field) for p in own).values()) == {len(own) // 3}
+            frees = Counter(p.free for p in own)
+            assert abs(frees[3] - frees[5]) <= 1
+    scattered = [p.scattered for p in plans if p.tier == "B"]
+    assert np.mean(scattered) == pytest.approx(0.5, abs=0.02)
+    few = matrix(False)
+    assert len(few) == 40 and set(few) <= set(plans)
+    assert {p.cause for p in few if p.tier == "A"} == set(keys("A"))

@@ -1,0 +1,170 @@
+"""Synthetic vibration of wheel-legs: what it depends on, reproducible, and mistakes named."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from datagen.draws import sample_rows
+from datagen.generate import generate, piece
+from datagen.recipe import read_recipe
+from datagen.wheel_leg_vibration import normal_stiffness
+from soilml import read_table, soil
+from soilml.errors import InputError
+from soilml.systems.wheel_legs.sensing.slip_models import spring_soil
+from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, amplitude
+
+RECIPE = """\
+rows = {rows}
+seed = 1
+[gear]
+type = "midstance"
+radius = 0.1482
+width = 0.029
+arc = 0.2733
+leg_length = 0.18
+tip_height = 0.0055
+[soil]
+cohesion = 500.0
+friction_angle = 0.625
+shear_modulus = 0.006
+kc = 0.0
+kphi = 600e3
+n = 0.7
+[soil.prior]
+friction_angle = [0.5, 0.75]
+kphi = [300e3, 900e3]
+[operating]
+slip = [0.0, 0.6]
+load_N = [15.0, 35.0]
+[stick_slip]
+stiffness = [3500, 4500]
+drop = [0.2, 0.3]
+turning = 3.0
+"""
+STICK_SLIP = "[stick_slip]" + RECIPE.partition("[stick_slip]")[2]
+LINE = RECIPE.partition("stiffness =")[0] + 'law = "line"\n'
+LINE = LINE.replace("[0.5, 0.75]", "[0.5, 0.7]").replace("900e3", "600e3")
+
+
+def recipe(tmp_path, text=RECIPE, rows=400):
+    (tmp_path / "r.toml").write_text(text.format(rows=rows))
+    return read_recipe(tmp_path / "r.toml")
+
+
+def test_the_hub_feels_what_the_spring_says(tmp_path):
+    made = piece(recipe(tmp_path), 0, 0, 60)
+    felt = [
+        amplitude(SpringLeg(stiffness=k, hub_mass=load / GRAVITY, turning=3.0), slip, angle, drop)
+        for k, load, slip, angle, drop in zip(
+            *(made[c] for c in ("stick-slip.stiffness", "load_N", "slip", "friction_angle_rad")),
+            made["stick-slip.increment"],
+            strict=True,
+        )
+    ]
+    np.testing.assert_allclose(made["vibration_m_s2"], felt, rtol=0.03)
+    assert np.corrcoef(made["vibration_m_s2"], made["slip"])[0, 1] > 0.4
+
+
+def test_the_line_of_the_tests_gives_its_slip_back(tmp_path):
+    """Comin and Saaj 2017, eq. 24 with the linear parameters of table V; degrees and g."""
+    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    a, drop = made["vibration_m_s2"] / GRAVITY, np.rad2deg(made["stick-slip.increment"])
+    slip = -0.882 + 0.022 * drop + (6.609 - 0.156 * drop) * a
+    np.testing.assert_allclose(slip, made["slip"], atol=1e-9)
+
+
+def test_with_the_line_leg_and_drop_of_friction_follow_the_soil(tmp_path):
+    """Comin and Saaj 2017, eq. 28 with table VII."""
+    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    found = spring_soil(made["stick-slip.increment"], made["stick-slip.stiffness"])
+    np.testing.assert_allclose(found[0], made["friction_angle_rad"], rtol=1e-9)
+    np.testing.assert_allclose(found[1], made["normal_stiffness_Pa"], rtol=1e-9)
+
+
+def test_a_line_without_slope_is_refused(tmp_path):
+    steep = LINE.replace("[0.5, 0.7]", "[0.5, 0.9]").replace("600e3", "900e3")
+    with pytest.raises(InputError, match="slip no longer follows vibration"):
+        generate(recipe(tmp_path, steep), tmp_path / "d.parquet")
+    assert not (tmp_path / "d.parquet").exists()
+
+
+def test_stiffness_a_centimetre_deep_is_that_of_the_catalogue_s_soils():
+    """Comin and Saaj 2017, table I: sigma_0 + alpha_z 1 cm, within what two fits differ by."""
+    for name, printed in (("ssc-1", 1.13), ("ssc-2", 2.36), ("ssc-3", 0.99), ("es-3", 2.20)):
+        sigma = normal_stiffness(soil(f"comin2017/{name}"), 0.03)
+        assert float(sigma) / 1e4 == pytest.approx(printed, rel=0.25)
+
+
+def test_what_is_unknown_of_a_leg_fills_its_range_and_does_not_follow_the_soil(tmp_path):
+    made = piece(recipe(tmp_path, rows=2000), 0, 0, 2000)
+    drop = made["stick-slip.increment"] / made["friction_angle_rad"]
+    for values, low, high in ((made["stick-slip.stiffness"], 3500, 4500), (drop, 0.2, 0.3)):
+        assert low <= values.min() < low + 0.01 * (high - low) and values.max() <= high
+        for other in ("friction_angle_rad", "kphi_SI", "slip", "load_N"):
+            assert abs(np.corrcoef(values, made[other])[0, 1]) < 0.05
+
+
+def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
+    for text in (RECIPE, RECIPE.replace("[3500, 4500]", "[1500, 9000]"), LINE):
+        made = recipe(tmp_path, text)
+        whole, part = piece(made, 0, 0, 200), piece(made, 0, 150, 163)
+        np.testing.assert_allclose(
+            part["vibration_m_s2"], whole["vibration_m_s2"][150:163], rtol=1e-12
+        )
+
+
+def test_the_file_names_units_and_can_be_read(tmp_path):
+    noisy = RECIPE.replace("[stick_slip]", "[noise]\nvibration_m_s2 = 0.2\n[stick_slip]")
+    clean = piece(recipe(tmp_path), 0, 0, 400)["vibration_m_s2"]
+    generate(recipe(tmp_path, noisy), tmp_path / "d.parquet")
+    units = json.loads(pq.read_schema(tmp_path / "d.parquet").metadata[b"soilml_units"])
+    assert units["vibration_m_s2"] == "m/s^2" and units["stick-slip.stiffness"] == "N/m"
+    table = read_table(tmp_path / "d.parquet")
+    assert (table["vibration_m_s2"] - clean).std() == pytest.approx(0.2, rel=0.1)
+
+
+def test_speed_and_other_draws_of_a_run_do_not_follow_the_soil(tmp_path):
+    text = RECIPE.replace("[stick_slip]", "speed_m_s = [0.01, 0.5]\n[stick_slip]")
+    made = recipe(tmp_path, text, 2000)
+    rows = sample_rows(made, 0, 0, 2000)
+    for values in (*rows.soil.values(), rows.slip, rows.load):
+        assert abs(np.corrcoef(rows.covariates["speed"], values)[0, 1]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("turning = 3.0", 'law = "magic"', "law is 'magic'; there are: spring, line"),
+        ("drop = [0.2, 0.3]", "", "drop is missing"),
+        ("drop = [0.2, 0.3]", "drop = [20, 30]", "shares of the friction angle"),
+        ("stiffness = [3500, 4500]", "stiffness = [5, 4500]", "stiffness is 5"),
+        ("turning = 3.0", 'law = "line"', "unknown key 'stiffness'"),
+        ("turning = 3.0", "turn = 3.0", "did you mean 'turning'"),
+        ("turning = 3.0", "turning = -1.0", "turning is -1"),
+        ("turning = 3.0", "hub_mass = 3.0", "unknown key 'hub_mass'"),
+        ("slip = [0.0, 0.6]", "slip = [-0.1, 0.6]", "is for driving legs"),
+        (STICK_SLIP, "[noise]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
+        (STICK_SLIP, "[bias]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
+    ],
+)
+def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
+    with pytest.raises(InputError) as caught:
+        recipe(tmp_path, RECIPE.replace(old, new))
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_wheel_has_no_legs_to_stick_and_slip(tmp_path):
+    gear = RECIPE[RECIPE.index("[gear]") : RECIPE.index("[soil]")]
+    wheel = '[gear]\ntype = "wheel"\nradius = 0.15\nwidth = 0.1\n'
+    with pytest.raises(InputError, match=r"\[stick_slip\] is of wheel-legs; .* 'wheel'"):
+        recipe(tmp_path, RECIPE.replace(gear, wheel))
+
+
+def test_the_packaged_recipe_varies_all_that_the_specs_read(tmp_path):
+    made = piece(read_recipe("wheel_leg"), 0, 0, 200)
+    assert (made["status"] == "ok").mean() > 0.9
+    good = made["status"] == "ok"
+    for name in ("slip", "load_N", "torque_Nm", "sinkage_m", "vibration_m_s2"):
+        assert np.isfinite(made[name][good]).all() and np.ptp(made[name][good]) > 0.0

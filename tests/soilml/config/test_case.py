@@ -1,0 +1,91 @@
+"""Model files: what can be written, and what is said of mistakes."""
+
+import pytest
+from conftest import MODEL
+
+from soilml import read_case
+from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError
+from soilml.numerics.prior import Prior
+
+
+def written(tmp_path, text):
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    return path
+
+
+def test_reads_everything_a_model_file_may_hold(tmp_path):
+    case = read_case(
+        written(
+            tmp_path,
+            MODEL.replace('torque_Nm = "2 %"', 'torque_Nm = "2 % + 0.05"\nsinkage_m = 0.0005')
+            + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n[effect.prior]\nn1 = [0.0, 1.0]\n'
+            + '[[effect]]\nname = "exit-angle"\nkappa = 0.1\n',
+        )
+    )
+    assert case.model.gear.radius == 0.15
+    assert [e.name for e in case.model.effects] == ["slip-sinkage", "exit-angle"]
+    assert case.noise == {"torque_Nm": Noise(0.05, 0.02), "sinkage_m": Noise(0.0005)}
+    assert case.prior["cohesion"] == Prior(0.0, 3000.0)
+    assert case.prior["slip-sinkage.n1"] == Prior(0.0, 1.0)
+    assert case.soil.kphi == 1528430.0
+    changed = case.with_values({"slip-sinkage.n1": 0.2, "cohesion": 5.0, "gear.width": 0.1})
+    assert changed.model.effects[0].n1 == 0.2
+    assert changed.soil.cohesion == 5.0
+    assert changed.model.gear.width == 0.1
+
+
+def test_a_soil_needs_no_name_when_all_its_values_are_given(tmp_path):
+    text = MODEL.replace(
+        'name = "wong1989/dry_sand"',
+        "cohesion = 500\nfriction_angle = 0.5\nshear_modulus = 0.01\nkc = 0\nkphi = 1e6\nn = 1",
+    )
+    soil = read_case(written(tmp_path, text)).soil
+    assert (soil.cohesion, soil.kphi, soil.a0) == (500.0, 1e6, 0.4)
+
+
+def test_a_range_may_be_logarithmic(tmp_path):
+    text = MODEL.replace("[0.005, 0.03]", '{ range = [0.001, 0.1], scale = "log" }')
+    prior = read_case(written(tmp_path, text)).prior["shear_modulus"]
+    assert prior.log
+    assert prior.at(0.5) == pytest.approx(0.01)
+
+
+MISTAKES = {
+    "no such type": ('type = "wheel"', 'type = "wheels"', "wheel, linear-wheel"),
+    "missing width": ("width = 0.12", "", "width is missing"),
+    "misspelt key": ("width = 0.12", "widht = 0.12\nwidth = 0.12", "did you mean 'width'"),
+    "negative radius": ("radius = 0.15", "radius = -0.15", "radius is -0.15"),
+    "text for a number": ("radius = 0.15", 'radius = "big"', "needed is a number"),
+    "degrees": ("[soil.prior]", "friction_angle = 34\n[soil.prior]", "write 0.5934"),
+    "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml soils"),
+    "unknown prior": ("cohesion = [", "cohesoin = [", "did you mean 'cohesion'"),
+    "prior upside down": ("[0.0, 3000.0]", "[3000.0, 0.0]", "lower below upper"),
+    "prior outside": ("[0.0, 3000.0]", "[-5.0, 3000.0]", "must lie between"),
+    "noise without unit": ("torque_Nm", "torque", "did you mean 'torque_Nm'"),
+    "noise of zero": ('"2 %"', "0.0", "above zero"),
+    "noise in words": ('"2 %"', '"two percent"', "2 %"),
+    "unknown table": ("[noise]", "[noises]\n[noise]", "did you mean 'noise'"),
+    "no TOML": ("[gear]", "[gear", "not valid TOML"),
+    "unknown effect": (
+        "[noise]",
+        '[[effect]]\nname = "sinking"\n[noise]',
+        "slip-sinkage, grousers",
+    ),
+    "effect twice": (
+        "[noise]",
+        '[[effect]]\nname = "exit-angle"\n[[effect]]\nname = "exit-angle"\n[noise]',
+        "already",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", MISTAKES)
+def test_mistakes_are_named_with_their_place(tmp_path, what):
+    old, new, said = MISTAKES[what]
+    assert old in MODEL
+    with pytest.raises(InputError) as caught:
+        read_case(written(tmp_path, MODEL.replace(old, new, 1)))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

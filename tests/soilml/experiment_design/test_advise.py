@@ -1,0 +1,148 @@
+"""Which row to drive next: physics says where the information is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Operating, read_case
+from soilml.config.measurement_noise import Noise
+from soilml.errors import FitError, InputError
+from soilml.experiment_design import (
+    abstention_message,
+    advise,
+    candidate_grid,
+    is_identified,
+    samples_of_prior,
+    samples_of_rows,
+)
+from soilml.experiment_design.messages import next_row_messages, summary
+from soilml.identification.free_parameters import select_free
+from soilml.identification.observations import read_observations
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+
+SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def after(case, slip, load, **options):
+    """Advice after rows driven so on SOIL without noise."""
+    true = case.with_values(SOIL)
+    at = Operating(slip=np.asarray(slip), load=np.asarray(load))
+    torque = true.model(true.soil, at).torque
+    run = np.full(len(slip), "a")
+    table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
+    data = read_observations(case, table)
+    belief = samples_of_rows(case, data, select_free(case, None), 1024)
+    return advise(case, belief, GRID, driven=data.at, outcome_count=200, **options)
+
+
+def test_a_second_load_tells_cohesion_and_another_row_at_the_first_does_not(case):
+    found = after(case, [0.6] * 3, [60.0] * 3)
+    assert not is_identified(found.now)[0]
+    best, repeat = found.best("cohesion"), found.repeat("cohesion")
+    assert best.candidate.load != 60.0 and repeat.candidate.load == 60.0
+    assert best.left[0] < 0.65 * repeat.left[0]
+
+
+def test_cohesion_tells_at_light_load_friction_at_heavy_and_shear_modulus_at_small_slip(case):
+    belief = samples_of_prior(select_free(case, None), 1024)
+    found = advise(case, belief, GRID)
+    assert found.best("cohesion").candidate.load == 30.0
+    assert found.best("friction_angle").candidate.load == 120.0
+    assert found.best("shear_modulus").candidate.slip == 0.05
+    assert found.best("cohesion").candidate.slip == 0.6
+
+
+def test_drawbar_pull_helps_and_sinkage_does_not_where_bearing_is_known(case):
+    noise = {"drawbar_pull_N": Noise(constant=0.5), "sinkage_m": Noise(constant=0.0005)}
+    found = after(replace(case, noise=case.noise | noise), [0.2] * 3, [60.0] * 3)
+    torque, pull, sinkage = (found.best("friction_angle", own).left[1] for own in found.sets)
+    assert [own[1:] for own in found.sets] == [(), ("drawbar_pull",), ("sinkage",)]
+    assert pull < torque - 0.03 and abs(sinkage - torque) < 0.02
+
+
+def test_sinkage_helps_where_bearing_is_not_known(case):
+    noise = case.noise | {"sinkage_m": Noise(constant=0.0005)}
+    unknown = replace(case, noise=noise, prior=case.prior | {"n": Prior(0.6, 1.6)})
+    found = advise(unknown, samples_of_prior(select_free(unknown, None), 1024), GRID)
+    torque, sinkage = (found.best("n", own).left[3] for own in found.sets)
+    assert sinkage < 0.6 * torque
+
+
+def test_rows_after_one_another_leave_less_and_less_and_go_elsewhere(case):
+    found = advise(case, samples_of_prior(select_free(case, None), 1500), GRID, count=3)
+    overall = [c.overall for c in found.sequence]
+    assert overall[0] == found.best().overall < 1.0
+    assert overall[1] < 0.85 * overall[0] and overall[2] < 0.85 * overall[1]
+    assert len({c.candidate for c in found.sequence}) == 3
+
+
+def test_following_the_plan_leaves_what_it_said(case):
+    planned = advise(case, samples_of_prior(select_free(case, None), 1500), GRID, count=2).sequence
+    points = [(c.candidate.slip, c.candidate.load) for c in planned]
+    rng, free, left = np.random.default_rng(4), select_free(case, None), []
+    slip, load = np.asarray(points).T
+    for _ in range(16):
+        true = case.with_values({f.path: float(f.prior.at(rng.random())) for f in free})
+        torque = true.model(true.soil, Operating(slip=slip, load=load)).torque
+        torque = torque * (1.0 + 0.02 * rng.standard_normal(2))
+        run = np.asarray(["a", "a"])
+        table = Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
+        left.append(samples_of_rows(case, read_observations(case, table), free).left)
+    realised = np.sqrt(np.mean(np.square(left), axis=0))
+    np.testing.assert_allclose(planned[-1].left, realised, atol=0.15)  # 16 soils: 3 sigma
+
+
+def test_loads_that_possible_soils_do_not_carry_are_left_out_and_counted(case):
+    heavy = candidate_grid([0.2], [60.0, 1e6])
+    found = advise(case, samples_of_prior(select_free(case, None), 64), heavy)
+    assert found.stuck == 1 and {c.candidate.load for c in found.choices} == {60.0}
+    with pytest.raises(FitError, match="smaller loads"):
+        advise(case, samples_of_prior(select_free(case, None), 64), candidate_grid([0.2], [1e6]))
+
+
+def test_impossible_slips_and_loads_are_refused():
+    for slips, loads in (([1.0], [60.0]), ([0.1], [0.0]), ([float("nan")], [60.0])):
+        with pytest.raises(InputError, match="cannot be driven"):
+            candidate_grid(slips, loads)
+    with pytest.raises(InputError, match="--loads"):
+        candidate_grid(None, None)
+    assert candidate_grid(None, None, [30.0, 60.0]).loads == (15.0, 25.0, 42.0, 71.0, 120.0)
+
+
+def test_without_noise_nothing_can_be_said(case):
+    silent = replace(case, noise={})
+    with pytest.raises(InputError, match="declare it in"):
+        advise(silent, samples_of_prior(select_free(case, None), 64), GRID)
+    with pytest.raises(InputError, match="channels that are read"):
+        advise(case, samples_of_prior(select_free(case, None), 64), GRID, reads=("sinkage",))
+
+
+def test_the_words_abstain_where_the_width_is_that_of_the_prior(case):
+    assert is_identified(np.asarray([0.3, 0.8, 0.81])).tolist() == [True, True, False]
+    text = abstention_message("friction_angle", 0.92)
+    assert text == "friction angle: 92% of the prior's width remains: these rows do not tell it"
+    found = after(case, [0.6] * 3, [60.0] * 3, count=2)
+    said = " | ".join(next_row_messages(found))
+    assert "cohesion: " in said and "do not tell it" in said and "repeating what was driven" in said
+    assert "Most helpful next: slip" in said and "helps most in all: slip" in said
+
+
+def test_where_no_single_row_tells_the_words_name_several(case):
+    loud = replace(case, noise={"torque_Nm": Noise(share=0.4)})
+    found = advise(loud, samples_of_prior(select_free(loud, None), 400), GRID, count=3)
+    assert "3 rows together leave" in " ".join(next_row_messages(found))
+
+
+def test_the_summary_names_slip_load_channels_and_every_width(case):
+    content = summary(after(case, [0.2], [60.0]))
+    assert set(content) == {"next", "next_for", "repeat"}
+    assert content["repeat"]["slip"] == 0.2 and content["next"]["channels"] == ["torque"]
+    assert set(content["next_for"]) == set(content["next"]["left_of_prior"]) == set(SOIL)

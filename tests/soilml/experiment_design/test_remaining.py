@@ -1,0 +1,131 @@
+"""Expected widths are those of brute force, and behave as information does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Operating, read_case
+from soilml.config.measurement_noise import Noise
+from soilml.experiment_design.expected_variance import expected_variance
+from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_prior
+from soilml.experiment_design.predicted_readings import PredictedReadings, predicted_readings
+from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.numerics.prior import Prior
+
+
+def line(count, seed=0):
+    """A belief of one parameter, uniform from 0 to 1."""
+    return samples_of_prior([FreeParameter("a", "1", Prior(0.0, 1.0), 0.5, False)], count, seed)
+
+
+def read(belief, y, std):
+    """One channel at one point that reads y (n,) with a noise of std."""
+    at = Operating(slip=np.zeros(1), load=np.ones(1))
+    shape = (1, 1, len(y))
+    noise = np.broadcast_to(std, shape).copy()
+    return PredictedReadings(at, ("torque",), y.reshape(shape), noise, np.ones(1, dtype=bool))
+
+
+def left(belief, y, std, count=256, seed=1):
+    soils = expected_variance(belief, 1, count, seed)
+    return np.sqrt(soils.remaining(soils.logs(read(belief, y, std), ("torque",), 0)))[0]
+
+
+def integrated(f, std, places=800):
+    """Root expected posterior variance over the prior's of a uniform parameter, by quadrature."""
+    x = (np.arange(places) + 0.5) / places
+    y = np.linspace(f(x).min() - 6 * std, f(x).max() + 6 * std, 1500)
+    likelihood = np.exp(-0.5 * ((y[:, None] - f(x)) / std) ** 2)
+    evidence = likelihood.mean(axis=1)
+    mean = likelihood @ x / places / evidence
+    variance = likelihood @ x**2 / places / evidence - mean**2
+    return np.sqrt(np.sum(evidence * variance) / np.sum(evidence) * 12.0)
+
+
+@pytest.mark.parametrize("std", [2.0, 0.3, 0.03])
+def test_one_parameter_is_left_as_wide_as_quadrature_says(std):
+    def bent(x):
+        return (2.0 * x - 0.6) ** 2  # two values of x give one reading
+
+    belief = line(1500)
+    found = np.mean([left(belief, bent(belief.u[:, 0]), std, seed=k) for k in range(8)])
+    assert found == pytest.approx(integrated(bent, std), rel=0.04)
+
+
+def test_noise_far_below_the_distance_of_samples_does_not_claim_certainty():
+    belief = line(60)
+    found = np.mean([left(line(60, k), line(60, k).u[:, 0], 1e-4, seed=k) for k in range(8)])
+    assert 0.5 / 60 < found < 5.0 / 60  # the distance of samples; far above the noise, 3.5e-4
+    assert belief.left[0] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_wheel_that_is_stuck_tells_on_which_soils_it_is():
+    belief = line(1000)
+    u = belief.u[:, 0]
+    blind = np.where(u < 0.3, np.nan, 0.0)  # it reads nothing else
+    expected = np.sqrt(0.3 * 0.3**2 + 0.7 * 0.7**2)  # two uniform parts
+    assert left(belief, blind, 1.0) == pytest.approx(expected, rel=0.05)
+    lone = np.where(u == u.min(), np.nan, 0.0)
+    assert left(belief, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_gaussian_is_left_as_its_precisions_add():
+    rng = np.random.default_rng(3)
+    prior = Prior(0.0, 1.0)
+    u = np.clip(0.5 + 0.05 * rng.standard_normal(4000), 0.0, 1.0)[:, None]
+    weights = rng.random(4000)
+    belief = ParameterSamples(
+        (FreeParameter("a", "1", prior, 0.5, False),), u, weights / weights.sum()
+    )
+    expected = belief.left[0] / np.sqrt(2.0)  # a reading as sharp as what is believed
+    sharp = belief.left[0] * prior.std
+    found = np.mean([left(belief, u[:, 0], sharp, seed=k) for k in range(6)])
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
+    belief = line(800)
+    found = [left(belief, belief.u[:, 0], std) for std in (1e3, 1.0, 0.3, 0.1, 0.03, 0.01)]
+    assert found[0] == pytest.approx(belief.left[0], rel=0.02) and found[0] <= belief.left[0]
+    assert (np.diff(found) < 0).all()
+
+
+def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
+    """Against importance sampling with twenty times the samples, simulated readings apart."""
+    case = read_case(model_file)
+    free = select_free(case, None)
+    at = Operating(slip=np.asarray([0.05, 0.3, 0.6]), load=np.asarray([120.0, 60.0, 30.0]))
+    found = np.zeros((3, 3))
+    for seed in range(4):
+        belief = samples_of_prior(free, 1000, seed)
+        ahead, soils = predicted_readings(case, belief, at), expected_variance(belief, 1, 400, seed)
+        found += [soils.remaining(soils.logs(ahead, ("torque",), k)) / 4 for k in range(3)]
+    many = samples_of_prior(free, 20000, seed=7)
+    y = predicted_readings(case, many, at).y[0]
+    rng = np.random.default_rng(8)
+    for k in range(3):
+        variance = []
+        for j in rng.integers(0, 20000, 500):
+            std = 0.02 * y[k]
+            reading = y[k][j] + std[j] * rng.standard_normal()
+            weight = np.exp(-0.5 * ((reading - y[k]) / std) ** 2) / std
+            mean = weight @ many.shares / weight.sum()
+            variance.append(weight @ many.shares**2 / weight.sum() - mean**2)
+        np.testing.assert_allclose(
+            np.sqrt(found[k]), np.sqrt(np.mean(variance, axis=0)), atol=0.045
+        )
+
+
+def test_noise_of_slip_makes_a_row_tell_less(model_file):
+    case = read_case(model_file)
+    shaky = replace(case, noise=case.noise | {"slip": Noise(constant=0.05)})
+    belief = samples_of_prior(select_free(case, None), 400)
+    at = Operating(slip=np.asarray([0.05]), load=np.asarray([60.0]))
+    steep = [
+        (soils := expected_variance(belief, 1)).remaining(
+            soils.logs(predicted_readings(c, belief, at), ("torque",), 0)
+        )
+        for c in (case, shaky)
+    ]
+    assert steep[1][2] > 1.2 * steep[0][2]  # the shear modulus shows where slip is small

@@ -1,0 +1,258 @@
+"""The page says what the report says, stands alone, and lets nothing through."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from soilml import Model, Wheel, soil
+from soilml.config.case import Case
+from soilml.gap.html import formatting
+from soilml.gap.html.page import page
+from soilml.gap.html.plots import MOST_RUNS, chosen_runs
+from soilml.gap.results import (
+    STATUSES,
+    Curves,
+    GapReport,
+    NamedEffect,
+    NextRun,
+    Shrink,
+    Tried,
+    Value,
+    Where,
+)
+from soilml.physics.effects import EFFECTS
+
+pytest.importorskip("jinja2")
+pytest.importorskip("matplotlib")
+
+VOID = {"meta", "link", "br", "img", "hr", "input"}
+EVIL = '<script>alert("x")</script>&\'$\\frac{'
+
+
+class Checked(HTMLParser):
+    """Tags that open and close in order, ids that occur once, attributes that fetch something."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.ids, self.fetched, self.tags, self.text = [], [], [], [], []
+        self.targets = []
+
+    def handle_starttag(self, tag, attrs):
+        self.note(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.note(tag, attrs)
+
+    def note(self, tag, attrs):
+        self.tags.append(tag)
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(value)
+            if key in ("src", "href", "srcset", "data", "action", "xlink:href"):
+                self.fetched.append(value)
+            self.targets += re.findall(r"url\(([^)]*)\)", value or "")
+            assert not key.startswith("on"), key
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def read(html):
+    seen = Checked()
+    seen.feed(html)
+    seen.close()
+    assert seen.open == []
+    return seen
+
+
+def curves(runs=8, channels=("torque_Nm", "drawbar_pull_N", "sinkage_m"), slips=5):
+    rng = np.random.default_rng(0)
+    run, slip, channel = np.meshgrid(
+        np.arange(runs), np.linspace(0.05, 0.6, slips), np.arange(len(channels)), indexing="ij"
+    )
+    run, slip, channel = run.ravel(), slip.ravel(), channel.ravel()
+    load = 40.0 + 10.0 * run
+    true = load * slip
+    return Curves(
+        channels=channels,
+        channel=channel,
+        run=tuple(f"r{i}" for i in run),
+        slip=slip,
+        load=load,
+        reading=true + 0.1 * rng.standard_normal(true.size),
+        std=np.full(true.size, 0.1),
+        before=0.9 * true,
+        after=true,
+        after_std=np.full(true.size, 0.05),
+        held_out=np.zeros(true.size, dtype=bool),
+    )
+
+
+def report(status="named", **changes):
+    wheel = Model(Wheel(radius=0.15, width=0.12))
+    case = Case(wheel + EFFECTS["slip-sinkage"](n1=0.4), soil("wong1989/dry_sand"))
+    channels = {"torque_Nm": (55.2, 1.11), "drawbar_pull_N": (26.8, 1.06), "sinkage_m": (879, 0.83)}
+    shrink = Shrink(320.2, 1.0017, channels, 192, "all rows fitted")
+    n1 = {"n1": Value(0.40134, 0.00147, "1")}
+    whole = GapReport(
+        status=status,
+        sentence="The gap is slip-sinkage: mean squared residual 3.2e+02 -> 1 (1 is the noise).",
+        model=case,
+        effects=(NamedEffect("slip-sinkage", n1, (), 184.3, "exit-angle"),),
+        cause_set=(("slip-sinkage",), ("grousers", "bulldozing")),
+        where=(
+            Where("sinkage_m", (0.4, 0.6), (40.0, 80.0), 122.9, 0.0002),
+            Where("torque_Nm", (0.1, 0.3), (80.0, 150.0), 2.1, 0.4),
+        ),
+        gap={
+            "train": shrink,
+            "held_out_runs": replace(shrink, what="every run predicted by fits to the others"),
+            "held_out_region": replace(shrink, what="load_N >= 150, predicted from the rest"),
+        },
+        soil_before={"friction_angle": Value(0.404, 0.0013, "rad"), "kc": Value(0.0, 0.0, "Pa")},
+        soil_after={"friction_angle": Value(0.47694, 0.0013, "rad"), "kc": Value(9.0, 1.0, "Pa")},
+        mimic_radius=0.62,
+        next_runs=(NextRun("reverse", "the same run driven the other way", 7.25, ()),),
+        tried=(
+            Tried(("slip-sinkage",), 61202.8, 61284.0, 0.0, "explains the data"),
+            Tried(("grousers", "bulldozing"), float("nan"), 7.0, 9.0, "more effects than needed"),
+        ),
+        untestable={"rate": "needs speed_m_s"},
+        notes=("sinkage_m scatters 1.3 times as much as declared",),
+        not_claimed=("that a smaller gap proves a cause",),
+        scatter={"noise_scale_torque_Nm": 0.87, "friction_angle_from_run_to_run_rad": 0.00698},
+        remainder={"torque_Nm": 0.25, "sinkage_m": 0.0},
+        p_gap=0.00025,
+        p_left=0.86,
+        seed=7,
+        curves=curves(),
+    )
+    return replace(whole, **changes)
+
+
+def bad():
+    return GapReport("bad-data", "no noise; one channel", report().model)
+
+
+@pytest.mark.parametrize("status", STATUSES)
+def test_every_status_gives_a_whole_page_that_says_what_it_means(status):
+    html = page(bad() if status == "bad-data" else report(status), "rover.toml", "runs.csv")
+    seen = read(html)
+    assert html.startswith("<!DOCTYPE html>\n<html lang=")
+    assert len(set(seen.ids)) == len(seen.ids)
+    text = " ".join(seen.text)
+    assert STATUSES[status] in text
+    assert "What to do" in text
+    assert seen.tags.count("h1") == 1
+    assert seen.tags.count("caption") == seen.tags.count("table")
+
+
+@pytest.mark.parametrize("whole", [report(), bad()])
+def test_the_page_needs_nothing_from_anywhere(whole):
+    html = page(whole, "rover.toml", "runs.csv")
+    seen = read(html)
+    assert not {"script", "iframe", "img", "object", "embed"} & set(seen.tags)
+    known = {f"#{name}" for name in seen.ids}
+    assert set(seen.fetched) <= known | {"data:,"}
+    assert set(seen.targets) <= known
+    assert "http:" not in html and "https:" not in html and "@import" not in html
+
+
+def test_hostile_names_stay_text():
+    c = curves()
+    whole = report(
+        sentence=EVIL,
+        notes=(EVIL,),
+        not_claimed=(EVIL,),
+        untestable={EVIL: EVIL},
+        remainder={EVIL: 1.0},
+        scatter={EVIL: 1.0},
+        cause_set=((EVIL,),),
+        effects=(NamedEffect(EVIL, {EVIL: Value(1.0, 0.1, EVIL)}, (EVIL,), 1.0, EVIL),),
+        where=(Where(EVIL, (0.1, 0.2), (1.0, 2.0), 5.0, 0.01),),
+        tried=(Tried((EVIL,), 1.0, 1.0, 0.0, EVIL),),
+        next_runs=(NextRun(EVIL, EVIL, 1.0, ()),),
+        soil_before={EVIL: Value(1.0, 0.1, EVIL)},
+        gap={EVIL: Shrink(2.0, 1.0, {EVIL: (2.0, 1.0)}, 9, EVIL)},
+        curves=replace(c, run=tuple(EVIL + r for r in c.run), channels=(EVIL, *c.channels[1:])),
+    )
+    html = page(whole, EVIL, EVIL)
+    seen = read(html)
+    assert "<script" not in html
+    assert "script" not in seen.tags
+    assert EVIL in "".join(seen.text)
+
+
+def test_the_same_report_gives_the_same_bytes():
+    assert page(report(), "rover.toml", "runs.csv") == page(report(), "rover.toml", "runs.csv")
+
+
+def test_figures_stand_where_people_look_for_them():
+    text = " ".join(" ".join(read(page(report(), "rover.toml", "runs.csv")).text).split())
+    for figure in (
+        *("320", "1.00", "879", "0.830"),  # the gap, before and after
+        "mean squared residual 320 → 1",
+        "0.4013 ± 0.0015",  # the effect
+        *("23.147 ± 0.074", "27.327 ± 0.074", "+4.179°", "0.4040 ± 0.0013 rad"),  # the soil
+        *("61203", "61284", "more effects than needed"),
+        "7.25 σ",
+        "p = 0.86",
+        "0.87 × what was declared",
+        *("rover.toml", "runs.csv", "seed 7", "needs speed_m_s"),
+        "Drawn are 6 of 8 runs",
+    ):
+        assert figure in text, figure
+
+
+def test_a_gap_that_did_not_change_is_drawn_once():
+    same = Shrink(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
+    html = page(report("no-gap", gap={"train": same}, effects=(), cause_set=()), "m", "r")
+    assert "before and after" not in html
+    assert "Dashed" not in html
+
+
+def test_figures_that_are_none_break_nothing():
+    nan, inf = float("nan"), float("inf")
+    c = curves(channels=("sinkage_m",), slips=1)
+    c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan), held_out=c.load > 60.0)
+    odd = Shrink(inf, nan, {"sinkage_m": (nan, 0.0)}, 0, "")
+    old = {"n": Value(nan, nan, "1"), "kphi": Value(0.0, inf, "N/m^(n+2)")}
+    whole = report(curves=c, gap={"train": odd}, soil_before=old, soil_after=old, p_left=nan)
+    read(page(replace(whole, where=(Where("sinkage_m", (0, 1), (1, 2), inf, nan),)), "m", "r"))
+
+
+def test_runs_are_drawn_from_all_loads():
+    many = chosen_runs(curves(runs=16))
+    assert len(many) == MOST_RUNS
+    assert many[0].load == 40.0 and many[-1].load == 190.0
+    assert len({run.colour for run in many}) == MOST_RUNS
+    assert len(chosen_runs(curves(runs=1))) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (1406.28, 11.8, "1406 ± 12"),
+        (-0.0071228, 2.9e-5, "(−7.123 ± 0.029) × 10⁻³"),
+        (1343631.0, 170762.0, "(1.34 ± 0.17) × 10⁶"),
+        (0.5, 0.0, "0.5000"),
+    ],
+)
+def test_values_are_written_to_the_digits_that_their_spread_leaves(value, std, text):
+    assert formatting.spread(value, std) == text
+
+
+@pytest.mark.parametrize(
+    ("x", "text"),
+    [(320.18, "320"), (0.0, "0.00"), (3311.0, "3311"), (1.2e7, "1.20 × 10⁷"), (-0.05, "−0.0500")],
+)
+def test_numbers_are_written_to_three_digits(x, text):
+    assert formatting.figure(x) == text

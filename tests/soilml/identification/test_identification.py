@@ -1,0 +1,244 @@
+"""Analytic identification: truth recovered, uncertainty calibrated, limits said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import LinearWheel, Operating, identify, read_case
+from soilml.config.measurement_noise import Noise
+from soilml.errors import FitError, InputError, TableError
+from soilml.io.table import Table
+
+TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+SLIPS = np.tile(np.linspace(0.1, 0.6, 6), 3)
+LOADS = np.repeat([40.0, 70.0, 110.0], 6)
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def measured(case, truth, slip, load, noise=0.0, seed=0, **columns):
+    true = case.with_values(truth)
+    force = true.model(true.soil, Operating(slip=slip, load=load))
+    rng = np.random.default_rng(seed)
+    torque = force.torque * (1.0 + noise * rng.standard_normal(len(slip)))
+    table = {"run": np.full(len(slip), "a"), "slip": slip, "load_N": load, "torque_Nm": torque}
+    for name in columns:
+        table[name] = getattr(force, name.rsplit("_", 1)[0])
+    return Table(table)
+
+
+def test_recovers_the_truth_from_rows_without_noise(case):
+    fit = identify(case, measured(case, TRUTH, SLIPS, LOADS))
+    for name, value in TRUTH.items():
+        assert fit[name] == pytest.approx(value, rel=1e-6)
+    assert fit.warnings == ()
+    assert fit.rows_used == 18
+
+
+def test_nine_of_ten_truths_lie_in_the_interval_and_the_std_says_how_far(case):
+    rng = np.random.default_rng(1)
+    inside, error, claimed = [], [], []
+    for k in range(80):
+        truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
+        fit = identify(case, measured(case, truth, SLIPS, LOADS, noise=0.02, seed=k))
+        off = np.abs(fit.values - list(truth.values()))
+        inside.append(off <= 1.645 * fit.std)
+        error.append(off**2)
+        claimed.append(fit.std**2)
+    assert (np.mean(inside, axis=0) > 0.80).all()  # 0.90 expected, 80 draws: 0.80 is 3 sigma
+    assert (np.mean(inside, axis=0) < 0.99).all()
+    ratio = np.mean(error, axis=0) / np.mean(claimed, axis=0)
+    assert (ratio > 0.55).all() and (ratio < 1.7).all()
+
+
+def test_one_load_does_not_identify_cohesion_and_says_so(case):
+    rng = np.random.default_rng(2)
+    slip, load = np.linspace(0.1, 0.6, 6), np.full(6, 60.0)
+    inside = []
+    for k in range(40):
+        truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
+        fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
+        assert "one load only: cohesion is not identified" in fit.warnings
+        assert fit.left["cohesion"] > 0.5
+        inside.append(np.abs(fit.values - list(truth.values())) <= 1.645 * fit.std)
+    assert (np.mean(inside, axis=0) > 0.78).all()
+
+
+def test_the_std_holds_where_the_prior_holds_another_parameter(case):
+    """The equally good values lie along a valley that bends away from the end of the prior."""
+    rng = np.random.default_rng(11)
+    slip, load = np.full(3, 0.3), np.asarray([40.0, 70.0, 110.0])
+    far = []
+    for k in range(80):
+        truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
+        fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
+        far.append(np.abs(fit.values - list(truth.values())) / fit.std)
+    assert np.max(far) < 3.0
+    assert (np.mean(np.less(far, 2.0), axis=0) > 0.93).all()
+
+
+def test_a_share_of_noise_does_not_draw_the_fit_low(case):
+    rng = np.random.default_rng(3)
+    slip, load = rng.uniform(0.1, 0.6, 1000), rng.uniform(40.0, 110.0, 1000)
+    noisy = replace(case, noise={"torque_Nm": Noise(share=0.1)}).with_values(TRUTH)
+    bias = []
+    for seed in range(3):
+        fit = identify(
+            noisy, measured(case, TRUTH, slip, load, noise=0.1, seed=seed), ["friction_angle"]
+        )
+        found, true = noisy.with_values({"friction_angle": fit["friction_angle"]}), noisy
+        at = Operating(slip=slip, load=load)
+        bias.append((found.model(found.soil, at).torque / true.model(true.soil, at).torque).mean())
+    assert abs(np.mean(bias) - 1.0) < 0.006  # 0.1 / sqrt(3000) is 0.002; of readings: -0.02
+
+
+def test_a_std_given_in_the_table_stands(case):
+    table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
+    table.columns["torque_Nm_std"] = 0.1 * table["torque_Nm"]
+    assert (
+        identify(case, table).std
+        > 1.3 * identify(case, measured(case, TRUTH, SLIPS, LOADS, noise=0.02)).std
+    ).any()
+
+
+def test_a_single_row_leaves_the_prior_and_says_so(case):
+    fit = identify(case, measured(case, TRUTH, SLIPS[:1], LOADS[:1], noise=0.02))
+    assert "1 reading for 3 parameters: the prior decides the rest" in fit.warnings
+    assert fit.left["cohesion"] > 0.8
+    assert fit.std[0] > 500.0
+
+
+def test_free_parameters_can_be_chosen_and_unknown_ones_are_refused(case):
+    table = measured(case, TRUTH, SLIPS, LOADS)
+    fit = identify(case.with_values({"cohesion": 812.0}), table, ["friction_angle", "kphi"])
+    assert fit.names == ("friction_angle", "kphi")
+    with pytest.raises(InputError, match="cohesion, friction_angle"):
+        identify(case, table, ["phi"])
+    with pytest.raises(InputError, match="nonlinear, linear, newton"):
+        identify(case, table, method="magic")
+    with pytest.raises(InputError, match="nothing to identify"):
+        identify(replace(case, prior={}), table)
+
+
+def test_effect_parameters_can_be_identified(case, tmp_path):
+    from conftest import MODEL
+
+    path = tmp_path / "m.toml"
+    path.write_text(MODEL + '[[effect]]\nname = "slip-sinkage"\n[effect.prior]\nn1 = [0, 1]\n')
+    case = replace(
+        read_case(path), noise={"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(1e-4)}
+    )
+    table = measured(case, TRUTH | {"slip-sinkage.n1": 0.4}, SLIPS, LOADS, sinkage_m=True)
+    assert identify(case, table)["slip-sinkage.n1"] == pytest.approx(0.4, rel=1e-5)
+
+
+def test_undeclared_noise_is_estimated_from_residuals(case):
+    table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
+    fit = identify(replace(case, noise={}), table)
+    known = identify(case, table)
+    assert any("not declared" in said for said in fit.warnings)
+    assert np.all(fit.std / known.std < 2.5) and np.all(fit.std / known.std > 0.4)
+    with pytest.raises(FitError, match="declare it"):
+        identify(replace(case, noise={}), table.rows(np.arange(3)))
+
+
+def test_a_channel_whose_noise_is_not_declared_is_left_out_and_named(case):
+    table = measured(case, TRUTH, SLIPS, LOADS, sinkage_m=True)
+    fit = identify(case, table)
+    assert fit.channels == ("torque_Nm",)
+    assert any("sinkage_m is not used" in said for said in fit.warnings)
+
+
+def test_noise_of_slip_widens_the_answer(case):
+    table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
+    slipping = replace(case, noise=case.noise | {"slip": Noise(0.02)})
+    assert (identify(slipping, table).std > identify(case, table).std).all()
+
+
+def test_more_misfit_than_noise_is_said_and_widens(case):
+    table = measured(case, TRUTH, SLIPS, LOADS)
+    table.columns["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.3 * np.sin(7 * SLIPS))
+    fit = identify(case, table)
+    assert any("times the declared noise" in said for said in fit.warnings)
+    assert fit.misfit > 3.0
+
+
+def test_a_load_that_nothing_carries_is_an_error(case):
+    table = measured(case, TRUTH, SLIPS, LOADS)
+    table.columns["load_N"] = np.full(18, 1e6)
+    with pytest.raises(FitError, match="carries these loads nowhere"):
+        identify(case, table)
+
+
+def test_a_table_of_another_wheel_is_refused(case):
+    table = measured(case, TRUTH, SLIPS, LOADS)
+    table.columns["wheel_radius_m"] = np.where(np.arange(18) == 4, 0.1, 0.15)
+    with pytest.raises(TableError, match="row 5, column wheel_radius_m"):
+        identify(case, table)
+
+
+def closed(case):
+    """The same case on the closed form, whose own data the classical methods fit exactly."""
+    gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)
+    return replace(case, model=replace(case.model, gear=gear))
+
+
+def test_linear_least_squares_is_exact_on_the_closed_form(case):
+    given = closed(case).with_values({"shear_modulus": 0.012})
+    table = measured(given, TRUTH, SLIPS, LOADS, sinkage_m=True)
+    given = replace(given, noise=given.noise | {"sinkage_m": Noise(1e-5)}, prior={})
+    fit = identify(given, table, ["cohesion", "friction_angle"], method="linear")
+    assert fit["cohesion"] == pytest.approx(812.0, rel=1e-6)
+    assert fit["friction_angle"] == pytest.approx(0.6, rel=1e-6)
+    assert any("shear_modulus is taken as given" in said for said in fit.warnings)
+
+
+def test_linear_least_squares_carries_the_doubt_about_the_shear_modulus(case):
+    given = closed(case).with_values({"shear_modulus": 0.012})
+    given = replace(given, noise=case.noise | {"sinkage_m": Noise(1e-4)})
+    table = measured(given, TRUTH, SLIPS, LOADS, sinkage_m=True)
+    believed = identify(replace(given, prior={}), table, ["cohesion"], method="linear")
+    doubted = identify(given, table, method="linear")
+    assert (doubted.std > 3.0 * believed.std).all()
+
+
+def test_linear_least_squares_needs_sinkage_and_two_rows(case):
+    with pytest.raises(FitError, match="needs sinkage"):
+        identify(case, measured(case, TRUTH, SLIPS, LOADS), method="linear")
+    both = replace(case, noise=case.noise | {"sinkage_m": Noise(1e-4)})
+    table = measured(case, TRUTH, SLIPS[:1], LOADS[:1], sinkage_m=True)
+    with pytest.raises(FitError, match="needs two"):
+        identify(both, table, method="linear")
+
+
+def test_newton_raphson_is_exact_on_the_closed_form(case):
+    given = closed(case).with_values({"cohesion": 812.0})
+    truth = TRUTH | {"kphi": 1.2e6}
+    table = measured(given, truth, SLIPS, LOADS, sinkage_m=True)
+    given = replace(given, noise=given.noise | {"sinkage_m": Noise(1e-4)})
+    fit = identify(given, table, method="newton")
+    assert fit["friction_angle"] == pytest.approx(0.6, rel=1e-6)
+    assert fit["shear_modulus"] == pytest.approx(0.012, rel=1e-6)
+    assert fit["kphi"] == pytest.approx(1.2e6, rel=1e-6)
+
+
+def test_newton_raphson_says_when_the_rows_do_not_determine_all(case):
+    with pytest.raises(FitError, match="three or more"):
+        identify(case, measured(case, TRUTH, SLIPS[:2], LOADS[:2]), method="newton")
+    alike = measured(case, TRUTH, np.full(4, 0.3), np.full(4, 60.0), noise=0.05)
+    with pytest.raises(FitError, match="Newton-Raphson"):
+        identify(case, alike, method="newton")
+
+
+def test_json_holds_what_is_promised(case):
+    content = identify(case, measured(case, TRUTH, SLIPS, LOADS, noise=0.02)).as_json()
+    assert content["method"] == "nonlinear"
+    assert set(content["parameters"]) == set(TRUTH)
+    assert set(content["parameters"]["cohesion"]) >= {"value", "std", "unit"}
+    assert content["parameters"]["cohesion"]["unit"] == "Pa"
+    assert -1.0 <= content["correlation"]["cohesion"]["friction_angle"] <= 1.0
+    assert content["rows_used"] == 18

@@ -1,0 +1,101 @@
+"""What identification takes from a table: noise, and rows that count."""
+
+import numpy as np
+import pytest
+from conftest import MODEL
+
+from soilml import Operating, identify, read_case
+from soilml.errors import FitError, TableError
+from soilml.identification.observations import read_observations
+from soilml.io.table import Table
+
+SHEAR = ["friction_angle", "shear_modulus"]
+
+
+@pytest.fixture
+def case(tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL)
+    return read_case(tmp_path / "model.toml")
+
+
+@pytest.fixture
+def table(case):
+    slip, load = np.linspace(0.05, 0.55, 12), np.tile([40.0, 70.0, 100.0], 4)
+    force = case.model(case.soil, Operating(slip=slip, load=load))
+    run = np.full(12, "a")
+    columns = {"run": run, "slip": slip, "load_N": load, "torque_Nm": force.torque}
+    return Table(columns, "log.csv", np.arange(2, 14))
+
+
+def changed(table, **columns):
+    return Table(table.columns | columns, table.source, table.line)
+
+
+def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
+    plain = identify(case, table, SHEAR)
+    std = np.full(12, 0.05)
+    std[0] = np.nan
+    shaky = changed(table, slip_std=std, load_N_std=0.2 * table["load_N"])
+    data = read_observations(case, shaky)
+    assert data.slip_std.tolist() == [0.0, *[0.05] * 11]
+    assert (data.load_std > 0).all()
+    assert (identify(case, shaky, SHEAR).std > 1.5 * plain.std).all()
+    huge = changed(table, load_N_std=np.full(12, 1e300), slip_std=np.full(12, 1e300))
+    assert np.isfinite(identify(case, huge, SHEAR).std).all()
+    said = " ".join(identify(case, shaky, SHEAR, "newton").warnings)
+    assert "newton method does not carry noise of slip and load" in said
+
+
+@pytest.mark.parametrize("method", ["nonlinear", "newton"])
+def test_a_reading_of_zero_under_a_share_of_noise_does_not_decide_alone(case, table, method):
+    truth = identify(case, table, SHEAR, method)
+    torque = table["torque_Nm"].copy()
+    torque[4] = 0.0
+    fit = identify(case, changed(table, torque_Nm=torque), SHEAR, method)
+    said = " ".join(fit.warnings)
+    assert "log.csv line 6, column torque_Nm: a standard deviation of 0 is not believed" in said
+    assert "not declared" not in said
+    assert np.isfinite(fit.std).all() and (fit.std > truth.std).all()
+
+
+def test_a_standard_deviation_next_to_nothing_is_not_believed(case, table):
+    std = np.full(12, 0.05)
+    std[[2, 5]] = 1e-300
+    fit = identify(case, changed(table, torque_Nm_std=std), SHEAR)
+    assert (
+        "line 4, column torque_Nm: a standard deviation of 1e-300 is not believed, nor 1 more"
+        in (" ".join(fit.warnings))
+    )
+    np.testing.assert_allclose(
+        fit.std, identify(case, changed(table, torque_Nm_std=np.full(12, 0.05)), SHEAR).std
+    )
+    for bad in (
+        changed(table, torque_Nm_std=np.full(12, 1e-300)),
+        changed(table, torque_Nm=np.zeros(12)),
+    ):
+        with pytest.raises(FitError, match="line 2, column torque_Nm: a standard deviation of"):
+            identify(case, bad, SHEAR)
+
+
+def test_rows_without_an_answer_are_left_out_and_counted(case, table):
+    torque, status = table["torque_Nm"].copy(), np.full(12, "ok", dtype="<U20")
+    torque[[3, 7]], status[[3, 7]], status[0] = 99.0, "no equilibrium", ""
+    fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR)
+    assert fit.rows_used == 10
+    assert fit["friction_angle"] == pytest.approx(float(case.soil.friction_angle), rel=1e-4)
+    assert "2 rows are left out: their status is not ok" in fit.warnings
+    with pytest.raises(FitError, match=r"log\.csv: no row has the status ok"):
+        identify(case, changed(table, status=np.full(12, "no peak")), SHEAR)
+
+
+def test_a_method_of_fixed_unknowns_says_what_was_not_asked_for(case, table):
+    said = " ".join(identify(case, table, ["friction_angle"], "newton").warnings)
+    assert "shear_modulus, kphi found too, though not asked for" in said
+    assert "not asked for" not in " ".join(identify(case, table, None, "nonlinear").warnings)
+
+
+def test_rows_cannot_be_grouped_by_blank_cells(table):
+    time = np.arange(12.0)
+    time[5] = np.nan
+    with pytest.raises(TableError, match=r"log\.csv line 7, column time_s: is blank"):
+        list(changed(table, time_s=time).groups("time_s"))

@@ -1,0 +1,91 @@
+"""Tables: what is read, and what is said of faults."""
+
+import numpy as np
+import pytest
+
+from soilml import read_table
+from soilml.errors import TableError
+from soilml.io.read_table import RUNS
+
+GOOD = "run,slip,load_N,torque_Nm,sinkage_m\na,0.1,60,1.5,0.012\na,0.2,60,,0.013\nb,0.3,80,2.5,\n"
+
+
+def written(tmp_path, text, name="runs.csv"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_reads_numbers_names_and_blanks(tmp_path):
+    table = read_table(written(tmp_path, GOOD), RUNS)
+    assert len(table) == 3
+    assert table["run"].tolist() == ["a", "a", "b"]
+    assert np.isnan(table["torque_Nm"]).tolist() == [False, True, False]
+    assert [name for name, _ in table.groups("run")] == ["a", "b"]
+    assert len(table.where("run", "a")) == 2
+    assert len(table.where("load_N", "80")) == 1
+    assert table.place(2).endswith("line 4")
+
+
+def test_a_byte_order_mark_spaces_and_empty_lines_do_no_harm(tmp_path):
+    text = "\ufeff" + GOOD.replace(",", " , ").replace("\nb", "\n\nb")
+    assert len(read_table(written(tmp_path, text), RUNS)) == 3
+
+
+FAULTS = {
+    "missing column": ("run,slip,load_N\na,0.1,60\n", "torque_Nm is missing"),
+    "missing run": (GOOD.replace("run,", "").replace("a,", "").replace("b,", ""), "run is missing"),
+    "misspelt column": (GOOD.replace("torque_Nm", "torqe_Nm"), "did you mean 'torque_Nm'"),
+    "wrong case": (GOOD.replace("torque_Nm", "Torque_nm"), "did you mean 'torque_Nm'"),
+    "unit missing": (GOOD.replace("torque_Nm", "torque"), "name it torque_Nm"),
+    "wrong unit": (GOOD.replace("load_N", "load_kN"), "load is read in N"),
+    "wrong unit of length": (GOOD.replace("sinkage_m", "sinkage_mm"), "sinkage is read in m"),
+    "extra column": (GOOD.replace("sinkage_m", "weather"), "'weather' is not known"),
+    "column twice": (GOOD.replace("sinkage_m", "slip"), "slip stands twice"),
+    "text in a number": (GOOD.replace("0.013", "deep"), "line 3, column sinkage_m: 'deep'"),
+    "NaN": (GOOD.replace("0.013", "nan"), "line 3, column sinkage_m: 'nan'"),
+    "infinity": (GOOD.replace("2.5", "inf"), "line 4, column torque_Nm: 'inf'"),
+    "slip of one": (GOOD.replace("0.3,80", "1.0,80"), "line 4, column slip: 1 given"),
+    "slip in percent": (GOOD.replace("0.3,80", "30,80"), "line 4, column slip: 30 given"),
+    "slip blank": (GOOD.replace("0.3,80", ",80"), "line 4, column slip: is blank"),
+    "negative load": (GOOD.replace("0.3,80", "0.3,-80"), "line 4, column load_N: -80 given"),
+    "run blank": (GOOD.replace("b,", ","), "line 4, column run: is blank"),
+    "cells missing": (GOOD.replace("a,0.2,60,", "a,0.2,"), "line 3: 4 cells, the header has 5"),
+    "semicolons": (GOOD.replace(",", ";"), "separator must be a comma"),
+    "no rows": (GOOD.splitlines()[0] + "\n", "no row"),
+    "empty file": ("", "is empty"),
+    "binary": (b"PK\x03\x04\x00\x00", "binary"),
+    "latin text": ("run,slip\n\xe4".encode("latin-1"), "cannot be read as text"),
+    "std of zero": (
+        "run,slip,load_N,torque_Nm,torque_Nm_std\na,0.1,60,1.5,0\n",
+        "standard deviation above zero",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_faults_are_named_by_file_line_and_column(tmp_path, what):
+    text, said = FAULTS[what]
+    with pytest.raises(TableError) as caught:
+        read_table(written(tmp_path, text), RUNS)
+    assert said in str(caught.value)
+    assert "runs.csv" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_extra_columns_can_be_passed_over(tmp_path):
+    path = written(tmp_path, GOOD.replace("sinkage_m", "weather"))
+    table = read_table(path, RUNS, ignore_extra=True)
+    assert "weather" not in table
+
+
+def test_a_truncated_parquet_file_is_refused(tmp_path, small_data):
+    whole = small_data.read_bytes()
+    for cut in (len(whole) // 2, 10, 0):
+        with pytest.raises(TableError, match="not a whole Parquet file"):
+            read_table(written(tmp_path, whole[:cut], "cut.parquet"), RUNS)
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(TableError, match="no such file"):
+        read_table(tmp_path / "none.csv")

@@ -1,0 +1,49 @@
+"""The element-wise root finder against a scalar library one."""
+
+import numpy as np
+from scipy.optimize import brentq
+
+from soilml.numerics.root_finding import crossing, scan
+
+
+def test_finds_every_root_of_a_batch_of_steep_and_flat_functions():
+    rng = np.random.default_rng(0)
+    power, place = rng.uniform(0.3, 5.0, 400), rng.uniform(-6.0, 2.0, 400)
+
+    def f(x):
+        return np.log(0.1 + np.exp(power * (x - place))) - np.log(1.1)
+
+    low, high = np.full(400, -20.0), np.full(400, 5.0)
+    root = crossing(f, low, high, np.full(400, 0.0), np.full(400, 1.0))
+    assert root.found.all()
+    for i in range(0, 400, 37):
+        exact = brentq(
+            lambda x, i=i: np.log(0.1 + np.exp(power[i] * (x - place[i]))) - np.log(1.1), -20, 5
+        )
+        assert abs(root.x[i] - exact) < 1e-9
+
+
+def test_says_so_where_there_is_no_root_and_ends_at_the_upper_bound():
+    top = np.asarray([0.5, -0.5])
+    root = crossing(
+        lambda x: np.minimum(x, top), np.full(2, -9.0), np.full(2, 3.0), np.zeros(2) - 1, np.ones(2)
+    )
+    assert root.found.tolist() == [True, False]
+    assert root.x[1] == 3.0
+
+
+def test_scan_takes_the_first_of_several_crossings():
+    grid = np.linspace(0.1, 9.0, 200)[:, None]
+    low, high, exists, _ = scan(lambda x: np.sin(x) - 0.5, grid)
+    assert exists.all()
+    assert low[0] < np.pi / 6 <= high[0]
+    _, _, exists, peak = scan(lambda x: np.sin(x) - 1.5, grid)
+    assert not exists.any()
+    assert abs(np.sin(grid[peak[0], 0]) - 1.0) < 1e-3
+
+
+def test_scan_points_to_a_peak_before_the_crossing():
+    grid = np.linspace(0.1, 9.0, 200)[:, None]
+    low, _, exists, peak = scan(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
+    assert exists.all() and low[0] > 6.0
+    assert abs(grid[peak[0], 0] - np.pi / 2) < 0.2

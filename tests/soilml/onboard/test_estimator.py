@@ -1,0 +1,301 @@
+"""The onboard runtime: answers, flags, and files that are not ours."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from soilml import Estimator
+from soilml.errors import InputError, ModelFileError
+
+
+@pytest.fixture(scope="module")
+def estimator(small_model):
+    return Estimator.load(small_model)
+
+
+def test_answers_have_names_units_and_shapes(estimator):
+    one = estimator(slip=0.3, torque=3.0, load=60.0)
+    assert one.names == ("cohesion", "friction_angle", "shear_modulus")
+    assert one.units == ("Pa", "rad", "m")
+    assert one.mean.shape == (3,) and one.covariance.shape == (3, 3)
+    assert one.in_range.shape == () and bool(one.in_range)
+    np.testing.assert_allclose(np.sqrt(np.diag(one.covariance)), one.std, rtol=1e-5)
+    grid = estimator(slip=np.linspace(0.1, 0.5, 5), torque=3.0, load=np.full((2, 1), 60.0))
+    assert grid.mean.shape == (2, 5, 3) and grid.covariance.shape == (2, 5, 3, 3)
+    np.testing.assert_allclose(grid.mean[0, 2], one.mean, rtol=1e-6)
+    assert one["cohesion"] == (one.mean[0], one.std[0])
+    assert (one.low < one.mean).all() and (one.mean < one.high).all()
+
+
+def test_covariances_are_positive(estimator):
+    slip = np.linspace(0.06, 0.59, 40)
+    many = estimator(slip=slip, torque=60 * 0.15 * (0.2 + 0.4 * slip), load=60.0)
+    assert (np.linalg.eigvalsh(many.covariance) > 0).all()
+
+
+def test_readings_out_of_range_are_flagged_and_get_the_prior(estimator):
+    cases = {
+        "slip beyond": {"slip": 0.8, "torque": 4.0, "load": 60.0},
+        "braking": {"slip": -0.2, "torque": -2.0, "load": 60.0},
+        "load in kN": {"slip": 0.3, "torque": 3.0, "load": 0.06},
+        "load in gram force": {"slip": 0.3, "torque": 3.0, "load": 6000.0},
+        "torque of another wheel": {"slip": 0.3, "torque": 30.0, "load": 60.0},
+        "torque no soil gives": {"slip": 0.06, "torque": 8.0, "load": 60.0},
+    }
+    for readings in cases.values():
+        wild = estimator(**readings)
+        assert not bool(wild.in_range)
+        np.testing.assert_allclose(wild.std, estimator.prior.std, rtol=1e-6)
+        np.testing.assert_allclose(wild.mean, estimator.prior.mean, rtol=1e-6)
+
+
+def test_impossible_readings_are_refused(estimator):
+    good = {"slip": 0.3, "torque": 3.0, "load": 60.0}
+    for bad in ({"slip": 1.0}, {"slip": np.nan}, {"load": -3.0}, {"load": 0.0}, {"torque": np.inf}):
+        with pytest.raises(InputError, match=next(iter(bad))):
+            estimator(**(good | bad))
+    with pytest.raises(InputError, match="load is missing"):
+        estimator(slip=0.3, torque=3.0)
+    with pytest.raises(InputError, match="'speed' is not read"):
+        estimator(**good, speed=0.1)
+
+
+def test_rows_of_one_soil_together_say_more_than_one(estimator):
+    rng = np.random.default_rng(0)
+    slip, load = rng.uniform(0.1, 0.55, 12), rng.uniform(35.0, 110.0, 12)
+    from soilml import Model, Operating, Wheel, soil
+
+    sand = soil("wong1989/dry_sand", cohesion=900.0, friction_angle=0.6, shear_modulus=0.012)
+    force = Model(Wheel(radius=0.15, width=0.12))(sand, Operating(slip=slip, load=load))
+    together = estimator.run(slip=slip, torque=force.torque, load=load)
+    alone = estimator(slip=slip, torque=force.torque, load=load)
+    assert together.mean.shape == (3,)
+    assert (together.std[1:] < 0.8 * np.median(alone.std, axis=0)[1:]).all()
+    assert (together.std <= estimator.prior.std * 1.0001).all()
+
+
+def test_rows_that_no_one_soil_gives_are_flagged_and_get_the_prior(estimator):
+    slip, load = np.asarray([0.1, 0.3, 0.5] * 4), np.asarray([40.0, 60.0, 80.0] * 4)
+    torque = load * 0.15 * np.asarray([0.45, 0.40, 0.35] * 4)  # falls where it must rise
+    wild = estimator.run(slip=slip, torque=torque, load=load)
+    assert not bool(wild.in_range)
+    np.testing.assert_allclose(wild.mean, estimator.prior.mean)
+    np.testing.assert_allclose(wild.std, estimator.prior.std)
+
+
+def test_a_stray_row_is_left_out_and_many_are_not_forgiven(estimator):
+    good = {"slip": np.full(20, 0.3), "torque": np.full(20, 3.0), "load": np.full(20, 60.0)}
+    stray = {name: values.copy() for name, values in good.items()}
+    stray["torque"][0] = 90.0
+    kept = estimator.run(**{name: values[1:] for name, values in good.items()})
+    np.testing.assert_allclose(estimator.run(**stray).mean, kept.mean)
+    stray["torque"][:5] = 90.0
+    assert not bool(estimator.run(**stray).in_range)
+
+
+def test_joined_answers_stay_inside_the_prior_and_inside_their_interval(estimator):
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        slip, load = rng.uniform(0.06, 0.59, 6), rng.uniform(31.0, 119.0, 6)
+        torque = load * 0.15 * (0.1 + rng.uniform(0.2, 0.8) * slip**0.5)
+        one = estimator.run(slip=slip, torque=torque, load=load)
+        assert (one.mean >= estimator.prior.lower).all() and (
+            one.mean <= estimator.prior.upper
+        ).all()
+        assert (one.low <= one.mean).all() and (one.mean <= one.high).all()
+        assert (one.low < one.high).all()
+
+
+def test_no_reading_and_readings_of_two_lengths_are_refused(estimator):
+    with pytest.raises(InputError, match="no reading"):
+        estimator.run(slip=[], torque=[], load=[])
+    with pytest.raises(InputError, match="one shape"):
+        estimator(slip=[0.1, 0.2], torque=[1.0, 2.0, 3.0], load=60.0)
+
+
+def test_a_reading_repeated_tells_what_it_tells_once(estimator):
+    alone = estimator(slip=0.3, torque=3.0, load=60.0)
+    again = estimator.run(slip=np.full(500, 0.3), torque=np.full(500, 3.0), load=np.full(500, 60.0))
+    assert bool(again.in_range)
+    np.testing.assert_allclose(again.std, alone.std, rtol=0.1)
+    np.testing.assert_allclose(again.mean, alone.mean, atol=0.03 * alone.prior_std.min())
+    run = {"slip": [0.1, 0.3, 0.5], "torque": [1.7, 3.4, 7.0], "load": [40.0, 60.0, 110.0]}
+    once = estimator.run(**run)
+    often = estimator.run(**{name: np.repeat(values, 20) for name, values in run.items()})
+    for field in ("mean", "std", "low", "high"):
+        np.testing.assert_allclose(getattr(often, field), getattr(once, field), rtol=0.02)
+
+
+def test_one_row_together_is_that_row(estimator):
+    alone = estimator(slip=0.3, torque=3.0, load=60.0)
+    together = estimator.run(slip=0.3, torque=3.0, load=60.0)
+    for field in ("mean", "std", "covariance", "low", "high"):
+        np.testing.assert_array_equal(getattr(together, field), getattr(alone, field))
+
+
+def test_files_that_are_not_ours_are_refused(tmp_path, small_model):
+    whole = small_model.read_bytes()
+    files = {
+        "none.onnx": None,
+        "empty.onnx": b"",
+        "cut.onnx": whole[: len(whole) // 2],
+        "text.onnx": b"a model, honestly",
+    }
+    for name, content in files.items():
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(ModelFileError) as caught:
+            Estimator.load(tmp_path / name)
+        assert name in str(caught.value) and "\n" not in str(caught.value)
+    helper = onnx.helper
+    value = helper.make_tensor_value_info("x", 1, ["n"])
+    graph = helper.make_graph(
+        [helper.make_node("Identity", ["x"], ["y"])],
+        "foreign",
+        [value],
+        [helper.make_tensor_value_info("y", 1, ["n"])],
+    )
+    foreign = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)])
+    foreign.ir_version = 9
+    onnx.save(foreign, tmp_path / "foreign.onnx")
+    with pytest.raises(ModelFileError, match="none that soilml train wrote"):
+        Estimator.load(tmp_path / "foreign.onnx")
+
+
+def test_every_single_damaged_byte_is_found(tmp_path, small_model):
+    whole = small_model.read_bytes()
+    rng = np.random.default_rng(0)
+    for place in rng.integers(0, len(whole), 60):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        (tmp_path / "damaged.onnx").write_bytes(bytes(damaged))
+        with pytest.raises(ModelFileError) as caught:
+            Estimator.load(tmp_path / "damaged.onnx")
+        assert "\n" not in str(caught.value)
+
+
+def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
+    whole = small_model.read_bytes()
+    model = onnx.load(small_model)
+    more = onnx.ModelProto()
+    more.graph.initializer.append(
+        onnx.numpy_helper.from_array(np.zeros(1), model.graph.initializer[0].name)
+    )
+    swapped = onnx.ModelProto()
+    swapped.CopyFrom(model)
+    for entry in reversed(model.metadata_props):
+        swapped.metadata_props.remove(entry)
+        swapped.metadata_props.append(entry)
+    graph_alone = onnx.ModelProto()
+    graph_alone.CopyFrom(model)
+    del graph_alone.metadata_props[:]
+    front = len(graph_alone.SerializeToString(deterministic=True))
+    for content in (
+        whole + more.SerializeToString(),
+        more.SerializeToString() + whole,
+        whole[:front] + more.SerializeToString() + whole[front:],
+        whole + whole[front:],  # the metadata twice
+        swapped.SerializeToString(deterministic=True),
+    ):
+        (tmp_path / "more.onnx").write_bytes(content)
+        with pytest.raises(ModelFileError):
+            Estimator.load(tmp_path / "more.onnx")
+
+
+def test_what_is_mostly_the_prior_abstains(estimator):
+    near = estimator(slip=0.3, torque=3.0, load=60.0)
+    assert (near.abstains == (near.std > 0.8 * near.prior_std)).all()
+    assert near.abstains.any()
+    assert estimator(slip=0.3, torque=3000.0, load=60.0).abstains.all()
+
+
+def test_the_probe_asks_for_a_row_out_of_range(estimator):
+    asked = json.loads(estimator.metadata["probe"])[0]["in_range"]
+    assert asked == [True] * 8 + [False]
+
+
+def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small_model):
+    from soilml.onboard.model_file import checksum
+
+    model = onnx.load(small_model)
+    metadata = {e.key: e.value for e in model.metadata_props}
+    probe = json.loads(metadata["probe"])
+    probe[0]["mean"][0][0] += 1.0
+    metadata["probe"] = json.dumps(probe)
+    metadata["metadata_sha256"] = checksum(metadata)
+    for entry in model.metadata_props:
+        entry.value = metadata[entry.key]
+    (tmp_path / "other.onnx").write_bytes(model.SerializeToString(deterministic=True))
+    with pytest.raises(ModelFileError, match="fails its own probe"):
+        Estimator.load(tmp_path / "other.onnx")
+
+
+def test_damaged_metadata_is_refused(tmp_path, small_model):
+    from soilml.onboard.model_file import checksum
+
+    for key, value in {"outputs": "{", "together": "[]", "probe": "{}"}.items():
+        model = onnx.load(small_model)
+        for entry in model.metadata_props:
+            if entry.key == key:
+                entry.value = value
+        metadata = {e.key: e.value for e in model.metadata_props}
+        for entry in model.metadata_props:
+            if entry.key == "metadata_sha256":
+                entry.value = checksum(metadata)
+        (tmp_path / "damaged.onnx").write_bytes(model.SerializeToString(deterministic=True))
+        with pytest.raises(ModelFileError, match="metadata is damaged"):
+            Estimator.load(tmp_path / "damaged.onnx")
+
+
+def test_metadata_tells_where_the_file_comes_from(estimator):
+    metadata = estimator.metadata
+    for entry in json.loads(metadata["inputs"]):
+        assert set(entry) == {"name", "column", "unit", "lower", "upper"}
+    for entry in json.loads(metadata["outputs"]):
+        assert {"unit", "lower", "upper", "prior_mean", "prior_std"} <= set(entry)
+    assert len(metadata["recipe_sha256"]) == len(metadata["data_sha256"]) == 64
+    assert json.loads(metadata["gear"])["radius"] == 0.15
+    assert float(metadata["parity"]) < 1e-4
+    assert "estimator" in json.loads(metadata["metrics"])
+
+
+def test_the_file_holds_no_path_of_the_machine_it_was_made_on(small_model):
+    content = small_model.read_bytes()
+    for trace in (b"site-packages", str(Path.home()).encode(), b"stack_trace", b".py"):
+        assert trace not in content
+
+
+def test_the_runtime_loads_numpy_and_onnxruntime_and_nothing_of_the_ground(small_model, tmp_path):
+    shutil.copy(small_model, tmp_path / "m.onnx")
+    code = (
+        "import sys; from soilml.onboard.estimator import Estimator; e = Estimator.load('m.onnx');"
+        "e(slip=0.3, torque=3.0, load=60.0); e.run(slip=[0.3, 0.2], torque=[3.0, 2.0], load=60.0);"
+        "print(*sorted({m.split('.')[0] for m in sys.modules}));"
+        "print(*sorted(m for m in sys.modules if m.startswith('soilml.')))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    loaded, own = (set(line.split()) for line in done.stdout.splitlines())
+    assert {"numpy", "onnxruntime"} <= loaded
+    for ground in ("scipy", "sklearn", "torch", "pandas", "pyarrow", "matplotlib", "onnx", "rich"):
+        assert ground not in loaded
+    for ground in ("datagen", "training", "argparse_completions"):
+        assert ground not in loaded
+    assert own == {
+        "soilml.errors",
+        "soilml.onboard",
+        "soilml.onboard.estimate",
+        "soilml.onboard.features",
+        "soilml.onboard.gaussian_pooling",
+        "soilml.onboard.model_file",
+        "soilml.onboard.estimator",
+        "soilml.quantities",
+        "soilml.onboard.set_posterior",
+    }

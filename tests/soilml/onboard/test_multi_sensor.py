@@ -1,0 +1,113 @@
+"""Estimates of one quantity from several files, against exact Gaussian inference."""
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.multi_sensor import ACROSS_FILES, fused_estimates
+
+PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))
+
+
+def estimate(mean, std, in_range=True, prior=PRIOR, names=("slip",)):
+    mean, std = (np.asarray(x, float)[..., None] for x in np.broadcast_arrays(mean, std))
+    return Estimate(
+        names=names,
+        units=("1",),
+        mean=mean,
+        std=std,
+        covariance=std[..., None] ** 2,
+        low=mean - 1.7 * std,
+        high=mean + 1.7 * std,
+        in_range=np.broadcast_to(np.asarray(in_range), mean.shape[:-1]),
+        prior=prior,
+    )
+
+
+def posteriors(rows=20000, noise=(0.1, 0.2)):
+    """True slips drawn from the prior, and what sensors of independent errors make of them."""
+    rng = np.random.default_rng(0)
+    truth = rng.normal(0.3, 0.15, rows)
+    found = []
+    for std in noise:
+        reading = truth + std * rng.normal(size=rows)
+        gain = 0.15**2 / (0.15**2 + std**2)
+        found.append(estimate(0.3 + gain * (reading - 0.3), np.sqrt(1.0 - gain) * 0.15))
+    return truth, found
+
+
+def rms(values):
+    return np.sqrt(np.mean(values**2))
+
+
+def test_the_prior_counts_once():
+    truth, found = posteriors()
+    once = fused_estimates(found).estimate
+    exact = (0.15**-2 + 0.1**-2 + 0.2**-2) ** -0.5
+    np.testing.assert_allclose(once.std, exact, rtol=0.01)
+    assert rms(once.mean[:, 0] - truth) == pytest.approx(exact, rel=0.02)
+    inside = (once.low[:, 0] <= truth) & (truth <= once.high[:, 0])
+    assert inside.mean() == pytest.approx(0.9, abs=0.01)
+
+
+def test_weighing_by_variance_counts_it_twice_and_is_too_sure():
+    truth, found = posteriors()
+    for rule in ("inverse-variance", "pairwise"):
+        twice = fused_estimates(found, rule).estimate
+        assert rms((twice.mean[:, 0] - truth) / twice.std[:, 0]) > 1.15
+        assert rms(twice.mean[:, 0] - truth) > rms(
+            fused_estimates(found).estimate.mean[:, 0] - truth
+        )
+
+
+def test_where_readings_say_far_more_than_the_prior_the_rules_agree():
+    found = [estimate(0.30, 0.002), estimate(0.305, 0.004)]
+    once, paper = (fused_estimates(found, r).estimate for r in ("prior-once", "inverse-variance"))
+    assert paper.mean[0] == pytest.approx(0.301)  # eq. 26: weight 0.8 and 0.2
+    np.testing.assert_allclose(once.mean, paper.mean, atol=1e-5)
+    np.testing.assert_allclose(once.std, paper.std, rtol=1e-3)
+
+
+def test_whatever_errors_have_in_common_covariance_intersection_is_not_too_sure():
+    same = [estimate(0.4, 0.05)] * 2
+    assert fused_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("rule", ACROSS_FILES)
+def test_what_is_out_of_range_takes_no_part(rule):
+    flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
+    slips = np.full(4, 0.30)
+    both = fused_estimates(
+        [estimate(slips, 0.05, flags[0]), estimate(0.34 + 0 * slips, 0.05, flags[1])], rule
+    )
+    found = both.estimate
+    np.testing.assert_array_equal(both.used, flags)
+    assert found.in_range.tolist() == [True, True, True, False]
+    np.testing.assert_allclose(found.mean[1:, 0], [0.30, 0.34, 0.30])
+    np.testing.assert_allclose(found.std[1:, 0], [0.05, 0.05, 0.15])
+    np.testing.assert_allclose(found.low[1, 0], 0.30 - 1.7 * 0.05)  # its own interval
+    assert 0.30 < found.mean[0, 0] < 0.34
+
+
+def test_sensors_that_contradict_each_other_give_the_prior():
+    quarrel = fused_estimates([estimate(0.1, 0.02), estimate(0.5, 0.02)])
+    assert not quarrel.used.any() and not bool(quarrel.estimate.in_range)
+    np.testing.assert_array_equal(quarrel.estimate.mean, PRIOR.mean)
+    assert bool(fused_estimates([estimate(0.1, 0.1), estimate(0.5, 0.1)]).estimate.in_range)
+
+
+def test_what_does_not_belong_together_is_refused():
+    wide = PriorSummary(PRIOR.mean, 2.0 * PRIOR.std, PRIOR.lower, PRIOR.upper)
+    one = estimate(0.3, 0.1)
+    for others, said in (
+        ([estimate(0.3, 0.1, names=("n",))], "another n: only estimates of the same"),
+        ([estimate([0.3, 0.2], 0.1)], "have the shapes"),
+        ([estimate(0.3, 0.1, prior=wide)], "other priors of slip"),
+    ):
+        with pytest.raises(InputError, match=said):
+            fused_estimates([one, *others])
+    with pytest.raises(InputError, match="rule is 'best-linear'"):
+        fused_estimates([one, one], "best-linear")
+    with pytest.raises(InputError, match="no estimate given"):
+        fused_estimates([])

@@ -1,0 +1,205 @@
+"""One contract for every effect of the catalogue."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from conftest import input_box, solved
+
+from soilml import EFFECTS, GEARS, Model, Operating, Status, Wheel, soil
+from soilml.errors import InputError
+from soilml.parameters import check, declared
+from soilml.physics.effects.base import KINDS, STAGES, suits
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.equilibrium import prepared
+from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.physics.load_case import LoadCase
+from soilml.physics.operating_point import COVARIATES
+
+SAND = soil("wong1989/dry_sand")
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
+AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0, **KNOWN)
+CHANNELS = ("torque", "drawbar_pull", "sinkage")
+FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
+
+RIGID = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
+OF_WHEELS = [name for name, effect in EFFECTS.items() if suits(effect, WHEEL.gear)]
+every = pytest.mark.parametrize("name", OF_WHEELS)
+shaped = pytest.mark.parametrize(
+    "name", [n for n in OF_WHEELS if issubclass(EFFECTS[n], SlipLoadScaling)]
+)
+needy = pytest.mark.parametrize("name", [n for n, c in EFFECTS.items() if c.about.needs])
+
+
+def sized(name, share=1.0, **more):
+    """The effect at a share of its reference size, or at the bound of it."""
+    cls = EFFECTS[name]
+    bounds = declared(cls)
+    sizes = {k: min(share * v, bounds[k].upper) for k, v in cls.about.reference.items()}
+    return cls(**sizes, **more)
+
+
+def known_to(count):
+    """Speeds forward and back, passes and slip angles for rows of a box."""
+    rows = np.arange(count)
+    return {
+        "speed": np.where(rows % 3, 1.0, -1.0) * 10.0 ** (-3 + 4 * (rows % 17) / 16),
+        "pass_number": 1.0 + rows % 6,
+        "slip_angle": -1.5 + 3.0 * (rows % 29) / 28,
+    }
+
+
+@cache
+def plain(gear):
+    return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
+
+
+@pytest.mark.parametrize("gear", RIGID)
+@every
+def test_neutral_changes_nothing_to_the_last_bit(name, gear):
+    box = input_box(128, seed=4)
+    assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
+    neutral = solved(box, [EFFECTS[name]()], GEARS[gear], **known_to(128))
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
+
+
+@pytest.mark.parametrize("gear", RIGID)
+@every
+def test_finite_over_the_whole_box_or_flagged(name, gear):
+    box, known = input_box(512, seed=8), known_to(512)
+    for share in (0.5, 2.0):
+        effect = sized(name, share)
+        force = solved(box, [effect], GEARS[gear], **known)
+        ok = force.status == Status.OK
+        assert ok.mean() > 0.3
+        for channel in CHANNELS:
+            assert np.isfinite(getattr(force, channel)[ok]).all()
+            assert np.isnan(getattr(force, channel)[~ok]).all()
+        at = Operating(slip=box["slip"], load=box["load"], **known)
+        true = prepared(LoadCase(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
+        np.testing.assert_allclose(force.load[ok], true.load[ok], rtol=1e-6)
+        assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
+
+
+@every
+def test_any_size_within_its_bounds_is_answered_or_flagged(name):
+    box, known = input_box(64, seed=6), known_to(64)
+    size = EFFECTS[name].about.size
+    bounds = declared(EFFECTS[name])[size]
+    for value in (bounds.lower, bounds.upper):
+        force = solved(box, [EFFECTS[name](**{size: value})], **known)
+        ok = force.status == Status.OK
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+
+
+@every
+def test_signs_are_as_declared(name):
+    effect = sized(name)
+    before, changed = WHEEL(SAND, AT), (WHEEL + effect)(SAND, AT)
+    assert set(effect.about.signs) <= set(CHANNELS)
+    for channel, sign in effect.about.signs.items():
+        assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
+    assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
+
+
+@every
+def test_answers_change_smoothly_with_the_size(name):
+    def at_size(share):
+        force = (WHEEL + sized(name, share))(SAND, AT)
+        return np.stack([getattr(force, c) for c in CHANNELS])
+
+    h = 1e-4
+    coarse = (at_size(0.9 + 10 * h) - at_size(0.9 - 10 * h)) / (20 * h)
+    fine = (at_size(0.9 + h) - at_size(0.9 - h)) / (2 * h)
+    scale = np.abs(fine).max(axis=1, keepdims=True) + 1e-12
+    assert np.abs((coarse - fine) / scale).max() < 1e-4
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_is_described(name):
+    cls = EFFECTS[name]
+    card, parameters = cls.about, declared(cls)
+    assert cls.name == name
+    assert any(hasattr(cls, stage) for stage in STAGES)
+    assert card.text and card.source and card.isolate and "References:" in cls.__doc__
+    assert ".. math::" in cls.__doc__
+    assert card.kind in KINDS
+    assert issubclass(cls, SlipLoadScaling) == (card.kind in ("soil", "wheel"))
+    assert (card.calibration is not None) == (card.kind in ("rig", "sensor"))
+    assert card.size == next(iter(parameters if card.kind in ("rig", "sensor") else card.reference))
+    assert card.reference[card.size] != 0 and getattr(cls(), card.size) == 0
+    assert set(card.reference) <= set(parameters) and set(card.needs) <= set(COVARIATES)
+    check(cls())
+    check(sized(name))
+
+
+@needy
+def test_what_nobody_measured_is_asked_for_by_its_column(name):
+    (need,) = EFFECTS[name].about.needs
+    for effect in (EFFECTS[name](), sized(name)):
+        with pytest.raises(InputError) as caught:
+            (WHEEL + effect)(SAND, replace(AT, **{need: None}))
+        assert str(caught.value) == f"the effect {name} needs the column {COVARIATES[need]}"
+
+
+@every
+def test_nothing_else_is_asked_for(name):
+    spare = {field: None for field in COVARIATES if field not in EFFECTS[name].about.needs}
+    assert ((WHEEL + sized(name))(SAND, replace(AT, **spare)).status == 0).all()
+
+
+@shaped
+@pytest.mark.parametrize("slip, load", [(0.3, 100.0), (0.5, 40.0), (-0.2, 130.0)])
+def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
+    at = replace(AT, slip=slip, load=load)
+    growth = np.exp(0.7 * (abs(slip) - 0.3)) * (load / 100.0) ** 0.2
+    running = (WHEEL + sized(name, 0.8, by_slip=0.7, by_load=0.2))(SAND, at)
+    size = EFFECTS[name].about.size
+    scaled = {size: growth * getattr(sized(name, 0.8), size)}
+    fixed = (WHEEL + replace(sized(name, 0.8), **scaled))(SAND, at)
+    for channel in CHANNELS:
+        np.testing.assert_allclose(
+            getattr(running, channel), getattr(fixed, channel), rtol=1e-9, atol=1e-12
+        )
+
+
+@every
+def test_a_row_is_answered_alike_alone_and_among_others(name):
+    slips = np.asarray([-0.3, -0.004, 0.004, 0.012, 0.2, 0.6])
+    model = WHEEL + sized(name, -1.0 if name == "slip-scale" else 1.0)
+    together = model(SAND, replace(AT, slip=slips))
+    for i, slip in enumerate(slips):
+        alone = model(SAND, replace(AT, slip=slip))
+        for channel in CHANNELS:
+            np.testing.assert_allclose(
+                getattr(together, channel)[i], getattr(alone, channel), rtol=1e-13
+            )
+
+
+def test_the_two_forms_of_the_exit_angle_exclude_each_other():
+    exit_angle = EFFECTS["exit-angle"]
+    with pytest.raises(InputError, match="kappa or b0"):
+        exit_angle(kappa=0.1, b0=-0.1)
+    with pytest.raises(InputError, match="kappa or b0"):
+        exit_angle(kappa=np.asarray([0.0, 0.2]), b0=np.asarray([0.0, -0.1]))
+    exit_angle(kappa=np.asarray([0.0, 0.2]), b0=np.asarray([-0.1, 0.0]))
+
+
+def test_an_effect_can_stand_in_a_model_once():
+    with pytest.raises(InputError, match="already"):
+        _ = WHEEL + EFFECTS["slip-sinkage"]() + EFFECTS["slip-sinkage"]()
+
+
+def test_a_users_own_effect_takes_part():
+    class DeeperRut:
+        name = "deeper-rut"
+
+        def on_reading(self, force, scene):
+            return replace(force, sinkage=force.sinkage + 0.001)
+
+    force = (WHEEL + DeeperRut())(SAND, AT)
+    np.testing.assert_allclose(force.sinkage, WHEEL(SAND, AT).sinkage + 0.001, rtol=1e-12)

@@ -1,0 +1,140 @@
+"""A user's own effects, from a file of theirs."""
+
+import numpy as np
+import pytest
+
+from soilml import Model, Operating, Wheel, soil
+from soilml.errors import InputError
+from soilml.physics.effects.user_effects import load_effects
+
+OWN = '''\
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
+
+from soilml.arrays import Real
+from soilml.physics.effects import EffectCard
+from soilml.parameters import Parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crust:
+    """A crust carries a part of the load."""
+
+    name: ClassVar[str] = "crust"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="a crust carries a part of the load",
+        source="own",
+        kind="soil",
+        reference={"strength": 5.0},
+        signs={"sinkage": -1},
+        isolate="the same runs on raked soil",
+    )
+    strength: Annotated[Real, Parameter("N", 0.0, 50.0, "load that it carries")] = 0.0
+
+    def on_force(self, force, scene):
+        return replace(force, load=force.load + self.strength)
+'''
+SAND = soil("wong1989/dry_sand")
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "my-effects.py"
+    path.write_text(OWN)
+    return path
+
+
+def test_an_effect_of_ones_own_acts_as_those_of_the_catalogue(own):
+    (crust,) = load_effects(own).values()
+    at = Operating(slip=np.asarray([0.2, 0.5]), load=60.0)
+    found = (WHEEL + crust(strength=5.0))(SAND, at)
+    lighter = WHEEL(SAND, Operating(slip=at.slip, load=55.0))
+    np.testing.assert_allclose(found.sinkage, lighter.sinkage, rtol=1e-7)
+    np.testing.assert_array_equal((WHEEL + crust())(SAND, at).torque, WHEEL(SAND, at).torque)
+    with pytest.raises(InputError, match=r"crust\.strength is 70 N"):
+        (WHEEL + crust(strength=70.0))(SAND, at)
+
+
+def test_what_the_file_imports_and_what_it_hides_is_not_its_own(own):
+    more = "from soilml import Bulldozing\n\n\nclass _Base:\n    def on_force(self): ...\n"
+    own.write_text(OWN + "\n" + more)
+    assert list(load_effects(str(own))) == ["crust"]
+
+
+def test_a_changed_file_is_read_again_and_nothing_is_left_beside_it(own):
+    load_effects(own)
+    own.write_text(OWN.replace('"crust"', '"crusu"'))  # as long, within the same second
+    assert list(load_effects(own)) == ["crusu"]
+    assert [path.name for path in own.parent.iterdir()] == ["my-effects.py"]
+
+
+ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
+
+
+@pytest.mark.parametrize(
+    "old, new, said",
+    [
+        (OWN, "x = 1\n", "no effect in it; one is a frozen dataclass with name, about and one of"),
+        (OWN, "", "no effect in it"),
+        ("replace(force", "replace((force", "line "),
+        ("import annotations", "import annotation", "line 1: future feature annotation"),
+        (OWN, "x = 1 / 0\n", "ZeroDivisionError when run: division by zero"),
+        (OWN, "import soilml.nonsense\n", "ModuleNotFoundError when run"),
+        (OWN, "raise SystemExit('no')\n", "SystemExit when run: no"),
+        (OWN, "raise ValueError('two\\nlines')\n", "ValueError when run: two lines"),
+        ('"crust"', '"grousers"', "Crust: the catalogue has an effect 'grousers' already"),
+        ('    name: ClassVar[str] = "crust"\n', "", "Crust: name is missing"),
+        ('"crust"', '"my crust."', "Crust: name is 'my crust.'; it takes lower-case letters"),
+        (ABOUT, "", "Crust: about is missing"),
+        ('{"strength": 5.0}', "{}", "Crust: about.reference is empty"),
+        ('{"strength": 5.0}', '{"size": 1.0}', "has 'size'; its parameters are: strength"),
+        ('{"strength": 5.0}', '{"strength": 99.0}', "about.reference strength is 99 N"),
+        ("[Real, Parameter", "[Reel, Parameter", "types that exist and neutral defaults"),
+        (" = 0.0\n", "\n", "Crust: its fields need types that exist and neutral defaults"),
+        (" = 0.0\n", " = -1.0\n", "Crust: strength is -1 N"),
+        ("frozen=True, ", "", "Crust: an effect is decorated by @dataclass(frozen=True"),
+        ("@dataclass(frozen=True, kw_only=True)\n", "", "an effect is decorated by @dataclass"),
+        ("on_force", "on_forces", "Crust: it acts on nothing; it needs one of the methods on_op"),
+        ('"soil"', '"water"', "about.kind is 'water'; there are: soil, wheel, rig, sensor"),
+        (
+            "        signs",
+            "        needs=('moisture',),\n        signs",
+            "about.needs has 'moisture'",
+        ),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(own, old, new, said):
+    assert old in OWN
+    own.write_text(OWN.replace(old, new))
+    with pytest.raises(InputError) as caught:
+        load_effects(own)
+    text = str(caught.value)
+    assert text.startswith(f"{own}: ") and said in text and "\n" not in text
+
+
+def test_an_effect_that_only_derives_from_a_dataclass_is_refused(own):
+    own.write_text(OWN + '\n\nclass Thick(Crust):\n    name: ClassVar[str] = "thick"\n')
+    with pytest.raises(InputError, match="Thick: an effect is decorated"):
+        load_effects(own)
+
+
+def test_two_effects_of_one_name_are_refused(own):
+    again = OWN[OWN.index("@dataclass") :].replace("class Crust", "class Second")
+    own.write_text(OWN + "\n\n" + again)
+    with pytest.raises(InputError, match="Second: Crust is 'crust' already"):
+        load_effects(own)
+
+
+def test_a_file_that_is_not_there_or_no_python_is_refused(own, tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        load_effects(tmp_path / "none.py")
+    with pytest.raises(InputError, match="no such file"):
+        load_effects(tmp_path)
+    with pytest.raises(InputError, match=r"must end in \.py"):
+        load_effects(own.rename(tmp_path / "effects.txt"))
+    own.write_bytes(b"x = '\xff\x00'\n")
+    with pytest.raises(InputError, match=r"my-effects\.py: "):
+        load_effects(own)

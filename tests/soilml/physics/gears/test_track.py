@@ -1,0 +1,293 @@
+"""The track against dense quadrature along the belt, and as sentences of physics."""
+
+from dataclasses import replace
+
+import array_api_strict as strict
+import numpy as np
+import pytest
+import torch
+from conftest import input_box
+
+from soilml import EFFECTS, Model, Operating, ShearSoftening, Soil, Status, Track, Wheel, soil
+from soilml import TrackGrousers as Grousers
+from soilml.errors import InputError
+from soilml.physics.effects.base import suits
+
+GEAR = Track(radius=0.1, width=0.08, base=0.6)
+TRACK = Model(GEAR)
+SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
+LOAD = 637.0
+AT = Operating(slip=np.linspace(0.1, 0.9, 5), load=LOAD)
+FIELDS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
+EFFECTS_OF_TRACKS = {name: cls for name, cls in EFFECTS.items() if suits(cls, GEAR)}
+KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
+
+
+def walked(track, ground, slip, sinkage, count=100_001):
+    """(W, DP, T) by walking back along the belt, which remembers how deep its soil has been."""
+    r, b, L = track.radius, track.width, track.base
+    entry = np.arccos(1.0 - sinkage / r)
+    leave = track.leaving * entry
+    psi = np.arcsin(track.settling * sinkage / L)
+    meet = leave + 2.0 * psi
+    x_c, y_c = -r * np.sin(leave), sinkage - r * (1.0 - np.cos(leave))
+    across = L * np.cos(psi) - r * (np.sin(meet) + np.sin(leave))
+    down = track.settling * sinkage + r * (np.cos(meet) - np.cos(leave))
+    bend = 0.5 * np.hypot(across, down) / np.sin(0.5 * (leave + meet))  # eq. 3
+    front = np.linspace(entry, -leave, count)
+    arc = np.linspace(-leave, meet, count)
+    back = np.linspace(meet, -track.rear_leaving * meet, count)
+    depth = sinkage - r * (1.0 - np.cos(front))
+    x_arc = x_c - bend * (np.sin(arc) + np.sin(leave))
+    y_arc = y_c + bend * (np.cos(leave) - np.cos(arc))
+    x_axle = x_arc[-1] - r * np.sin(meet)
+    y_low = y_arc[-1] + r * (1.0 - np.cos(meet))
+    np.testing.assert_allclose([-x_axle, y_low - sinkage], [L * np.cos(psi), L * np.sin(psi)])
+    x = np.r_[r * np.sin(front), x_arc, x_axle + r * np.sin(back)]
+    depth = np.r_[depth, y_arc, y_low - r * (1.0 - np.cos(back))]
+    angle = np.r_[front, arc, back]
+    way = np.r_[0.0, np.cumsum(np.hypot(np.diff(x), np.diff(depth)))]
+    sheared = way - (1.0 - slip) * (x[0] - x)
+    k = ground.kc / b + ground.kphi
+    deepest = np.maximum.accumulate(np.maximum(depth, 0.0))
+    peak = k * deepest**ground.n
+    away = (deepest - depth) / (track.rebound * np.maximum(deepest, 1e-12))
+    sigma = np.maximum(peak * (1.0 - away), 0.0)
+    left = sigma / np.maximum(peak, 1e-9)
+    sheared = np.where(left < 1.0, sheared * (1.0 - np.exp(-left / 0.05)), sheared)
+    tau = ground.cohesion + sigma * np.tan(ground.friction_angle)
+    tau = tau * (1.0 - np.exp(-np.abs(sheared) / ground.shear_modulus)) * np.where(slip < 0, -1, 1)
+
+    def integral(f):
+        return b * np.sum(0.5 * (f[1:] + f[:-1]) * np.diff(way))
+
+    sin, cos = np.sin(angle), np.cos(angle)
+    return (
+        integral(sigma * cos + tau * sin),
+        integral(tau * cos - sigma * sin),
+        r * integral(tau),
+    )
+
+
+SHAPES = {
+    "usual": {},
+    "taut": {"leaving": 0.005, "rebound": 1.0},
+    "slack": {"leaving": 0.3, "rebound": 0.2},
+    "level": {"settling": 0.0},
+    "tail down": {"settling": 0.5, "rear_leaving": 0.3},
+    "hard to unload": {"rebound": 0.03},
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("ground", [SAND, CLAY], ids=["sand", "clay"])
+def test_agrees_with_a_dense_walk_along_the_belt(ground, shape):
+    track = replace(GEAR, **SHAPES[shape])
+    for load in (60.0, 637.0, 1500.0):
+        at = Operating(slip=np.asarray([0.02, 0.3, 0.9]), load=load)
+        force = Model(track)(ground, at)
+        assert load > 60.0 or (force.status == Status.OK).all()
+        for i, slip in enumerate(at.slip):
+            if force.status[i] == Status.TOO_HEAVY:
+                assert walked(track, ground, slip, float(track.deepest()))[0] < load
+                continue
+            carried, pull, torque = walked(track, ground, slip, float(force.sinkage[i]))
+            assert carried == pytest.approx(load, rel=4e-5)
+            assert force.torque[i] == pytest.approx(torque, rel=4e-5)
+            assert force.drawbar_pull[i] == pytest.approx(pull, abs=4e-5 * load)
+
+
+def test_a_braking_track_agrees_within_a_part_in_a_thousand():
+    force = TRACK(SAND, Operating(slip=np.asarray([-0.6, -0.2, -0.03]), load=LOAD))
+    for i, slip in enumerate((-0.6, -0.2, -0.03)):
+        carried, pull, _ = walked(GEAR, SAND, slip, float(force.sinkage[i]))
+        assert carried == pytest.approx(LOAD, rel=1e-3)
+        assert force.drawbar_pull[i] == pytest.approx(pull, abs=1e-3 * LOAD)
+    assert (force.drawbar_pull < 0).all()
+
+
+def boxed(count, seed, effects=()):
+    """Tracks, soils and driving that fill a wide box."""
+    box = input_box(count, seed)
+    names = ("cohesion", "friction_angle", "shear_modulus", "n", "kc", "kphi")
+    u = np.random.default_rng(seed).random((5, count))
+    radius = 0.04 * 5.0 ** u[0]
+    gear = Track(
+        radius=radius,
+        width=box["width"],
+        base=radius * (2.2 + 10.0 * u[1]),
+        leaving=0.01 * 30.0 ** u[2],
+        settling=0.5 * u[3],
+        rebound=0.05 * 20.0 ** u[4],
+    )
+    at = Operating(slip=box["slip"], load=3.0 * box["load"], **KNOWN)
+    return Model(gear, tuple(effects))(Soil(**{name: box[name] for name in names}), at), at
+
+
+def test_every_row_of_a_wide_box_is_answered_or_too_heavy():
+    force, at = boxed(512, seed=3)
+    assert set(force.status) <= {Status.OK, Status.TOO_HEAVY}
+    ok = force.status == Status.OK
+    assert 0.5 < ok.mean() < 1.0
+    np.testing.assert_allclose(force.load[ok], at.load[ok], rtol=1e-6)
+    assert (force.load[~ok] < at.load[~ok]).all()
+    for channel in FIELDS:
+        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+
+
+@pytest.mark.parametrize("name", EFFECTS_OF_TRACKS)
+def test_effects_are_neutral_or_finite_on_tracks(name):
+    cls = EFFECTS_OF_TRACKS[name]
+    neutral, plain = boxed(32, 5, [cls()])[0], boxed(32, 5)[0]
+    for field in (*FIELDS, "load", "status"):
+        assert getattr(neutral, field).tobytes() == getattr(plain, field).tobytes(), field
+    force, _ = boxed(32, 5, [cls(**cls.about.reference)])
+    ok = force.status == Status.OK
+    assert ok.mean() > 0.5
+    for channel in FIELDS:
+        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+
+
+@pytest.mark.parametrize("library", ["strict", "torch"])
+@pytest.mark.parametrize("effects", [(), (Grousers(spacing=0.8), ShearSoftening(share=1.0))])
+def test_same_answers_in_another_array_library(library, effects):
+    make = strict.asarray if library == "strict" else torch.from_numpy
+    slip = np.concatenate([np.linspace(-0.5, 0.8, 9), [0.3]])
+    load = np.concatenate([np.linspace(20.0, 2000.0, 9), [1e7]])  # the last cannot be carried
+    model = Model(GEAR, effects)
+    expected = model(SAND, Operating(slip=slip, load=load))
+    found = model(SAND, Operating(slip=make(slip), load=make(load)))
+    assert type(found.torque) is type(make(slip))
+    assert np.asarray(found.status).tolist() == expected.status.tolist() == 9 * [0] + [1]
+    for name in FIELDS:
+        values = np.asarray(getattr(found, name))
+        np.testing.assert_allclose(values, getattr(expected, name), rtol=1e-11, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "path", ["cohesion", "friction_angle", "shear_modulus", "kphi", "n", "settling", "rebound",
+             "leaving", "rear_leaving", "radius", "base", "spacing", "height"]
+)  # fmt: skip
+def test_gradients_flow_through_the_equilibrium(path):
+    grousers = Grousers(spacing=0.7)
+
+    def value(x):
+        ground, gear, effect = (
+            replace(part, **{path: x}) if hasattr(part, path) else part
+            for part in (SAND, GEAR, grousers)
+        )
+        slip = np.asarray([0.1, 0.3, 0.6])
+        at = Operating(slip=torch.from_numpy(slip) if torch.is_tensor(x) else slip, load=LOAD)
+        f = (Model(gear) + effect)(ground, at)
+        return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 500.0 * f.sinkage.sum()
+
+    middle = next(getattr(p, path) for p in (SAND, GEAR, grousers) if hasattr(p, path))
+    middle = 0.9 * middle
+    x = torch.tensor(middle, dtype=torch.float64, requires_grad=True)
+    value(x).backward()
+    h = 1e-5 * middle
+    expected = (value(middle + h) - value(middle - h)) / (2.0 * h)
+    assert float(x.grad) == pytest.approx(expected, rel=1e-5)
+
+
+def test_load_carried_is_smooth_in_sinkage():
+    from soilml.physics.equilibrium import loaded
+    from soilml.physics.load_case import LoadCase
+    from soilml.physics.model import flattened
+
+    z = np.linspace(1e-4, 0.08, 4001)
+    slack = replace(GEAR, leaving=0.1)
+    scene, _ = flattened(LoadCase(slack, CLAY, Operating(slip=0.3 + 0.0 * z, load=LOAD)))
+    load = loaded(scene, z).load
+    assert (np.diff(load) > 0).all()
+    steepness = np.diff(load) / np.diff(z)
+    assert np.abs(np.diff(steepness)[40:]).max() < 0.02 * steepness.max()
+
+
+def test_profile_follows_the_law_and_is_nothing_where_the_belt_does_not_touch():
+    slack = Model(replace(GEAR, leaving=0.2, rebound=0.2))
+    profile = slack.profile(SAND, Operating(slip=0.3, load=LOAD), points=2001)
+    depth = float(slack(SAND, Operating(slip=0.3, load=LOAD)).sinkage)
+    off = profile.normal <= 1e-3
+    assert 0.1 < off.mean() < 0.9 and (np.abs(profile.shear[off]) < 1e-3).all()
+    peak = SAND.kphi * depth**SAND.n
+    assert profile.normal[:400].max() == pytest.approx(peak, rel=1e-4)
+    rear = SAND.kphi * (1.2 * depth) ** SAND.n
+    assert profile.normal[-400:].max() == pytest.approx(rear, rel=1e-3)
+
+
+def test_torque_and_load_of_the_profile_are_those_of_the_force():
+    at = Operating(slip=0.3, load=LOAD)
+    profile, force = TRACK.profile(CLAY, at, points=20_001), TRACK(CLAY, at)
+    belt = GEAR.shape(np.asarray(float(force.sinkage)), CLAY, at)
+    length = GEAR.radius * (belt.entry + belt.leave + belt.meet + belt.exit)
+    length = length + belt.arc_radius * (belt.leave + belt.meet)
+    along = np.linspace(0.0, float(length), 20_001)
+    lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
+    assert GEAR.width * np.trapezoid(lift, along) == pytest.approx(LOAD, rel=1e-4)
+    turning = GEAR.width * GEAR.radius * np.trapezoid(profile.shear, along)
+    assert force.torque == pytest.approx(turning, rel=1e-4)
+
+
+def test_a_track_sinks_less_and_pulls_more_than_a_wheel_under_the_same_load():
+    at = replace(AT, load=300.0)
+    track, wheel = TRACK(SAND, at), Model(Wheel(radius=0.1, width=0.08))(SAND, at)
+    assert (track.sinkage < 0.5 * wheel.sinkage).all()
+    assert (track.drawbar_pull > wheel.drawbar_pull).all()
+
+
+def test_softer_soil_sinks_more_and_stronger_soil_pulls_more():
+    assert (TRACK(replace(SAND, kphi=5e5), AT).sinkage > TRACK(SAND, AT).sinkage).all()
+    for change in ({"cohesion": 3e3}, {"friction_angle": 0.6}, {"shear_modulus": 0.01}):
+        stronger = TRACK(replace(SAND, **change), AT)
+        assert (stronger.drawbar_pull > TRACK(SAND, AT).drawbar_pull).all()
+
+
+def test_a_taut_belt_spreads_the_load():
+    def deep(leaving):
+        return TRACK.__class__(replace(GEAR, leaving=leaving))(SAND, AT).sinkage
+
+    assert (deep(0.02) < deep(0.05)).all() and (deep(0.05) < deep(0.2)).all()
+
+
+def test_pull_is_below_what_mohr_and_coulomb_allow():
+    for ground in (SAND, CLAY):
+        most = 0.08 * 0.9 * ground.cohesion + LOAD * np.tan(ground.friction_angle)
+        assert (TRACK(ground, AT).drawbar_pull < most).all()
+
+
+def test_grousers_matter_on_cohesive_soil_and_hardly_on_sand():
+    def gain(ground):
+        lugged, bare = (TRACK + Grousers(spacing=0.8))(ground, AT), TRACK(ground, AT)
+        return lugged.drawbar_pull - bare.drawbar_pull
+
+    assert (gain(SAND) > 0).all() and (gain(CLAY) > 3.0 * gain(SAND)).all()
+    dry = replace(SAND, cohesion=0.0)
+    assert (np.abs(gain(dry))[1:] < 0.05 * TRACK(dry, AT).drawbar_pull[1:]).all()
+
+
+def test_grousers_far_slipped_shear_the_whole_block():
+    """Cohesion on the tips' plane and both sides, friction on the plane: eq. 13 beyond j_k."""
+    ground = replace(CLAY, shear_modulus=1e-4)
+    force = (TRACK + Grousers(spacing=1.0, height=0.012))(ground, Operating(slip=0.9, load=LOAD))
+    bare = TRACK(ground, Operating(slip=0.9, load=LOAD))
+    area = (bare.torque / 0.1 - LOAD * np.tan(ground.friction_angle)) / ground.cohesion
+    sides = force.torque / 0.1 - bare.torque / 0.1
+    assert sides == pytest.approx(ground.cohesion * area * 2.0 * 0.012 / 0.08, rel=0.1)
+
+
+def test_shear_that_softens_costs_pull_at_large_slip():
+    soft = TRACK + ShearSoftening(share=1.0, residual=0.7, peak=1.0)
+    ratio = soft(CLAY, AT).drawbar_pull / TRACK(CLAY, AT).drawbar_pull
+    assert ratio[0] > 1.0 and 0.65 < ratio[-1] < 0.8 and (np.diff(ratio) < 0).all()
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(InputError, match="above twice the radius"):
+        Track(radius=0.3, width=0.1, base=0.6)
+    with pytest.raises(InputError, match=r"settling is 0\.8; it must lie between 0 and 0.5"):
+        Model(replace(GEAR, settling=0.8))(SAND, AT)
+    with pytest.raises(InputError, match="track-grousers is one of tracks, not of wheel"):
+        Model(Wheel(radius=0.1, width=0.1)) + Grousers()
+    with pytest.raises(InputError, match="exit-angle is one of rigid wheels, not of track"):
+        TRACK + EFFECTS["exit-angle"]()

@@ -1,0 +1,229 @@
+"""The rigid wheel against adaptive quadrature, and as sentences of physics."""
+
+import numpy as np
+import pytest
+from conftest import input_box, solved
+from reference import equilibrium, forces, stresses, turning_points
+
+from soilml import ExitAngle, LinearWheel, Model, Operating, Soil, Status, Wheel, soil
+from soilml.physics.gears.shear_reversal import reversals
+
+SAND = soil("wong1989/dry_sand")
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+
+
+def relative(a, b):
+    return np.abs(a / b - 1.0)
+
+
+@pytest.mark.parametrize("braking", [False, True])
+def test_agrees_with_adaptive_quadrature_over_the_whole_input_box(braking):
+    box = input_box(512, seed=20 + braking)
+    box["slip"] = np.abs(box["slip"]) * (-1 if braking else 1)
+    force = solved(box)
+    rows = np.flatnonzero(force.status == 0)[:: 4 if braking else 3]
+    assert len(rows) > 50
+    for i in rows:
+        row = {name: values[i] for name, values in box.items()}
+        entry, pull, torque = equilibrium(row, near=force.entry_angle[i])
+        assert relative(force.entry_angle[i], entry) < 1e-7
+        assert relative(force.torque[i], torque) < 1e-6
+        scale = max(abs(pull), 1e-3 * row["load"])
+        assert abs(force.drawbar_pull[i] - pull) < 1e-6 * scale
+
+
+def test_agrees_at_the_corners_of_the_box():
+    names = ("cohesion", "friction_angle", "shear_modulus", "n", "kphi", "slip", "load", "radius")
+    ends = {
+        "cohesion": (0.0, 6000.0),
+        "friction_angle": np.deg2rad((15.0, 50.0)),
+        "shear_modulus": (0.002, 0.06),
+        "n": (0.4, 1.6),
+        "kphi": (4e4, 1e7),
+        "slip": (-0.9, 0.95),
+        "load": (5.0, 1000.0),
+        "radius": (0.04, 0.5),
+    }
+    corners = np.stack(np.meshgrid(*[[0, 1]] * 8), axis=-1).reshape(-1, 8)
+    box = {n: np.asarray(ends[n])[corners[:, i]] for i, n in enumerate(names)}
+    for name, value in {"width": 0.1, "kc": 0.0, "a0": 0.4, "a1": 0.15}.items():
+        box[name] = np.full(len(corners), value)
+    force = solved(box)
+    rows = np.flatnonzero(force.status == 0)[::5]
+    assert len(rows) > 25
+    for i in rows:
+        row = {name: values[i] for name, values in box.items()}
+        entry, pull, torque = equilibrium(row, near=force.entry_angle[i])
+        assert relative(force.entry_angle[i], entry) < 1e-7
+        assert relative(force.torque[i], torque) < 1e-6
+        assert abs(force.drawbar_pull[i] - pull) < 1e-6 * max(abs(pull), 1e-3 * row["load"])
+
+
+def test_exit_angle_agrees_with_adaptive_quadrature():
+    at = Operating(slip=0.25, load=80.0)
+    force = (WHEEL + ExitAngle(kappa=0.2))(SAND, at)
+    row = {"radius": 0.15, "width": 0.12, "slip": 0.25, "load": 80.0}
+    row |= {n: getattr(SAND, n) for n in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {n: getattr(SAND, n) for n in ("kc", "kphi", "n", "a0", "a1")}
+    leave = -np.arccos(1.0 - 0.2 * force.sinkage / 0.15)
+    load, pull, torque = forces(float(force.entry_angle), row, float(leave))
+    assert load == pytest.approx(80.0, rel=1e-8)
+    assert force.drawbar_pull == pytest.approx(pull, rel=1e-8)
+    assert force.torque == pytest.approx(torque, rel=1e-8)
+
+
+def test_rows_beyond_what_the_soil_carries_are_flagged_and_blank():
+    box = input_box(512, seed=3)
+    box["slip"] = np.abs(box["slip"])
+    force = solved(box)
+    heavy = np.flatnonzero(force.status == Status.TOO_HEAVY)
+    assert len(heavy) > 20
+    for i in heavy[::8]:
+        row = {name: values[i] for name, values in box.items()}
+        most, _, _ = forces(np.pi / 2, row)
+        assert most < row["load"]
+        assert force.load[i] == pytest.approx(most, rel=1e-6)
+        assert np.isnan([force.torque[i], force.drawbar_pull[i], force.sinkage[i]]).all()
+    # and none is flagged that the reference can carry
+    for i in np.flatnonzero(force.status == 0)[::40]:
+        row = {name: values[i] for name, values in box.items()}
+        assert forces(np.pi / 2, row)[0] >= row["load"]
+
+
+def test_a_braking_wheel_rests_at_the_first_depth_that_carries_it():
+    box = input_box(256, seed=9)
+    box["slip"] = -np.abs(box["slip"])
+    force = solved(box)
+    for i in np.flatnonzero(force.status == 0)[::6]:
+        row = {name: values[i] for name, values in box.items()}
+        shallower = np.linspace(0.02, 0.999, 60) * force.entry_angle[i]
+        assert all(forces(t, row)[0] < row["load"] for t in shallower)
+
+
+SHALLOW = [  # radius, width, c, phi, K, kc, kphi, n, slip, load; first rest, m
+    (0.132, 0.2, 4740, 0.384, 0.0029, 283, 200700, 1.165, -0.0835, 10.59, 0.02372),
+    (0.1881, 0.2425, 2458, 0.2759, 0.005924, 1142, 68130, 1.289, -0.2171, 10.25, 0.04573),
+    (0.20922514, 0.38138873, 3038.31, 0.4060822, 0.00284310443, 30767.961, 61492.867, 1.51986868,
+     -0.47842663, 21.615, 0.09319),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SHALLOW)
+def test_a_braking_wheel_rests_at_the_first_of_several_depths(case):
+    radius, width, c, phi, K, kc, kphi, n, slip, load, first = case
+    ground = Soil(cohesion=c, friction_angle=phi, shear_modulus=K, kc=kc, kphi=kphi, n=n)
+    force = Model(Wheel(radius=radius, width=width))(ground, Operating(slip=slip, load=load))
+    assert force.status == Status.OK
+    assert force.sinkage == pytest.approx(first, rel=5e-4)
+    row = {"radius": radius, "width": width, "slip": slip}
+    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    assert forces(float(force.entry_angle), row)[0] == pytest.approx(load, rel=1e-7)
+    assert max(forces(t, row)[0] for t in np.linspace(0.1, 0.99, 20) * force.entry_angle) < load
+    deeper = [forces(t, row)[0] for t in np.linspace(force.entry_angle, np.pi / 2, 30)]
+    assert min(deeper) < load < deeper[-1]  # there is another further down
+
+
+TWICE = [  # radius, width, c, phi, K, kc, kphi, n, slip, load, kappa
+    (0.2649, 0.2286, 4552.0, 0.3675, 0.005238, 1094.0, 267500.0, 1.495, -0.0468, 40.82, 0.793),
+    (0.1669, 0.2375, 1653.7, 0.75319, 0.010844, 0.0, 326000.0, 1.289, -0.2662, 553.64, 0.97),
+]
+
+
+@pytest.mark.parametrize("case", TWICE)
+def test_shear_that_turns_behind_the_axle_agrees_with_adaptive_quadrature(case):
+    radius, width, c, phi, K, kc, kphi, n, slip, load, kappa = case
+    ground = Soil(cohesion=c, friction_angle=phi, shear_modulus=K, kc=kc, kphi=kphi, n=n)
+    model = Model(Wheel(radius=radius, width=width)) + ExitAngle(kappa=kappa)
+    force = model(ground, Operating(slip=slip, load=load))
+    entry = float(force.entry_angle)
+    leave = -float(np.arccos(1.0 - kappa * force.sinkage / radius))
+    assert len([t for t in turning_points(entry, leave, slip) if entry - t > 1e-6]) == 2
+    row = {"radius": radius, "width": width, "slip": slip}
+    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    carried, pull, torque = forces(entry, row, leave)
+    assert carried == pytest.approx(load, rel=1e-7)
+    assert force.torque == pytest.approx(torque, rel=1e-7)
+    assert abs(force.drawbar_pull - pull) < 1e-7 * load
+
+
+def test_all_angles_at_which_displacement_vanishes_are_found():
+    rng = np.random.default_rng(0)
+    slip = -np.exp(rng.uniform(np.log(1e-3), np.log(0.95), 400))
+    turning = np.arccos(1.0 / (1.0 - slip))
+    entry = np.minimum(turning * rng.uniform(0.3, 2.2, 400), np.pi / 2)
+    leave = -entry * rng.random(400)
+    angle, there = reversals(entry, leave, slip)
+    assert there.sum(axis=0).max() == 2
+    for i in range(400):
+        expected = [t for t in turning_points(entry[i], leave[i], slip[i]) if entry[i] - t > 1e-6]
+        np.testing.assert_allclose(np.sort(angle[there[:, i], i]), expected, atol=1e-9)
+
+
+def test_a_place_of_maximum_stress_outside_the_contact_is_a_reason():
+    bad = Soil(cohesion=0.0, friction_angle=0.5, shear_modulus=0.01, kc=0.0, kphi=1e6, n=1.0)
+    force = WHEEL(bad, Operating(slip=np.asarray([0.2, 0.9]), load=60.0))
+    assert (force.status == 0).all()
+    from dataclasses import replace
+
+    force = WHEEL(replace(bad, a0=0.5, a1=0.6), Operating(slip=np.asarray([0.2, 0.9]), load=60.0))
+    assert force.status.tolist() == [Status.OK, Status.NO_PEAK]
+    assert np.isnan(force.torque[1])
+    force = WHEEL(replace(bad, kphi=-5.0), Operating(slip=0.2, load=60.0))
+    assert force.status == Status.NO_BEARING
+
+
+def test_profile_of_stresses_follows_the_equations():
+    profile = WHEEL.profile(SAND, Operating(slip=0.3, load=60.0), points=41)
+    row = {"radius": 0.15, "width": 0.12, "slip": 0.3}
+    row |= {n: getattr(SAND, n) for n in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {n: getattr(SAND, n) for n in ("kc", "kphi", "n", "a0", "a1")}
+    assert profile.angle.shape == (41,)
+    for angle, normal, shear in zip(profile.angle, profile.normal, profile.shear, strict=True):
+        sigma, tau = stresses(angle, profile.angle[0], 0.0, row)
+        assert normal == pytest.approx(sigma, rel=1e-9, abs=1e-6)
+        assert shear == pytest.approx(tau, rel=1e-9, abs=1e-6)
+
+
+def test_softer_soil_sinks_more_and_heavier_wheels_too():
+    loads = np.linspace(20.0, 150.0, 8)
+    depth = WHEEL(SAND, Operating(slip=0.2, load=loads)).sinkage
+    assert (np.diff(depth) > 0).all()
+    from dataclasses import replace
+
+    soft = WHEEL(replace(SAND, kphi=0.5 * SAND.kphi), Operating(slip=0.2, load=loads)).sinkage
+    assert (soft > depth).all()
+
+
+def test_stronger_soil_pulls_more_and_slip_mobilises_it():
+    from dataclasses import replace
+
+    slips = np.linspace(0.0, 0.9, 12)
+    force = WHEEL(SAND, Operating(slip=slips, load=60.0))
+    assert (np.diff(force.torque) > 0).all()
+    for change in ({"cohesion": 3000.0}, {"friction_angle": 0.7}, {"shear_modulus": 0.005}):
+        stronger = WHEEL(replace(SAND, **change), Operating(slip=slips[1:], load=60.0))
+        assert (stronger.drawbar_pull > force.drawbar_pull[1:]).all()
+
+
+def test_a_braking_wheel_is_pulled_back():
+    force = WHEEL(SAND, Operating(slip=np.asarray([-0.6, -0.3]), load=60.0))
+    assert (force.torque < 0).all()
+    assert (force.drawbar_pull < 0).all()
+
+
+@pytest.mark.parametrize("gear", [Wheel, LinearWheel])
+def test_any_shape_broadcasts_and_chunks_do_not_matter(gear, monkeypatch):
+    model = Model(gear(radius=0.15, width=np.asarray([[0.08], [0.12]])))
+    slip = np.linspace(-0.4, 0.6, 7)
+    at = Operating(slip=slip, load=60.0)
+    together = model(SAND, at)
+    assert together.torque.shape == (2, 7)
+    for j in range(7):
+        alone = model(SAND, Operating(slip=slip[j], load=60.0))
+        assert alone.torque.shape == (2, 1)
+        np.testing.assert_allclose(alone.torque[:, 0], together.torque[:, j], rtol=1e-12)
+    monkeypatch.setattr("soilml.physics.model.CHUNK", 3)
+    np.testing.assert_allclose(model(SAND, at).torque, together.torque, rtol=1e-12)
+    assert model(SAND, Operating(slip=np.zeros(0), load=60.0)).torque.shape[-1] == 0

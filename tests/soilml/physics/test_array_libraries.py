@@ -1,0 +1,85 @@
+"""One source of physics runs on numpy, torch and a strict array library."""
+
+from dataclasses import replace
+
+import array_api_strict as strict
+import numpy as np
+import pytest
+import torch
+
+from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
+from soilml.physics.effects.base import suits
+
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if suits(cls, WHEEL.gear)}
+CASES = {
+    "all": replace(WHEEL, effects=tuple(cls(**cls.about.reference) for cls in OF_WHEELS.values())),
+    **{name: WHEEL + cls(**cls.about.reference) for name, cls in OF_WHEELS.items()},
+}
+SAND = soil("wong1989/dry_sand")
+SLIP = np.concatenate([np.linspace(-0.5, 0.8, 9), [0.3]])
+LOAD = np.concatenate([np.linspace(20.0, 150.0, 9), [1e5]])  # the last cannot be carried
+FIELDS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
+
+
+KNOWN = {
+    "speed": np.linspace(-0.1, 0.3, 10),
+    "pass_number": np.arange(10.0) % 3 + 1.0,
+    "slip_angle": np.linspace(-0.3, 0.3, 10),
+}
+
+
+@pytest.mark.parametrize("library", ["strict", "torch"])
+@pytest.mark.parametrize("case", CASES)
+def test_same_answers_in_another_array_library(library, case):
+    make = strict.asarray if library == "strict" else torch.from_numpy
+    given = {"slip": SLIP, "load": LOAD, **KNOWN}
+    expected = CASES[case](SAND, Operating(**given))
+    found = CASES[case](SAND, Operating(**{name: make(value) for name, value in given.items()}))
+    assert type(found.torque) is type(make(SLIP))
+    for name in FIELDS:
+        values = np.asarray(getattr(found, name))
+        np.testing.assert_allclose(values, getattr(expected, name), rtol=1e-12, atol=1e-15)
+    assert np.asarray(found.status).tolist() == expected.status.tolist()
+
+
+@pytest.mark.parametrize("gear", [Wheel, LinearWheel])
+@pytest.mark.parametrize("name", OF_WHEELS)
+def test_gradients_flow_through_the_size_of_every_effect(name, gear):
+    size = EFFECTS[name].about.size
+    bare = Model(gear(radius=0.15, width=0.12))
+    slip, known = np.asarray([0.2, 0.3, 0.6]), {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2}
+
+    def value(x):
+        at = Operating(slip=torch.from_numpy(slip) if torch.is_tensor(x) else slip, load=70.0)
+        f = (bare + EFFECTS[name](**{size: x}))(SAND, replace(at, **known))
+        return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 50.0 * f.sinkage.sum()
+
+    reference = 0.7 * EFFECTS[name].about.reference[size]
+    x = torch.tensor(reference, dtype=torch.float64, requires_grad=True)
+    value(x).backward()
+    h = 1e-4 * reference
+    expected = (value(reference + h) - value(reference - h)) / (2 * h)
+    assert float(x.grad) == pytest.approx(expected, rel=1e-5)
+
+
+def test_gradients_flow_through_the_equilibrium():
+    names = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
+    at = Operating(slip=torch.tensor([0.1, 0.3, 0.6], dtype=torch.float64), load=70.0)
+    values = {
+        name: torch.tensor(getattr(SAND, name), dtype=torch.float64, requires_grad=True)
+        for name in names
+    }
+    force = WHEEL(replace(SAND, **values), at)
+    total = force.torque.sum() + 0.1 * force.drawbar_pull.sum() + 50.0 * force.sinkage.sum()
+    total.backward()
+
+    def value(**changes):
+        f = WHEEL(replace(SAND, **changes), Operating(slip=np.asarray([0.1, 0.3, 0.6]), load=70.0))
+        return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 50.0 * f.sinkage.sum()
+
+    for name in names:
+        x = getattr(SAND, name)
+        h = 1e-5 * x
+        expected = (value(**{name: x + h}) - value(**{name: x - h})) / (2 * h)
+        assert float(values[name].grad) == pytest.approx(expected, rel=1e-5)

@@ -1,0 +1,108 @@
+"""The forces of a rover's wheels on a slope."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.systems.climbing import Rover, SimulatedRover, Uncertainty
+from soilml.systems.climbing.ability import grip_of_rover
+from soilml.systems.climbing.balance_noise import spread
+from soilml.systems.climbing.wheel_force_parts import parts, pull_of_rover
+from soilml.systems.climbing.wheel_loads import with_loads
+from soilml.systems.force_sensor_wheel import forces
+
+EXACT = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0)
+
+
+@pytest.fixture(scope="module")
+def true():
+    return SimulatedRover(noise=EXACT, stress=0.0)
+
+
+@pytest.fixture(scope="module")
+def climb(true):
+    return true.climbs(np.random.default_rng(0), [0.14], 1)[0]
+
+
+def test_forces_are_straight_lines_in_magnification_and_cohesion(true, climb):
+    wheel = parts(climb.front, true.rover, 0.007)
+    whole = forces(
+        climb.front.profile,
+        magnification=1.7,
+        cohesion=300.0,
+        friction_angle=0.6,
+        shear_modulus=0.007,
+        slip=climb.front.slip,
+        radius=0.055,
+        width=0.064,
+    )
+    assert wheel.pull(1.7, 300.0, np.tan(0.6)) == pytest.approx(whole.drawbar_pull, rel=1e-12)
+    assert wheel.load(1.7, 300.0, np.tan(0.6)) == pytest.approx(whole.load, rel=1e-12)
+
+
+def test_the_wheels_carry_the_weight_across_the_slope():
+    rover = Rover(mass=12.0, radius=0.055, width=0.064, front_share=0.55, height_ratio=0.4)
+    for slope in (0.0, 0.1, 0.2):
+        assert 2.0 * sum(rover.loads(slope)) == pytest.approx(rover.weight * np.cos(slope))
+    assert rover.loads(0.2)[0] / rover.loads(0.2)[1] < rover.loads(0.0)[0] / rover.loads(0.0)[1]
+
+
+def test_half_a_centre_of_mass_is_refused():
+    with pytest.raises(InputError, match="belong together"):
+        Rover(mass=12.0, radius=0.055, width=0.064, front_share=0.5)
+
+
+def test_a_climb_balances_at_its_true_soil(true, climb):
+    c, phi, k = true.shear
+    wheels = parts(climb.front, true.rover, k), parts(climb.rear, true.rover, k)
+    pull = pull_of_rover(true.rover, climb.slope, wheels, c, np.tan(phi))
+    # what is left is the sampling of the rim
+    assert pull == pytest.approx(true.rover.weight * np.sin(climb.slope), abs=0.6)
+
+
+def test_soil_that_gives_way_pulls_less(true, climb):
+    wheels = tuple(parts(w, true.rover, np.asarray([0.003, 0.007, 0.02])) for w in climb.wheels)
+    pull = pull_of_rover(true.rover, climb.slope, wheels, 0.0, np.tan(0.66))
+    assert np.all(np.diff(pull) < 0.0)
+
+
+def test_the_slope_that_a_grip_climbs_is_where_pull_equals_weight(true, climb):
+    wheels = tuple(parts(w, true.rover, 0.007) for w in climb.wheels)
+    for cohesion in (0.0, 800.0):
+        grip = grip_of_rover(true.rover, wheels, cohesion, np.tan(0.66), true.rover.front_share)
+        slope = grip.slope()
+        assert grip.pull(slope) == pytest.approx(true.rover.weight * np.sin(slope), rel=1e-12)
+        apart = pull_of_rover(true.rover, slope, wheels, cohesion, np.tan(0.66))
+        assert grip.pull(slope) == pytest.approx(apart, rel=1e-12)
+
+
+def test_loads_of_wheels_are_found_from_climbs(true):
+    climbs = true.climbs(np.random.default_rng(1), [0.0, 0.07, 0.14, 0.2], 1)
+    unknown = replace(true.rover, front_share=None, height_ratio=None)
+    found = with_loads(unknown, climbs, true.shear)
+    assert found.front_share == pytest.approx(0.52, abs=0.005)
+    assert found.height_ratio == pytest.approx(0.4, abs=0.03)
+
+
+def test_speed_matters_most_at_low_slip(true):
+    noise = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0, speed_scale=0.01)
+    climbs = true.climbs(np.random.default_rng(2), [0.0, 0.1, 0.2], 1)
+    by_speed = [abs(spread(true.rover, c, true.shear, noise)[1]) for c in climbs]
+    assert by_speed[0] > 2.0 * by_speed[2]
+
+
+def test_noise_of_the_balance_is_what_repeated_readings_show():
+    """First-order spread against 200 readings of one climb."""
+    noise = Uncertainty(speed=0.006, slope=0.004, entry_angle=0.0, front_load=0.08)
+    true = SimulatedRover(noise=noise, stress=0.2)
+    c, phi, k = true.shear
+    unknown = replace(true.rover, front_share=None, height_ratio=None)
+    off = []
+    for climb in true.climbs(np.random.default_rng(3), [0.1], 200):
+        wheels = parts(climb.front, true.rover, k), parts(climb.rear, true.rover, k)
+        pull = pull_of_rover(unknown, climb.slope, wheels, c, np.tan(phi))
+        off.append(pull - true.rover.weight * np.sin(climb.slope))
+    claimed = spread(unknown, climb, true.shear, noise)[0]
+    assert np.std(off) == pytest.approx(claimed, rel=0.2)

@@ -1,0 +1,204 @@
+"""Forces that follow from a measured stress, and the two unknowns that balance them."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
+from soilml.errors import FitError, InputError
+from soilml.systems.force_sensor_wheel import (
+    Run,
+    SensingWheel,
+    Strength,
+    StressProfile,
+    balanced_arc,
+    conventional,
+    forces,
+    solve,
+    stressed_arc,
+)
+from soilml.systems.force_sensor_wheel.force_balance import excess
+
+SENSORS = SensingWheel(noise=0.0)
+PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
+STRENGTH = Strength(friction_angle=PHI)
+RIM = {"radius": 0.055, "width": 0.064}
+
+
+def by_hand(profile, magnification, modulus, cohesion, slip):
+    entry, leave = profile.entry_angle, profile.exit_angle
+
+    def stresses(x):
+        normal = magnification * np.interp(x, profile.angle, profile.normal)
+        j = 0.055 * (entry - x - (1 - slip) * (math.sin(entry) - math.sin(x)))
+        strength = cohesion + normal * math.tan(PHI)
+        return normal, math.copysign(strength * (1 - math.exp(-abs(j) / modulus)), slip)
+
+    def total(f):
+        ends = np.linspace(leave, entry, 41)
+        parts = [quad(f, a, b, epsabs=1e-9)[0] for a, b in pairwise(ends)]
+        return 0.055 * 0.064 * math.fsum(parts)
+
+    return (
+        total(lambda x: stresses(x)[0] * math.cos(x) + stresses(x)[1] * math.sin(x)),
+        total(lambda x: stresses(x)[1] * math.cos(x) - stresses(x)[0] * math.sin(x)),
+        0.055 * total(lambda x: stresses(x)[1]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("cohesion", "slip", "modulus"), [(0.0, 0.11, 0.0072), (800.0, 0.6, 0.001), (0.0, -0.2, 0.003)]
+)
+def test_forces_are_those_of_dense_quadrature(cohesion, slip, modulus):
+    profile = stressed_arc(0.2, 0.6, 2e4, lean=0.3, points=41)
+    found = forces(
+        profile,
+        magnification=1.3,
+        shear_modulus=modulus,
+        cohesion=cohesion,
+        friction_angle=PHI,
+        slip=slip,
+        **RIM,
+    )
+    expected = by_hand(profile, 1.3, modulus, cohesion, slip)
+    rel = 1e-8 if slip > 0 else 1e-4  # between samples the shear of a braking wheel may turn
+    assert (found.load, found.drawbar_pull, found.torque) == pytest.approx(expected, rel=rel)
+
+
+def test_a_batch_is_its_rows():
+    profile = stressed_arc(0.2, 0.6, 2e4)
+    modulus, slip = np.geomspace(1e-3, 0.1, 4)[:, None], np.asarray([0.1, 0.5, -0.1])
+    found = forces(profile, shear_modulus=modulus, friction_angle=PHI, slip=slip, **RIM)
+    assert found.load.shape == (4, 3)
+    one = forces(profile, shear_modulus=modulus[2, 0], friction_angle=PHI, slip=slip[2], **RIM)
+    assert found.drawbar_pull[2, 2] == pytest.approx(float(one.drawbar_pull), rel=1e-12)
+
+
+def test_the_stress_of_the_model_gives_the_forces_of_the_model():
+    model = Model(Wheel(**RIM)) + ExitAngle(kappa=0.1) + StressShift(shift=0.3)
+    sand, at = soil("nagatani2009/toyoura_sand"), Operating(slip=0.3, load=20.0)
+    force, p = model(sand, at), model.profile(sand, at, points=401)
+    profile = StressProfile(p.angle[::-1], np.maximum(p.normal[::-1], 0.0))
+    found = forces(profile, shear_modulus=TRUE, friction_angle=sand.friction_angle, slip=0.3, **RIM)
+    assert float(found.load) == pytest.approx(20.0, rel=1e-3)
+    assert float(found.torque) == pytest.approx(float(force.torque), rel=1e-3)
+    pulled = Run(
+        slip=0.3,
+        weight=math.hypot(20.0, force.drawbar_pull),
+        slope=math.atan2(force.drawbar_pull, 20.0),
+    )
+    back = solve(profile, pulled, SENSORS, Strength(friction_angle=float(sand.friction_angle)))
+    assert back.shear_modulus == pytest.approx(TRUE, rel=0.02)
+
+
+@pytest.mark.parametrize(("slip", "slope"), [(0.11, 0.0), (0.39, 6.0), (0.8, 8.0)])
+def test_the_modulus_and_magnification_put_in_come_back(slip, slope):
+    at = Run(slip=slip, weight=WEIGHT, slope=math.radians(slope))
+    arc = balanced_arc(math.radians(30.0), at, SENSORS, STRENGTH, TRUE, lean=0.2)
+    found = solve(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
+    assert found.shear_modulus == pytest.approx(TRUE, rel=1e-6)
+    assert found.magnification == pytest.approx(1.7, rel=1e-6)
+
+
+def test_softer_shear_pulls_less():
+    profile, modulus = stressed_arc(0.2, 0.5, 2e4), np.geomspace(1e-4, 1.0, 30)
+    found = forces(profile, shear_modulus=modulus, friction_angle=PHI, slip=0.2, **RIM)
+    assert (np.diff(found.drawbar_pull / found.load) < 0).all()
+
+
+def test_the_arc_that_table_i_asks_for_moves_forward_with_slip():
+    printed = {0.11: (0.0072, 0), 0.18: (0.0073, 2), 0.29: (0.0070, 4), 0.39: (0.0066, 6)}
+    printed[0.80] = (0.0026, 8)
+    peaks = [
+        balanced_arc(
+            math.radians(30.0),
+            Run(slip=s, weight=WEIGHT, slope=math.radians(a)),
+            SENSORS,
+            STRENGTH,
+            k,
+        ).peak_angle
+        for s, (k, a) in printed.items()
+    ]
+    assert (np.diff(peaks) > 0).all()
+
+
+def test_the_conventional_profile_makes_too_much_of_the_grip():
+    at = Run(slip=0.11, weight=WEIGHT)
+    sand, wheel = soil("nagatani2009/toyoura_sand"), Wheel(**RIM)
+    wide = conventional(wheel, sand, slip=0.11, sinkage=0.016, rebound=0.3)
+    assert wide.entry_angle == pytest.approx(math.acos(1.0 - 0.016 / 0.055))
+    assert wide.exit_angle == pytest.approx(-math.acos(1.0 - 0.3 * 0.016 / 0.055))
+    assert solve(wide, at, SENSORS, STRENGTH).shear_modulus > 2.0 * TRUE
+    found = forces(wide, shear_modulus=TRUE, friction_angle=PHI, slip=0.11, **RIM)
+    assert float(found.drawbar_pull / found.load) * WEIGHT > 4.0
+
+
+def test_no_balance_says_which_side():
+    front, rear = stressed_arc(0.9, 0.5, 2e4), stressed_arc(-0.5, 0.5, 2e4)
+    at = Run(slip=0.2, weight=WEIGHT)
+    with pytest.raises(FitError, match="even with perfect grip"):
+        solve(front, at, SENSORS, STRENGTH)
+    with pytest.raises(FitError, match="even with hardly any grip"):
+        solve(rear, at, SENSORS, STRENGTH)
+    with pytest.raises(FitError, match="cohesion alone"):
+        solve(
+            stressed_arc(0.6, 0.5, 2e4),
+            Run(slip=0.2, weight=0.001),
+            SENSORS,
+            Strength(friction_angle=PHI, cohesion=9e5),
+        )
+
+
+def test_there_is_at_most_one_balance():
+    rng, modulus = np.random.default_rng(0), np.geomspace(1e-5, 10.0, 64)
+    for _ in range(150):
+        arc = stressed_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
+        at = Run(slip=rng.uniform(-0.6, 0.9), weight=WEIGHT, slope=rng.uniform(-0.8, 0.5))
+        strength = Strength(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
+        left, _ = excess(arc, at, SENSORS, strength, modulus)
+        above = left[np.isfinite(left)] > 0
+        assert np.count_nonzero(above[1:] != above[:-1]) <= 1
+
+
+def test_several_balances_would_be_said(monkeypatch):
+    waves = lambda *given: (np.sin(np.log(given[-1])), np.ones_like(given[-1]))  # noqa: E731
+    monkeypatch.setattr("soilml.systems.force_sensor_wheel.force_balance.excess", waves)
+    with pytest.raises(FitError, match="shear moduli satisfy both balances"):
+        solve(stressed_arc(0.2, 0.5, 2e4), Run(slip=0.2, weight=WEIGHT), SENSORS, STRENGTH)
+
+
+@pytest.mark.parametrize(
+    ("angle", "normal", "said"),
+    [
+        ([0.0, 0.1, 0.2], [0.0, 0.0, 0.0], "without contact"),
+        ([0.0, 10.0, 20.0], [0.0, 1.0, 0.0], "radians"),
+        ([0.0, 0.2, 0.1], [0.0, 1.0, 0.0], "rise"),
+        ([0.0, 0.1, 0.2], [0.0, -1.0, 0.0], "sensor's zero"),
+        ([0.0, 0.1, 0.2], [0.0, math.nan, 0.0], "not finite"),
+        ([0.0, 0.1], [0.0, 1.0], "three or more"),
+        ([1.0, 1.7, 1.8], [0.0, 1.0, 0.0], "above the axle"),
+        ([[0.0, 0.1, 0.2]], [0.0, 1.0, 0.0], "must be"),
+    ],
+)
+def test_what_is_no_profile_is_refused(angle, normal, said):
+    with pytest.raises(InputError, match=said):
+        StressProfile(np.asarray(angle), np.asarray(normal))
+
+
+def test_values_out_of_range_are_refused():
+    profile = stressed_arc(0.2, 0.5, 2e4)
+    with pytest.raises(InputError, match="degrees"):
+        forces(profile, shear_modulus=TRUE, friction_angle=38.0, slip=0.2, **RIM)
+    with pytest.raises(InputError, match="slip"):
+        forces(profile, shear_modulus=TRUE, friction_angle=PHI, slip=1.2, **RIM)
+    with pytest.raises(InputError, match="slope"):
+        Run(slip=0.2, weight=WEIGHT, slope=8.0)
+    with pytest.raises(InputError, match="rebound"):
+        conventional(
+            Wheel(**RIM), soil("nagatani2009/toyoura_sand"), slip=0.1, sinkage=0.06, rebound=0.1
+        )
+    with pytest.raises(FitError, match="no place of an arc"):
+        balanced_arc(0.5, Run(slip=0.1, weight=WEIGHT, slope=-1.2), SENSORS, STRENGTH, TRUE)

@@ -1,0 +1,127 @@
+"""Sensor signals of a tracked robot: filtered, averaged, joined."""
+
+import numpy as np
+import pytest
+from scipy import signal as scipy_signal
+
+from soilml.errors import FitError, InputError
+from soilml.systems.tracked_robot.signals import (
+    low_pass,
+    rear_sinkage,
+    rut_mean,
+    slip_of_displacements,
+    stationary,
+)
+
+RATE = 100.0
+
+
+def remembered(count, memory, rng):
+    """Noise of unit variance that forgets within `memory` samples."""
+    keep = np.exp(-1.0 / memory)
+    steps = rng.standard_normal(count) * np.sqrt(1.0 - keep**2)
+    return scipy_signal.lfilter([1.0], [1.0, -keep], steps)
+
+
+def test_the_filter_is_the_one_that_scipy_runs_both_ways():
+    x = np.cumsum(np.random.default_rng(0).standard_normal(400))
+    for cutoff in (0.5, 5.0, 40.0):
+        b, a = scipy_signal.butter(2, cutoff, fs=RATE)
+        np.testing.assert_allclose(
+            low_pass(x, RATE, cutoff), scipy_signal.filtfilt(b, a, x), rtol=1e-9, atol=1e-10
+        )
+
+
+def test_the_filter_takes_vibration_and_leaves_the_sinkage_where_it_is():
+    t = np.arange(0.0, 20.0, 1.0 / RATE)
+    slow = 0.01 * np.sin(2.0 * np.pi * 0.1 * t)
+    shaken = slow + 0.005 * np.sin(2.0 * np.pi * 15.0 * t)
+    assert np.abs(low_pass(shaken, RATE, 2.0) - slow)[50:-50].max() < 1e-4
+    np.testing.assert_allclose(low_pass(np.full(30, 3.0), RATE, 2.0), 3.0, rtol=1e-12)
+    straight = np.linspace(1.0, 5.0, 500)
+    np.testing.assert_allclose(low_pass(straight, RATE, 2.0)[60:-60], straight[60:-60], rtol=1e-4)
+
+
+@pytest.mark.parametrize("memory", [0.3, 8.0])
+def test_the_error_of_the_mean_knows_that_noise_remembers(memory):
+    rng = np.random.default_rng(1)
+    off, said = [], []
+    for _ in range(150):
+        found = stationary(600.0 + 20.0 * remembered(4000, memory, rng))
+        off.append(found.mean - 600.0)
+        said.append(found.std_error)
+    ratio = np.sqrt(np.mean(np.square(off)) / np.mean(np.square(said)))
+    assert 0.8 < ratio < 1.35  # scatter of samples would say 4 times too little at 8
+
+
+def test_ramps_before_and_after_the_pull_are_left_out():
+    rng = np.random.default_rng(2)
+    pull = np.concatenate(
+        [np.zeros(800), np.linspace(0, 620, 900), np.full(3000, 620.0), np.linspace(620, 0, 400)]
+    )
+    pull = pull + 15.0 * remembered(len(pull), 5.0, rng)
+    found = stationary(pull, above=50.0)
+    assert 1600 <= found.start < found.stop <= 4800 and found.stop - found.start > 1500
+    assert abs(found.mean - 620.0) < 4.0 * found.std_error < 10.0
+    assert stationary(pull[:900]).mean == pytest.approx(0.0, abs=8.0)  # waiting stands still too
+
+
+def test_a_signal_that_never_stands_still_is_refused():
+    with pytest.raises(FitError, match="stand still together"):
+        stationary(np.linspace(0.0, 600.0, 2000))
+    with pytest.raises(FitError, match="stand still"):
+        stationary(np.full(2000, 10.0), above=50.0)
+
+
+def test_slip_of_a_belt_that_runs_ahead_of_the_robot():
+    belt = np.linspace(0.0, 2.0, 201)
+    np.testing.assert_allclose(slip_of_displacements(belt, 0.7 * belt, 10), 0.3)
+    assert len(slip_of_displacements(belt, belt, 10)) == 191
+    with pytest.raises(InputError, match="must move forward"):
+        slip_of_displacements(np.r_[belt, belt[-1] * np.ones(20)], np.zeros(221), 10)
+    with pytest.raises(InputError, match="span is 300"):
+        slip_of_displacements(belt, belt, 300)
+
+
+def test_rear_sinkage_is_the_ruts_depth_whatever_the_robots_trim():
+    depth, height, spacing = 0.018, 0.2, 0.7
+    for delta in (-0.05, 0.0, 0.05):
+        front = height + 0.5 * spacing * np.sin(delta)
+        rear = height + depth - 0.5 * spacing * np.sin(delta)
+        found = rear_sinkage([rear], [front], [delta], spacing)
+        assert found == pytest.approx(depth, abs=1e-12)
+
+
+def test_the_mean_of_a_rut_keeps_the_volume_of_soil():
+    lower, raised, part, pitch = 0.010, 0.006, 0.012, 0.05
+    mean = rut_mean([lower + raised], [lower], part, pitch)
+    assert (mean - lower) * pitch == pytest.approx(raised * part)  # eq. 16
+    assert rut_mean([0.02], [0.01], pitch, pitch) == pytest.approx(0.02)
+
+
+def test_bad_signals_are_told_apart():
+    good = np.zeros(500)
+    with pytest.raises(InputError, match="signal is nan at sample 7"):
+        low_pass(np.where(np.arange(500) == 7, np.nan, good), RATE, 5.0)
+    with pytest.raises(InputError, match="one row of 10 samples or more"):
+        low_pass(good[:5], RATE, 5.0)
+    with pytest.raises(InputError, match="one row of 160 samples"):
+        stationary(good[:100])
+    with pytest.raises(InputError, match="cutoff is 60 Hz"):
+        low_pass(good, RATE, 60.0)
+    with pytest.raises(InputError, match="rear 3, front 2, angle 3"):
+        rear_sinkage([1, 2, 3], [1, 2], [0, 0, 0], 0.5)
+    with pytest.raises(InputError, match="track 2, robot 3"):
+        slip_of_displacements([0, 1], [0, 1, 2], 1)
+    with pytest.raises(InputError, match="crest_length"):
+        rut_mean([0.1], [0.1], 0.06, 0.05)
+    with pytest.raises(InputError, match=r"below 0\.001 Hz the filter loses its digits"):
+        low_pass(good, RATE, 1e-9)
+    with pytest.raises(InputError, match="rate of inf Hz"):
+        low_pass(good, np.inf, 5.0)
+    with pytest.raises(
+        InputError, match="angle is 10 at sample 1; needed is an inclination in rad"
+    ):
+        rear_sinkage([1, 2], [1, 2], [0, 10], 0.5)
+    with pytest.raises(InputError, match="spacing is nan"):
+        rear_sinkage([1], [1], [0], np.nan)

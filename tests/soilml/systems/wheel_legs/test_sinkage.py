@@ -1,0 +1,87 @@
+"""The soil from midstance sinkage: found again where it is known, doubted where it is not."""
+
+import numpy as np
+import pytest
+
+from soilml.errors import FitError, InputError
+from soilml.systems.wheel_legs.sensing.sinkage_fit import SinkageFit, fitted, fitted_to, simulated
+from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return simulated()
+
+
+@pytest.fixture(scope="module")
+def fit(rows):
+    return fitted_to(rows)
+
+
+def test_denser_soil_is_sunk_into_less(rows):
+    assert np.all(rows.status == 0)
+    assert np.all(np.diff(rows.sinkage.reshape(4, 3), axis=1) < 0)
+
+
+def test_lines_that_hold_are_found_exactly():
+    z = np.array([0.01, 0.02, 0.03, 0.05])
+    found = fitted(z, 400.0 / z, 0.8 - 6.0 * z, list("abcd"))
+    assert found.s_sigma == pytest.approx(400.0)
+    assert (found.s_i, found.s_z) == pytest.approx((0.8, -6.0))
+    assert found.stiffness_r2 == pytest.approx(1.0) and found.friction_r2 == pytest.approx(1.0)
+    assert found.stiffness_scatter == pytest.approx(0.0, abs=1e-9)
+    estimate = found(0.02, 0.002)
+    assert estimate.normal_stiffness == pytest.approx(20000.0)
+    assert estimate.normal_stiffness_std == pytest.approx(2000.0)
+    assert estimate.friction_angle_std == pytest.approx(0.012)
+
+
+def test_stiffness_goes_down_as_sinkage_goes_up(fit):
+    found = fit(np.linspace(0.02, 0.15, 9))
+    assert np.all(np.diff(found.normal_stiffness) < 0)
+    assert np.all(found.normal_stiffness_std > 0) and np.all(found.friction_angle_std > 0)
+
+
+def test_soils_left_out_of_the_fit_lie_within_what_it_claims(rows):
+    soils = np.array(rows.soil)
+    stiffness_off, friction_off = [], []
+    for name in GROUNDS:
+        out = soils == name
+        kept = (rows.sinkage, rows.normal_stiffness, rows.friction_angle)
+        found = fitted(*(values[~out] for values in kept), soils[~out])(rows.sinkage[out])
+        stiffness_off += [
+            (rows.normal_stiffness[out] - found.normal_stiffness) / found.normal_stiffness_std
+        ]
+        friction_off += [
+            (rows.friction_angle[out] - found.friction_angle) / found.friction_angle_std
+        ]
+    assert np.abs(stiffness_off).max() < 3
+    assert np.sqrt(np.mean(np.square(stiffness_off))) < 1.5
+    assert np.sqrt(np.mean(np.square(friction_off))) < 1.5
+
+
+def test_friction_cannot_be_told_from_simulated_sinkage(rows, fit):
+    assert fit.friction_r2 < 0.2
+    assert fit.friction_scatter > np.std(rows.friction_angle)
+
+
+def test_what_the_fit_has_not_seen_is_flagged(fit):
+    assert fit([0.001, 0.05, 0.5]).in_range.tolist() == [False, True, False]
+
+
+def test_more_doubt_about_sinkage_is_more_doubt_about_the_soil(fit):
+    assert fit(0.05, 0.01).normal_stiffness_std > fit(0.05).normal_stiffness_std
+
+
+@pytest.mark.parametrize("sinkage", [0.0, -0.01, np.nan])
+def test_a_sinkage_that_is_none_is_refused(fit, sinkage):
+    with pytest.raises(InputError, match="above 0"):
+        fit(sinkage)
+
+
+def test_too_few_soils_are_refused():
+    with pytest.raises(FitError, match="2 soils"):
+        fitted([0.01, 0.02, 0.03], [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], ["a", "b", "b"])
+    with pytest.raises(FitError, match="different sinkages"):
+        fitted([0.02] * 3, [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], list("abc"))
+    assert SinkageFit.__doc__

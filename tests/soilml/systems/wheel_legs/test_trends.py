@@ -1,0 +1,86 @@
+"""What legs and feet do to sinkage and slip (Comin and Saaj 2017, figs. 5 and 6)."""
+
+import numpy as np
+import pytest
+
+from soilml.systems.wheel_legs.walking.gait_metrics import (
+    falls_until,
+    feet_compared,
+    gait,
+    legs_compared,
+)
+from soilml.systems.wheel_legs.walking.geometry import wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.walk import walk
+
+
+@pytest.fixture(scope="module")
+def legs():
+    return legs_compared(Ground(stiffness=0.7e6))
+
+
+@pytest.fixture(scope="module")
+def feet():
+    return feet_compared()
+
+
+def test_every_leg_added_up_to_five_lowers_the_slip(legs):
+    assert falls_until(legs.rms_slip) >= 5
+
+
+def test_the_body_lies_on_the_ground_until_a_fifth_leg_lifts_it(legs):
+    assert np.ptp(legs.most_sinkage[:4]) < 0.01 * legs.most_sinkage[0]
+    assert legs.most_sinkage[4] < 0.9 * legs.most_sinkage[3]
+
+
+def test_up_to_four_legs_the_mean_square_of_sinkage_grows_with_the_time_on_the_ground(legs):
+    assert np.all(np.diff(legs.rms_sinkage[:4]) > 0)
+    assert legs.rms_sinkage[4] < legs.rms_sinkage[3]
+
+
+def test_one_leg_slips_less_while_it_propels(legs):
+    assert legs.rms_slip_propelled[0] < 0.8 * legs.rms_slip[0]
+    np.testing.assert_array_equal(legs.rms_slip_propelled[2:], legs.rms_slip[2:])
+
+
+def test_any_foot_sinks_less_than_none_and_the_largest_least(feet):
+    none, ltf, srf, cif = feet.sinkage
+    assert np.all(none > ltf) and np.all(none > srf)
+    assert np.all(cif < 0.5 * np.minimum(ltf, srf))
+
+
+def test_the_largest_foot_slips_least_and_none_most(feet):
+    none, ltf, srf, cif = feet.slip
+    assert np.all(cif < np.minimum(ltf, srf)) and np.all(none > np.maximum(ltf, srf))
+
+
+def test_the_load_testing_foot_tells_stiffness_best_by_sinkage(feet):
+    slope, _ = feet.sensitivity(feet.sinkage)
+    assert np.all(slope < 0)
+    assert feet.feet[np.argmin(slope)] == "LTF" and feet.feet[np.argmax(slope)] == "CIF"
+
+
+def test_no_foot_tells_stiffness_best_by_slip_then_the_load_testing_foot(feet):
+    slope, error = feet.sensitivity(feet.slip)
+    assert [feet.feet[i] for i in np.argsort(slope)] == ["none", "LTF", "SRF", "CIF"]
+    assert np.all(error > 0)
+
+
+def test_a_straight_line_has_its_slope_and_no_error(feet):
+    slope, error = feet.sensitivity(np.outer([1.0, -2.0], feet.stiffness))
+    np.testing.assert_allclose(slope, [1.0, -2.0])
+    np.testing.assert_allclose(error, 0.0, atol=1e-9)
+
+
+def test_falling_ends_where_a_value_is_not_lower():
+    assert falls_until(np.array([3.0, 2.0, 1.0])) == 3
+    assert falls_until(np.array([3.0, 2.0, 2.0, 1.0])) == 2
+    assert falls_until(np.array([1.0, 2.0])) == 1
+    assert falls_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
+
+
+def test_a_walk_that_stopped_has_no_figures():
+    stopped = gait(walk(wheel_leg("LTF"), Ground(stiffness=10.0)))
+    assert stopped.status[0] != 0
+    figures = [v for name, v in vars(stopped).items() if name != "status"]
+    assert np.isnan(figures).all()

@@ -1,0 +1,199 @@
+"""Wheel-legs walking: what carries, what propels, and what stops."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.systems.wheel_legs.walking.gait_metrics import gait
+from soilml.systems.wheel_legs.walking.geometry import FEET, Section, WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.walking.ground_reaction import batch, reaction
+from soilml.systems.wheel_legs.walking.integrator import FADING, explicit
+from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS, Ground
+from soilml.systems.wheel_legs.walking.plate_stresses import stresses
+from soilml.systems.wheel_legs.walking.trajectory import WalkStatus
+from soilml.systems.wheel_legs.walking.walk import walk
+
+SAND = Ground(stiffness=0.7e6)
+WEIGHT = 3.75 * 9.81
+STRIDE = 2 * np.pi / 5
+FADES = np.array([FADING * 0.3 * 0.18])
+
+
+@pytest.fixture(scope="module")
+def soft_to_firm():
+    grounds = [Ground(stiffness=a) for a in (0.4e6, 0.7e6, 1.0e6, 1.7e6)]
+    return walk(wheel_leg("LTF"), grounds, steps=500)
+
+
+@pytest.fixture(scope="module")
+def slipping():
+    return walk(wheel_leg("LTF"), SAND, slip=[0.0, 0.125, 0.25, 0.375, 0.5], turns=1, steps=500)
+
+
+def test_softer_ground_is_sunk_into_deeper_and_slips_more(soft_to_firm):
+    found = gait(soft_to_firm)
+    assert np.all(np.diff(found.most_sinkage) < 0)
+    assert np.all(np.diff(found.mean_slip) < 0)
+
+
+def test_every_stride_of_a_steady_walk_is_like_the_last(soft_to_firm):
+    last = soft_to_firm.after(2 * np.pi)
+    z = last.z[:-1].reshape(5, 100, -1)
+    assert np.ptp(z, axis=0).max() < 1e-5
+
+
+def test_walking_on_level_ground_takes_work(soft_to_firm):
+    assert np.all(gait(soft_to_firm).mean_torque > 0)
+
+
+def test_the_ground_carries_the_weight_over_a_stride():
+    fine = walk(wheel_leg("LTF"), SAND, turns=1, steps=1000)
+    given = batch([wheel_leg("LTF")], [SAND])
+    up = [
+        reaction(given, given.at(a), z, vx, vz, FADES).up
+        for a, z, vx, vz in zip(fine.angle, fine.z, fine.vx, fine.vz, strict=True)
+    ]
+    assert np.mean(up[-200:]) == pytest.approx(WEIGHT, rel=1e-3)
+
+
+def test_a_commanded_slip_is_the_slip_that_comes_out(slipping):
+    late = slipping.after(STRIDE)
+    np.testing.assert_allclose(
+        late.slip, np.broadcast_to([0, 0.125, 0.25, 0.375, 0.5], late.slip.shape)
+    )
+
+
+def test_more_slip_takes_more_torque_at_midstance(slipping):
+    late = slipping.after(STRIDE)
+    assert np.all(np.diff(late.at_midstance(late.torque)) > 0)
+
+
+def test_the_leg_nearest_to_straight_down_passes_it_once_a_stride(slipping):
+    assert slipping.midstance.sum(axis=0).tolist() == [6] * 5
+    assert np.all(np.abs(slipping.attack - np.pi / 2) <= STRIDE / 2 + 1e-9)
+
+
+def test_a_case_walks_alike_alone_and_in_company():
+    cases = [wheel_leg("none", legs=3), wheel_leg("CIF"), wheel_leg("LTF", legs=6)]
+    together = walk(cases, SAND, turns=0.5, steps=500)
+    for i, case in enumerate(cases):
+        alone = walk(case, SAND, turns=0.5, steps=500)
+        np.testing.assert_allclose(together.z[:, i], alone.z[:, 0], atol=1e-7)
+        np.testing.assert_allclose(together.x[:, i], alone.x[:, 0], atol=1e-6)
+
+
+def test_long_steps_agree_with_the_papers_short_ones():
+    short = round(2 * np.pi / 0.3 / 1e-4)
+    slow = walk(wheel_leg("LTF"), SAND, turns=0.05, steps=short, step=explicit, fading=1e-9)
+    fast = walk(wheel_leg("LTF"), SAND, turns=0.05, steps=1000)
+    np.testing.assert_allclose(
+        fast.z[:, 0], np.interp(fast.angle, slow.angle, slow.z[:, 0]), atol=1e-3
+    )
+    assert fast.x[-1, 0] == pytest.approx(slow.x[-1, 0], rel=0.02)
+
+
+def test_shorter_steps_change_little():
+    cases = [wheel_leg(foot) for foot in FEET]
+    coarse, fine = (gait(walk(cases, SAND, turns=1.2, steps=n)) for n in (500, 1000))
+    np.testing.assert_allclose(coarse.most_sinkage, fine.most_sinkage, atol=5e-4)
+    np.testing.assert_allclose(coarse.mean_slip, fine.mean_slip, atol=1e-3)
+
+
+def test_slopes_of_the_reaction_are_its_derivatives():
+    cases = [wheel_leg("LTF"), wheel_leg("CIF", legs=3)]
+    given = batch(cases, [SAND, GROUNDS["SSC-2"]])
+    at, fading = given.at(0.3), np.full(2, 1e-3)
+    here = (np.array([0.1, 0.13]), np.array([0.04, 0.03]), np.array([-0.01, 0.02]))
+
+    def force(height, ahead, up):
+        found = reaction(given, at, height, ahead, up, fading)
+        return np.stack([found.ahead, found.up])
+
+    found = reaction(given, at, *here, fading)
+    for i, analytic in enumerate([found.sinking, found.slopes[:, 0], found.slopes[:, 1]]):
+        step = [np.zeros(2)] * 3
+        step[i] = np.full(2, 1e-7)
+        ahead, behind = (
+            force(*(h + sign * d for h, d in zip(here, step, strict=True))) for sign in (1, -1)
+        )
+        np.testing.assert_allclose(analytic, (ahead - behind) / 2e-7, rtol=1e-4, atol=1e-2)
+
+
+def test_cases_that_cannot_walk_say_why_and_leave_the_others_alone():
+    good = wheel_leg("LTF")
+    stub = replace(good, foot=FEET["none"], leg=Section(10, 0.016, 0.015, 0.002))
+    hung = wheel_leg("none", legs=1, body_area=0.0)
+    cases = [good, replace(good, mass=0.0), replace(good, mass=-1.0), replace(good, legs=9), stub]
+    walked = walk([*cases, hung], SAND, turns=0.3, steps=500)
+    names = [WalkStatus(code).name for code in walked.status]
+    assert names == ["OK", "UNSOUND", "UNSOUND", "UNSOUND", "NO_CONTACT", "SUNK"]
+    assert all(WalkStatus(code).reason for code in walked.status)
+    assert np.all(np.isfinite(walked.z[:, 0])) and np.all(np.isnan(walked.z[:, 1:4]))
+    assert np.isnan(walked.sinkage[-1, 5]) and np.isnan(walked.slip[-1, 5])
+    alone = walk(good, SAND, turns=0.3, steps=500)
+    np.testing.assert_allclose(walked.z[:, 0], alone.z[:, 0], atol=1e-7)
+
+
+def test_ground_too_soft_to_carry_takes_the_hub_down():
+    grounds = [Ground(stiffness=a) for a in (1e3, 1e4, 1e6, 0.0, np.nan)]
+    names = [WalkStatus(c).name for c in walk(wheel_leg("LTF"), grounds, turns=0.3).status]
+    assert names == ["SUNK", "SUNK", "OK", "UNSOUND", "UNSOUND"]
+
+
+def test_a_start_too_high_for_the_time_never_touches_the_ground():
+    walked = walk(wheel_leg("LTF"), SAND, height=100.0, turns=0.02)
+    assert WalkStatus(walked.status[0]) is WalkStatus.NO_CONTACT
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: walk(WheelLeg(), SAND, steps=10), "at least 100 steps"),
+        (lambda: walk(WheelLeg(), SAND, turns=0.0), "above 0"),
+        (lambda: walk(WheelLeg(), SAND, height=np.nan), "height"),
+        (lambda: walk(WheelLeg(), []), "no case"),
+        (lambda: gait(walk(WheelLeg(), SAND, turns=0.1)), "one full turn"),
+        (lambda: walk([WheelLeg()] * 2, [SAND] * 3), "2 wheel-legs for 3 cases"),
+    ],
+)
+def test_settings_of_no_simulation_are_refused(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
+
+
+def test_the_offset_of_the_normal_stress_carries_too():
+    with_it = walk(wheel_leg("LTF"), GROUNDS["SSC-1"], turns=0.6, steps=500)
+    without = walk(wheel_leg("LTF"), replace(GROUNDS["SSC-1"], offset=0.0), turns=0.6, steps=500)
+    assert with_it.sinkage[-1, 0] < without.sinkage[-1, 0]
+    assert GROUNDS["SSC-1"].normal_stiffness == pytest.approx(11300.0)
+
+
+def test_stresses_on_the_plates_add_up_to_the_reaction(soft_to_firm):
+    wheel, ground = wheel_leg("LTF"), Ground(stiffness=0.7e6)
+    found = stresses(soft_to_firm, 640, wheel, ground, case=1)
+    given = batch([wheel], [ground])
+    state = (part[640, [1]] for part in (soft_to_firm.z, soft_to_firm.vx, soft_to_firm.vz))
+    total = reaction(given, given.at(soft_to_firm.angle[640]), *state, FADES)
+    assert np.sum(found.area * found.up) == pytest.approx(total.up[0])
+    assert np.sum(found.area * found.ahead) == pytest.approx(total.ahead[0])
+    assert np.all(found.up[found.z > 0] == 0)
+
+
+def test_a_walk_at_a_tenth_of_the_speed_leaves_the_same_track():
+    quick, slow = (
+        walk(wheel_leg("LTF", speed=speed), SAND, turns=0.6, steps=500) for speed in (0.3, 0.03)
+    )
+    np.testing.assert_allclose(slow.z[50:], quick.z[50:], atol=1e-3)
+    assert slow.x[-1, 0] == pytest.approx(quick.x[-1, 0], rel=0.01)
+
+
+def test_the_lines_on_the_page_run():
+    page = (Path(__file__).parents[4] / "docs/papers/comin2017.md").read_text()
+    names: dict = {}
+    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
+    assert np.all(names["walked"].status == 0)
+    assert names["gait"](names["walked"]).mean_slip[1] == pytest.approx(0.25)

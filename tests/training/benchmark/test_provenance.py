@@ -1,0 +1,89 @@
+"""A comparison of what belongs together, and what is said of the rest."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from conftest import MODEL
+
+from soilml import Estimator, read_case, read_table
+from soilml.cli import main
+from soilml.errors import InputError
+from training.benchmark.provenance import check_same_provenance
+
+NAMES = ("cohesion", "friction_angle", "shear_modulus")
+OTHERS = {
+    "soil": (MODEL.replace("dry_sand", "sandy_loam_32"), ", the model file"),
+    "bearing": (MODEL.replace("[soil.prior]", "kphi = 1e6\n[soil.prior]"), "the model file 1e+06"),
+    "effect": (MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n', "effects none"),
+    "prior": (MODEL.replace("3000.0", "6000.0"), "prior [0.0, 3000.0] of cohesion"),
+    "scale": (
+        MODEL.replace("[0.005, 0.03]", '{ range = [0.005, 0.03], scale = "log" }'),
+        "of shear_modulus",
+    ),
+    "gear": (MODEL.replace('"wheel"', '"linear-wheel"'), "a gear of type 'wheel'"),
+    "wheel": (MODEL.replace("radius = 0.15", "radius = 0.1"), "radius 0.15"),
+}
+
+
+@pytest.fixture
+def parts(tmp_path, small_data, small_model):
+    table = read_table(small_data)
+    return table.rows(slice(0, 100)), {"small": Estimator.load(small_model)}
+
+
+def case_of(tmp_path, text):
+    (tmp_path / "m.toml").write_text(text)
+    return read_case(tmp_path / "m.toml")
+
+
+def test_what_belongs_together_is_passed_without_a_word(tmp_path, parts):
+    assert check_same_provenance(case_of(tmp_path, MODEL), *parts, NAMES) == []
+    cohesion = MODEL.replace("[soil.prior]", "cohesion = 7.0\n[soil.prior]")
+    assert (
+        check_same_provenance(case_of(tmp_path, cohesion), *parts, NAMES) == []
+    )  # the data vary it
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_another_model_file_than_the_data_s_is_refused(tmp_path, parts, what):
+    text, said = OTHERS[what]
+    with pytest.raises(InputError) as caught:
+        check_same_provenance(case_of(tmp_path, text), *parts, NAMES)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_without_the_data_s_recipe_a_model_trained_otherwise_is_named(tmp_path, parts, what):
+    text, said = OTHERS[what]
+    table, estimators = parts
+    case, table = case_of(tmp_path, text), replace(table, metadata={})
+    if what in ("gear", "wheel"):
+        with pytest.raises(InputError, match="compare what belongs to one wheel"):
+            check_same_provenance(case, table, estimators, NAMES)
+    else:
+        (note, *_) = check_same_provenance(case, table, estimators, NAMES)
+        assert note.startswith("small was trained with") and said in note
+
+
+def test_a_damaged_recipe_is_one_line(tmp_path, parts):
+    table, estimators = parts
+    for text in ("{", "[]", "[" * 100_000, json.dumps({"gear": 10**400}), '{"gear": {}}'):
+        with pytest.raises(InputError):
+            check_same_provenance(
+                case_of(tmp_path, MODEL),
+                replace(table, metadata={"soilml_recipe": text}),
+                estimators,
+                NAMES,
+            )
+
+
+@pytest.mark.parametrize("sets", ["0", "-5", "many", "9" * 5000])
+def test_a_number_of_sets_that_is_none_is_refused(tmp_path, small_data, small_model, capsys, sets):
+    (tmp_path / "m.toml").write_text(MODEL)
+    command = ["compare", str(tmp_path / "m.toml"), str(small_data), str(small_model)]
+    with pytest.raises(SystemExit) as done:
+        main([*command, "--out", str(tmp_path / "o"), f"--analytic-sets={sets}"])
+    assert done.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "o").exists()

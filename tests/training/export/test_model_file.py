@@ -1,0 +1,117 @@
+"""From a trained estimator to its file: parity, reproducibility, versions."""
+
+import hashlib
+import json
+
+import numpy as np
+import onnx
+import pytest
+from onnx.reference import ReferenceEvaluator
+
+from soilml import Estimator
+from soilml.numerics.estimate_fusion import RULES
+from soilml.onboard.features import computed
+from training.data.dataset import read_dataset
+from training.export.model_file import export
+from training.spec import read_spec
+from training.train import train
+
+MEMBERS = {
+    "lssvm": '[[regressor]]\ntype = "lssvm"\n',
+    "fixed-size-lssvm": '[[regressor]]\ntype = "fixed-size-lssvm"\ncentres = 40\n',
+    "mlp": '[[regressor]]\ntype = "mlp"\nhidden = [16, 16]\nepochs = 6\n',
+    "linear": '[[regressor]]\ntype = "linear"\n',
+}
+
+
+@pytest.fixture(scope="module")
+def few_rows(tmp_path_factory):
+    from conftest import RECIPE
+
+    from datagen.generate import generate
+    from datagen.recipe import read_recipe
+
+    folder = tmp_path_factory.mktemp("few")
+    (folder / "recipe.toml").write_text(RECIPE.format(rows=1200, seed=9))
+    generate(read_recipe(folder / "recipe.toml"), folder / "data.parquet")
+    return folder / "data.parquet"
+
+
+def trained(tmp_path, data_path, text):
+    (tmp_path / "spec.toml").write_text(text)
+    spec = read_spec(tmp_path / "spec.toml")
+    return train(spec, read_dataset(data_path, spec.features, spec.targets))
+
+
+def specs():
+    for kind, text in MEMBERS.items():
+        yield pytest.param(text, id=kind)
+    for rule in RULES:
+        members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
+        yield pytest.param(f'rule = "{rule}"\n{members}', id=rule)
+
+
+@pytest.mark.parametrize("text", list(specs()))
+def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows, text):
+    original = trained(tmp_path, few_rows, text)
+    metadata = export(original, tmp_path / "m.onnx", few_rows)
+    estimator = Estimator.load(tmp_path / "m.onnx")
+    rng = np.random.default_rng(0)
+    readings = {
+        entry["name"]: rng.uniform(entry["lower"], entry["upper"], 4000)
+        for entry in json.loads(metadata["inputs"])
+    }
+    found = estimator(**readings)
+    mean, std, inside = original.predict(computed(original.spec.features, readings))
+    same = found.in_range == inside
+    assert same.mean() > 0.999
+    assert 0.1 < inside.mean() < 1.0
+    off = np.maximum(np.abs(found.mean - mean), np.abs(found.std - std)) / original.prior.std
+    assert off[same].max() < 1e-4
+    assert off[same].max() <= max(3.0 * float(metadata["parity"]), 1e-6)
+
+
+def test_a_second_runtime_agrees(tmp_path, few_rows):
+    members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
+    export(trained(tmp_path, few_rows, members), tmp_path / "m.onnx", few_rows)
+    estimator = Estimator.load(tmp_path / "m.onnx")
+    reference = ReferenceEvaluator(str(tmp_path / "m.onnx"))
+    rng = np.random.default_rng(1)
+    readings = {
+        "slip": rng.uniform(0.1, 0.5, 50),
+        "torque": rng.uniform(1.0, 5.0, 50),
+        "load": rng.uniform(40.0, 100.0, 50),
+    }
+    feed = {k: v.astype(np.float32) for k, v in readings.items()}
+    mean, std = reference.run(["mean", "std"], feed)
+    found = estimator(**readings)
+    np.testing.assert_allclose(found.mean, mean, rtol=1e-5)
+    np.testing.assert_allclose(found.std, std, rtol=1e-5)
+
+
+def test_same_spec_and_data_give_the_same_bytes(tmp_path, few_rows):
+    members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
+    digests = set()
+    for name in ("a", "b"):
+        export(trained(tmp_path, few_rows, members), tmp_path / f"{name}.onnx", few_rows)
+        digests.add(hashlib.sha256((tmp_path / f"{name}.onnx").read_bytes()).hexdigest())
+    assert len(digests) == 1
+
+
+def test_versions_are_pinned_where_old_runtimes_still_read_them(small_model):
+    model = onnx.load(small_model)
+    assert model.ir_version <= 10
+    assert [(o.domain, o.version) for o in model.opset_import] == [("", 18)]
+    kinds = {t.data_type for t in model.graph.initializer}
+    assert onnx.TensorProto.FLOAT not in kinds  # weights stay float64 inside
+    assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.FLOAT}
+
+
+def test_other_inputs_can_be_learned_from(tmp_path, few_rows):
+    text = 'features = ["slip", "torque/load", "load", "sinkage", "drawbar_pull/load"]\n'
+    original = trained(tmp_path, few_rows, text + MEMBERS["fixed-size-lssvm"])
+    export(original, tmp_path / "m.onnx", few_rows)
+    estimator = Estimator.load(tmp_path / "m.onnx")
+    assert estimator.inputs == ("slip", "torque", "load", "drawbar_pull", "sinkage")
+    # drawbar pull and sinkage without noise determine far more than torque alone
+    assert original.scores["estimator"].relative.mean() < 0.72  # torque alone: about 0.80

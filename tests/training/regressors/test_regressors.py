@@ -1,0 +1,139 @@
+"""The regressors: exact against brute force, and well-behaved scikit-learn estimators."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.utils.estimator_checks import check_estimator
+
+from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
+from training.regressors.gaussian_mlp import GaussianMLP
+from training.regressors.linear_gaussian import LinearGaussian
+from training.regressors.lssvm import LSSVM, Factored
+from training.regressors.rbf_kernel import rbf
+from training.regressors.renyi_subset import entropy_selected
+
+ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
+
+
+def curve(count, seed=0, noise=0.1):
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-2.0, 2.0, (count, 2))
+    clean = np.stack([np.sin(2 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]], axis=1)
+    return x, clean + noise * rng.normal(size=clean.shape), clean
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("machine", ALL, ids=lambda m: m.kind)
+def test_passes_the_checks_of_scikit_learn(machine):
+    results = check_estimator(machine, on_fail="raise", on_skip=None)
+    assert sum(r["status"] == "passed" for r in results) > 40
+
+
+def bordered(x, y, gamma, width):
+    """Dual weights and bias by solving the whole bordered system."""
+    n = len(x)
+    system = np.zeros((n + 1, n + 1))
+    system[0, 1:] = system[1:, 0] = 1.0
+    system[1:, 1:] = rbf(x, x, width) + np.eye(n) / gamma
+    solution = np.linalg.solve(system, np.vstack([np.zeros((1, y.shape[1])), y]))
+    return solution[1:], solution[0], system
+
+
+def test_solution_is_that_of_the_bordered_system_for_all_outputs_at_once():
+    x, y, _ = curve(60)
+    alpha, bias, _ = Factored.of(rbf(x, x, 0.8)).solved(y, 30.0)
+    expected_alpha, expected_bias, _ = bordered(x, y, 30.0, 0.8)
+    np.testing.assert_allclose(alpha, expected_alpha, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(bias, expected_bias, rtol=1e-8)
+    np.testing.assert_allclose(alpha.sum(axis=0), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("gamma", [0.1, 10.0, 1e4])
+def test_closed_form_leave_one_out_is_leaving_one_out(gamma):
+    x, y, _ = curve(30)
+    residual = Factored.of(rbf(x, x, 0.8)).solved(y, gamma)[2]
+    for i in range(0, 30, 4):
+        rest = np.arange(30) != i
+        alpha, bias, _ = bordered(x[rest], y[rest], gamma, 0.8)
+        left_out = y[i] - rbf(x[i : i + 1], x[rest], 0.8)[0] @ alpha - bias
+        np.testing.assert_allclose(residual[i], left_out, rtol=1e-6, atol=1e-9)
+
+
+def test_fixed_size_leave_one_out_is_leaving_one_out():
+    from training.regressors.fixed_size_lssvm import Primal
+
+    x, y, _ = curve(40)
+    features = rbf(x, x[:9], 1.0)
+    residual = Primal.of(features).leave_one_out(features, y, 3.0)
+    for i in range(0, 40, 5):
+        rest = np.arange(40) != i
+        # ridge with a free bias by its normal equations
+        A = np.hstack([features[rest], np.ones((39, 1))])
+        penalty = np.diag([1 / 3.0] * 9 + [0.0])
+        w = np.linalg.solve(A.T @ A + penalty, A.T @ y[rest])
+        left_out = y[i] - features[i] @ w[:-1] - w[-1]
+        np.testing.assert_allclose(residual[i], left_out, rtol=1e-8)
+
+
+def test_fixed_size_with_all_rows_as_centres_is_the_exact_machine():
+    x, y, _ = curve(50)
+    exact = LSSVM(gamma=20.0, width=1.0).fit(x, y)
+    fixed = FixedSizeLSSVM(centres=50, gamma=20.0, width=1.0).fit(x, y)
+    probe = curve(40, seed=1)[0]
+    np.testing.assert_allclose(fixed.predict(probe), exact.predict(probe), atol=2e-3)
+
+
+@pytest.mark.parametrize("machine", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=80)])
+def test_learns_a_curve_better_than_a_line_and_knows_the_noise(machine):
+    x, y, _ = curve(900)
+    probe, noisy, clean = curve(600, seed=1)
+    mean, std = clone(machine).fit(x, y).predict(probe, return_std=True)
+    error = np.sqrt(np.mean((mean - clean) ** 2))
+    straight = LinearGaussian().fit(x, y).predict(probe)
+    assert error < 0.2 * np.sqrt(np.mean((straight - clean) ** 2))
+    assert error < 0.06
+    inside = np.mean(np.abs(noisy - mean) <= 1.645 * std)
+    assert 0.82 < inside < 0.96
+
+
+def test_noise_that_varies_is_seen_to_vary():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1, 1, (2000, 1))
+    y = np.sin(3 * x) + (0.05 + 0.4 * (x > 0)) * rng.normal(size=x.shape)
+    for machine in (FixedSizeLSSVM(centres=40), GaussianMLP(epochs=60)):
+        _, std = machine.fit(x, y).predict(np.asarray([[-0.7], [0.7]]), return_std=True)
+        assert std[1, 0] > 2.0 * std[0, 0]
+
+
+def test_far_from_the_data_no_machine_claims_more_than_it_did_on_it():
+    x, y, _ = curve(400)
+    for machine in (LSSVM(), FixedSizeLSSVM(centres=50), GaussianMLP(epochs=20), LinearGaussian()):
+        fitted = machine.fit(x, y)
+        near = fitted.predict(x, return_std=True)[1]
+        far = fitted.predict(50.0 * x, return_std=True)[1]
+        assert (far >= 0.98 * near.min(axis=0)).all()
+        assert np.isfinite(far).all()
+
+
+def test_seeds_decide_everything():
+    x, y, _ = curve(300)
+    for machine in (FixedSizeLSSVM(centres=30), GaussianMLP(epochs=5)):
+        first, second = (clone(machine).fit(x, y).predict(x) for _ in range(2))
+        np.testing.assert_array_equal(first, second)
+        other = clone(machine).set_params(random_state=1).fit(x, y).predict(x)
+        assert not np.array_equal(first, other)
+
+
+def test_training_stops_early_when_held_out_rows_get_worse():
+    x, y, _ = curve(40, noise=1.0)
+    machine = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
+    assert len(machine.history_) < 400
+
+
+def test_selected_rows_spread_more_than_random_ones():
+    x = np.random.default_rng(0).normal(size=(1500, 2))
+    chosen = entropy_selected(x, 40, 0.7, seed=0)
+    random = np.random.default_rng(1).permutation(1500)[:40]
+    assert len(np.unique(chosen)) == 40
+    assert rbf(x[chosen], x[chosen], 0.7).sum() < 0.8 * rbf(x[random], x[random], 0.7).sum()
+    assert len(entropy_selected(x[:10], 40, 0.7, seed=0)) == 10

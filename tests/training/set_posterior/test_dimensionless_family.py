@@ -1,0 +1,66 @@
+"""One response serves wheels of all sizes, for it has no dimensions."""
+
+import numpy as np
+import pytest
+
+from training.set_posterior.validation import graph_outputs, opened
+
+
+def larger(sets, size):
+    """The same sets, all lengths `size` times as large, at the same pressures."""
+    force, moment = size**2, size**3
+    for name in ("load", "drawbar_pull", "drawbar_pull_std"):
+        sets.readings[name] *= force
+    for name in ("torque", "torque_std", "torque_bias"):
+        sets.readings[name] *= moment
+    for name in ("sinkage", "sinkage_std"):
+        sets.readings[name] *= size
+    for name in ("wheel_radius", "wheel_width", "shear_modulus_max"):
+        sets.context[name] *= size
+    sets.context["bearing_modulus"] *= size ** -sets.context["n"]
+    return sets
+
+
+def test_a_larger_wheel_at_the_same_pressure_answers_alike(any_posterior):
+    family, session = any_posterior.family, opened(any_posterior)
+    small, large = (family.sets(12, 6, 7) for _ in range(2))
+    large = larger(large, 1.3)
+    sound = 0
+    for index in range(len(small.truth)):
+        a, b = (graph_outputs(session, any_posterior.response, s, index) for s in (small, large))
+        assert a["set_in_range"] == b["set_in_range"]
+        lengths = np.asarray([1.0, 1.0, 1.3])
+        spread = a["set_std"] * lengths
+        assert (np.abs(b["set_mean"] - a["set_mean"] * lengths) < 0.05 * spread).all()
+        assert b["set_std"] == pytest.approx(spread, rel=0.05)
+        sound += bool(a["set_in_range"][0])
+    assert sound
+
+
+def test_designs_of_one_size_ratio_have_the_same_features_and_answers(any_posterior):
+    family = any_posterior.family
+    base = family.designs(20, 1)
+    scaled = base.copy()
+    _, r, b, w, n, k, _, shear = scaled.T
+    for column, power in ((r, 1.0), (b, 1.0), (w, 2.0), (shear, 1.0)):
+        column *= 1.7**power
+    k *= 1.7**-n
+    assert family.features(scaled) == pytest.approx(family.features(base))
+    x = np.zeros((20, 1, 5))
+    assert family.answers(scaled, x) == pytest.approx(family.answers(base, x), rel=1e-6)
+
+
+def test_features_in_the_graph_are_those_that_were_learned_from(any_posterior):
+    from training.onnx_graph.builder import Graph, session_of
+
+    family = any_posterior.family
+    sets = family.sets(10, 4, 3)
+    names = [*sets.readings, *sets.context]
+    graph = Graph()
+    graph.op("Identity", family.draw(graph, {n: n for n in names}).features, out="features")
+    shapes = {n: ["rows"] if n in sets.readings else [1] for n in names}
+    session = session_of(graph.model(shapes, {"features": (1, ["rows", 5])}))
+    feed = {n: v.astype(np.float32) for n, v in sets.rows(2).items()}
+    feed |= {n: np.asarray([v], np.float32) for n, v in sets.given(2).items()}
+    wanted = family.features(sets.origin.designs[2])
+    assert session.run(None, feed)[0] == pytest.approx(wanted, abs=2e-5)

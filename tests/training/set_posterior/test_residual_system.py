@@ -1,0 +1,58 @@
+"""Readings become rows of a linear system, in standard deviations of their noise."""
+
+import numpy as np
+import pytest
+
+from training.onnx_graph.builder import Graph, session_of
+from training.set_posterior.monomials import monomials
+from training.set_posterior.residual_system import draw_unbiased
+from training.set_posterior.validation import graph_outputs, opened
+
+
+@pytest.fixture(scope="module")
+def session(wheel_posterior):
+    return opened(wheel_posterior)
+
+
+@pytest.fixture(scope="module")
+def sets(wheel_posterior):
+    return wheel_posterior.family.sets(40, 6, 3)
+
+
+def test_the_system_is_misfit_over_noise_row_by_row(wheel_posterior, session, sets):
+    response, x = wheel_posterior.response, np.asarray([0.2, -0.4, 0.6])
+    told = int(np.argmax(sets.readings["sinkage_std"][:, 0] < 1.0))
+    system = graph_outputs(session, response, sets, told)["memory_out"].astype(np.float64)
+    own = sets.rows(told)
+    y = response.predict(np.log(np.stack([own["slip"], own["load"]], axis=1)), x)
+    share = own["torque_std"] / own["torque"]
+    off = {
+        "torque": y[:, 0] - np.log(own["torque"] / own["load"]) - 0.5 * share**2,
+        "sinkage": y[:, 1] - np.log(own["sinkage"]),
+        "drawbar_pull": y[:, 2] - own["drawbar_pull"] / own["load"],
+    }
+    stray = (share, own["sinkage_std"] / own["sinkage"], own["drawbar_pull_std"] / own["load"])
+    for k, (values, std) in enumerate(zip(off.values(), stray, strict=True)):
+        found = system[6 * k : 6 * k + 6, :-1] @ monomials(x, response.these)
+        assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
+
+
+def test_a_channel_that_was_not_measured_has_no_row(wheel_posterior, session, sets):
+    alone = int(np.argmax(sets.readings["sinkage_std"][:, 0] > 1e5))
+    found = graph_outputs(session, wheel_posterior.response, sets, alone)
+    assert len(found["memory_out"]) == 6
+    assert found["counted_out"].tolist() == [6.0, 6.0, 6.0]
+
+
+def test_the_sensors_bias_is_integrated_out_of_the_likelihood():
+    rng = np.random.default_rng(0)
+    a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 1)), rng.normal(size=5)
+    graph = Graph()
+    graph.op("Identity", draw_unbiased(graph, "system", 5), out="out")
+    session = session_of(graph.model({"system": ["m", 6]}, {"out": (1, ["m", 5])}))
+    system = np.concatenate([a, g], axis=1).astype(np.float32)
+    found = session.run(None, {"system": system})[0] @ b
+    dense = np.linalg.solve(np.eye(8) + g @ g.T, a @ b)
+    assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
+    steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
+    assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)

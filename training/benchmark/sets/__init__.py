@@ -1,0 +1,1 @@
+"""Set posteriors of files beside the exact posteriors of the same sets."""

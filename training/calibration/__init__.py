@@ -1,0 +1,1 @@
+"""Recalibration on unseen rows, the training domain, and scores."""

@@ -1,0 +1,1 @@
+"""Rows to learn from, and what may be learned from them."""

@@ -1,0 +1,67 @@
+"""Several regressors of the same row as one estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES, best_linear, shrunk
+from training.calibration.recalibration import CalibratedRegressor
+from training.data.dataset import Dataset
+from training.onnx_graph.builder import Graph
+from training.onnx_graph.fusion_rules import draw_best_linear, draw_rule
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Calibrated members, the rule that joins them, and their errors over held-out rows.
+
+    The rule `best-linear` takes one set of weights for all rows, from the covariance of the errors:
+    row by row it would favour whichever member happens to claim most.
+    """
+
+    members: tuple[CalibratedRegressor, ...]
+    rule: str
+    correlation: Floats  # (q, m, m) of the members' errors
+    weights: Floats  # (m, q) of the rule best-linear
+
+    def predict(self, features: Floats, return_std: bool = True) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (n, q) as the rule claims them."""
+        both = [member.predict(features) for member in self.members]
+        mean, std = np.stack([m for m, _ in both]), np.stack([s for _, s in both])
+        if self.rule == BEST_LINEAR:
+            weighed = self.weights[:, None, :] * std
+            variance = np.einsum("inq,qij,jnq->nq", weighed, self.correlation, weighed)
+            return (self.weights[:, None, :] * mean).sum(axis=0), np.sqrt(variance)
+        joined = RULES[self.rule](mean, std)
+        return joined.mean, joined.std
+
+    def draw(self, graph: Graph, features: str) -> tuple[str, str]:
+        """All members and the rule as nodes of an ONNX graph: names of mean and std, (n, q)."""
+        means, stds = [], []
+        for member in self.members:
+            mean, std = member.regressor.draw(graph, features)
+            means.append(mean)
+            stds.append(graph.op("Mul", std, graph.constant(member.widen)))
+        if self.rule == BEST_LINEAR:
+            return draw_best_linear(graph, means, stds, self.weights, self.correlation)
+        return draw_rule(self.rule, graph, means, stds)
+
+
+def fuse_members(members: list[CalibratedRegressor], rule: str, data: Dataset) -> Ensemble:
+    """Join members by a rule, with the covariance of their errors on rows they did not learn."""
+    both = [member.predict(data.features) for member in members]
+    error = np.stack([data.targets - m for m, _ in both])  # (m, n, q)
+    z = error / np.stack([s for _, s in both])
+    overall = np.sqrt(np.mean(error**2, axis=1))
+    m, _, q = error.shape
+    correlation = np.stack([shrunk(np.corrcoef(z[:, :, k]).reshape(m, m)) for k in range(q)])
+    weights = np.stack(
+        [best_linear(overall[:, k], overall[:, k], correlation[k]).weights for k in range(q)],
+        axis=1,
+    )
+    return Ensemble(tuple(members), rule, correlation, weights)

@@ -1,0 +1,1 @@
+"""Regressors with a predictive variance, in the manner of scikit-learn."""
