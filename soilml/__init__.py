@@ -1,73 +1,99 @@
-"""soilml: what soil does the rover drive on.
+"""soilml estimates the strength of the soil that a rover drives on.
 
-Names are loaded on first use, so that the onboard runtime loads only what it needs.
+The names below are loaded on first use, so that the runtime on board loads only what it needs.
+Effects of the catalogue (`soilml.physics.effects`) can be imported from here too.
 """
 
 from __future__ import annotations
 
+import sys
+import warnings
+from collections.abc import Sequence
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any
 
 __version__ = "0.1.0"
 
+#: public name -> the module that defines it; effects of the catalogue come in addition
 _HOME = {
     "Case": "soilml.config.case",
     "read_case": "soilml.config.case",
+    "SoilmlError": "soilml.errors",
+    "METHODS": "soilml.identification",
+    "identify": "soilml.identification",
+    "read_table": "soilml.io.read_table",
+    "Table": "soilml.io.table",
+    "Estimate": "soilml.onboard.estimate",
+    "Estimator": "soilml.onboard.estimator",
+    "Parameter": "soilml.parameters",
     "Force": "soilml.physics.contact",
     "EFFECTS": "soilml.physics.effects",
-    "BearingFriction": "soilml.physics.effects",
-    "Bulldozing": "soilml.physics.effects",
-    "DepthCohesion": "soilml.physics.effects",
-    "DrawbarGain": "soilml.physics.effects",
-    "DrawbarOffset": "soilml.physics.effects",
-    "ExitAngle": "soilml.physics.effects",
-    "Grousers": "soilml.physics.effects",
-    "LateralSlip": "soilml.physics.effects",
-    "LoadGain": "soilml.physics.effects",
-    "LoadTransfer": "soilml.physics.effects",
-    "Multipass": "soilml.physics.effects",
-    "Rate": "soilml.physics.effects",
-    "ShearSoftening": "soilml.physics.effects",
-    "SidewallShear": "soilml.physics.effects",
-    "SinkageGain": "soilml.physics.effects",
-    "SinkageOffset": "soilml.physics.effects",
-    "SlipScale": "soilml.physics.effects",
-    "SlipSinkage": "soilml.physics.effects",
-    "Slope": "soilml.physics.effects",
-    "SmallWheelStiffness": "soilml.physics.effects",
-    "StressShift": "soilml.physics.effects",
-    "TorqueGain": "soilml.physics.effects",
-    "TorqueOffset": "soilml.physics.effects",
-    "TrackGrousers": "soilml.physics.effects",
-    "WheelFlexibility": "soilml.physics.effects",
-    "SoilmlError": "soilml.errors",
-    "Estimate": "soilml.onboard.estimate",
+    "Effect": "soilml.physics.effects",
+    "EffectCard": "soilml.physics.effects",
     "GEARS": "soilml.physics.gears",
     "LinearWheel": "soilml.physics.gears",
     "Midstance": "soilml.physics.gears",
     "Track": "soilml.physics.gears",
     "Wheel": "soilml.physics.gears",
-    "METHODS": "soilml.identification",
-    "identify": "soilml.identification",
     "Model": "soilml.physics.model",
-    "Estimator": "soilml.onboard.estimator",
     "Operating": "soilml.physics.operating_point",
-    "read_table": "soilml.io.read_table",
     "Soil": "soilml.physics.soils",
     "soil": "soilml.physics.soils",
     "soil_catalogue": "soilml.physics.soils",
     "Status": "soilml.row_status",
-    "Table": "soilml.io.table",
 }
 
-__all__ = ["__version__", *_HOME]
+#: import path that users of an earlier layout have in their files -> where it is now
+_FORMER_PATHS = {
+    "soilml.case": "soilml.config.case",
+    "soilml.effects": "soilml.physics.effects",
+    "soilml.effects.base": "soilml.physics.effects.base",
+    "soilml.estimate": "soilml.onboard.estimate",
+    "soilml.gears": "soilml.physics.gears",
+    "soilml.model": "soilml.physics.model",
+    "soilml.operating": "soilml.physics.operating_point",
+    "soilml.reading": "soilml.io.read_table",
+    "soilml.soils": "soilml.physics.soils",
+    "soilml.table": "soilml.io.table",
+}
+
+
+class _FormerPaths(MetaPathFinder, Loader):
+    """Imports a module by its former path, with a warning that names the present one."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        return ModuleSpec(name, self) if name in _FORMER_PATHS else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        former = module.__name__
+        present = _FORMER_PATHS[former]
+        warnings.warn(f"{former} has moved to {present}", DeprecationWarning, stacklevel=2)
+        sys.modules[former] = import_module(present)
+
+
+sys.meta_path.append(_FormerPaths())
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"soilml has no {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    if name == "__all__":
+        return ["__version__", *_HOME, *_effects()]
+    if not name.startswith("_") and name in _effects():
+        return _effects()[name]
+    raise AttributeError(f"soilml has no {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(__getattr__("__all__"))
+
+
+def _effects() -> dict[str, Any]:
+    """Effects of the catalogue by class name."""
+    catalogue = import_module("soilml.physics.effects").EFFECTS
+    return {effect.__name__: effect for effect in catalogue.values()}

@@ -106,8 +106,31 @@ def test_every_public_name_can_be_had():
     for name in soilml.__all__:
         assert getattr(soilml, name) is not None
     assert set(dir(soilml)) == set(soilml.__all__)
+    assert {effect.__name__ for effect in soilml.EFFECTS.values()} < set(soilml.__all__)
     with pytest.raises(AttributeError):
         _ = soilml.nonsense
+
+
+def test_former_import_paths_lead_to_the_same_module():
+    code = "import warnings; warnings.simplefilter('error'); import soilml; "
+    code += "warnings.simplefilter('ignore'); import soilml.effects.base as old, soilml.case; "
+    code += (
+        "from soilml.effects import SlipSinkage; from soilml.physics.effects import base as new; "
+    )
+    code += "import soilml.config.case; assert old is new and SlipSinkage is soilml.SlipSinkage; "
+    code += "assert soilml.case is soilml.config.case; print('same')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.stdout == "same\n", done.stderr
+
+
+def test_a_former_import_path_names_the_present_one():
+    code = "import warnings; warnings.simplefilter('error'); import soilml.effects.base"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert "has moved to soilml.physics.effects" in done.stderr
 
 
 def test_pinned_versions_cover_every_dependency():

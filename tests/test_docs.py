@@ -1,0 +1,103 @@
+"""What README and docs show works as shown, and every link leads somewhere."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from soilml import read_case, read_table
+from soilml.cli import main
+from soilml.cli.main import ORDER
+from soilml.io.read_table import RUNS
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted(
+    page
+    for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "exported/*.md", "examples/*/*.md")
+    for page in ROOT.glob(pattern)
+)
+#: pages whose Python blocks are run; docs/physics.md ends with an effect that a command loads
+RUN = ("README.md", "docs/physics.md", "docs/sets.md", "docs/advice.md", "docs/pull.md")
+
+
+def blocks(page, language):
+    text = (ROOT / page).read_text()
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
+
+
+def name_of(page):
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_python_blocks_run(page, monkeypatch, tmp_path):
+    """In a folder that has the repository's examples, and the table that the page shows."""
+    for folder in ("examples", "exported"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    for table in blocks(page, "csv"):
+        (tmp_path / "runs.csv").write_text(table)
+    monkeypatch.chdir(tmp_path)
+    assert blocks(page, "python")
+    for block in blocks(page, "python"):
+        exec(block, {"__name__": "documented"})
+
+
+def test_the_estimates_of_the_readme_are_answered(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names: dict = {}
+    exec(blocks("README.md", "python")[0], names)
+    assert names["one"].mean.shape == names["all_"].mean.shape == (3,)
+    assert bool(names["one"].in_range) and bool(names["all_"].in_range)
+
+
+def test_the_model_file_is_valid(tmp_path):
+    (tmp_path / "model.toml").write_text(blocks("docs/model-file.md", "toml")[0])
+    case = read_case(tmp_path / "model.toml")
+    assert case.soil.friction_angle == 0.60
+    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus", "slip-sinkage.n1"}
+
+
+@pytest.mark.slow
+def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
+    model = blocks("docs/model-file.md", "toml")[0]
+    extra, spec = blocks("docs/recipes-and-specs.md", "toml")
+    (tmp_path / "recipe.toml").write_text(f"rows = 60000\nseed = 1\n{model}{extra}")
+    (tmp_path / "spec.toml").write_text(spec)
+    monkeypatch.chdir(tmp_path)
+    assert main(["generate", "recipe.toml", "data.parquet", "--rows", "3000"]) == 0
+    assert main(["train", "spec.toml", "data.parquet", "model.onnx"]) == 0
+
+
+def test_the_table_of_runs_is_valid(tmp_path):
+    (tmp_path / "runs.csv").write_text(blocks("docs/runs.md", "csv")[0])
+    table = read_table(tmp_path / "runs.csv", RUNS)
+    assert np.isnan(table["drawbar_pull_N"]).all()
+
+
+def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
+    *_, effect = blocks("docs/physics.md", "python")
+    (tmp_path / "mine.py").write_text(effect)
+    model = blocks("docs/model-file.md", "toml")[0]
+    (tmp_path / "model.toml").write_text(f'{model}[[effect]]\nname = "cable-drag"\nforce = 2.0\n')
+    command = ["simulate", str(tmp_path / "model.toml"), "--slip", "0.3", "--load", "60"]
+    assert main(command) == 2
+    assert "cable-drag" in capsys.readouterr().err
+    assert main([*command, "--effects", str(tmp_path / "mine.py")]) == 0
+    with_drag = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
+    (tmp_path / "model.toml").write_text(model)
+    assert main(command) == 0
+    without = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
+    assert without - with_drag == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("command", ORDER)
+def test_every_command_is_on_the_page(command):
+    assert f"\nsoilml {command} " in (ROOT / "docs/command-line.md").read_text()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_to_files(page):
+    for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text()):
+        if not target.startswith(("http://", "https://")):
+            assert (page.parent / target).exists(), f"{name_of(page)} links to {target}"
