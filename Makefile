@@ -2,12 +2,12 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# one thread for each process: two processes that share two cores slow each other down manyfold
+# one thread for each process: threads of several processes on the same cores slow each other down
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers gap test check models limit kls1 gap-real bench bench-gap clean
+.PHONY: help demo demo-papers gap test test-fast check models limit kls1 gap-real bench bench-gap clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,18 +23,22 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	  --disable-pip-version-check --editable '.[ground,dev]'
 	@touch $@
 
-demo: $(VENV)/.ready ## from physics to an estimate on board, with a table and a picture
+demo: $(VENV)/.ready ## from the forward model to an estimate on board, with a table and a picture
 	@$(BIN)/python examples/wheel/demo.py
 
-gap: $(VENV)/.ready ## five stories of a model that lacks something, with their reports
+gap: $(VENV)/.ready ## five examples of a model that lacks an effect, with their reports
 	@$(BIN)/python examples/gap/run.py
 
-demo-papers: $(VENV)/.ready ## every system of the source papers, with pictures and their printed numbers
+demo-papers: $(VENV)/.ready ## every system of the source papers: pictures, and printed numbers beside computed ones
 	@$(BIN)/python examples/papers/run.py
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check
 	@$(BIN)/python -m pytest -n 2
+
+test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, under a minute
+	@$(MAKE) --no-print-directory check
+	@$(BIN)/python -m pytest -n 2 -m "not slow and not network"
 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \
@@ -43,14 +47,14 @@ check: $(VENV)/.ready ## formatting, types and layers
 models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
 
-limit: $(VENV)/.ready ## the Bayes limit of the benchmark and of the reference sets again, ten minutes on two cores
+limit: $(VENV)/.ready ## compute the Bayes limit of the benchmark and of the reference sets, ten minutes on two cores
 	@$(BIN)/soilml compare --limit training/benchmark/benchmark_limit.parquet
 	@$(BIN)/python bench/sets.py --limit
 
-kls1: $(VENV)/.ready ## the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
+kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/kls1/run.py
 
-gap-real: $(VENV)/.ready ## published tests through the gap workflow: make gap-real SOILML_DATA=/path/to/data
+gap-real: $(VENV)/.ready ## run the gap workflow on published tests: make gap-real SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/gap/real.py
 
 bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md
