@@ -1,4 +1,4 @@
-"""From physics to an estimate on board: what `make demo` runs, command by command."""
+"""From the forward model to an estimate on board: what `make demo` runs, step by step."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def show(log: Table, truth: dict[str, float], estimator: Estimator) -> None:
             return f"{value * factor:.3g} +- {std * factor:.2g}"
 
         analytic = [
-            cell(found[m][name]["value"], found[m][name]["std"]) if name in found[m] else "given"
+            cell(found[m][name]["value"], found[m][name]["std"]) if name in found[m] else "fixed"
             for m in found
         ]
         lines.append(
