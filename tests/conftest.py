@@ -172,3 +172,26 @@ def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Pat
     """The same as a model file."""
     noise = {"torque": [0.0, 0.02], "sinkage": [0.0005, 0.05], "drawbar_pull": [0.5, 0.03]}
     return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)
+
+
+#: Fixtures that train or run a whole workflow, by the group of tests that shares them. Tests of one
+#: group run on one worker, so that nothing is trained twice.
+SHARED = {
+    "small_data": "small model",
+    "small_model": "small model",
+    "wheel_posterior": "set posteriors",
+    "wheel_set_file": "set posteriors",
+    "any_posterior": "set posteriors",
+    "any_set_file": "set posteriors",
+}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests that use an expensive fixture as slow, and keep its users on one worker."""
+    for item in items:
+        groups = [SHARED[name] for name in getattr(item, "fixturenames", ()) if name in SHARED]
+        if groups:
+            item.add_marker(pytest.mark.slow)
+            if item.get_closest_marker("xdist_group") is None:
+                item.add_marker(pytest.mark.xdist_group(groups[-1]))
