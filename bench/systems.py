@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from soilml import Midstance, Model, Operating, Wheel, soil
 from soilml.io.text_tables import aligned
-from soilml.systems.climbing.coverage_study import coverage
+from soilml.systems.climbing.coverage_study import simulate_coverage
 from soilml.systems.tracked_robot.robot import WANG2018
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.integrator import explicit
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.integrator import explicit_step
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.walk import walk
 
 ROWS = 50_000
@@ -55,7 +55,7 @@ def gears() -> str:
 
 def walking() -> str:
     """Seconds for a turn, and the difference to the paper's step of 1e-4 s."""
-    ground = Ground(stiffness=0.7e6)
+    ground = LinearGround(stiffness=0.7e6)
     cases = [wheel_leg(foot) for foot in ("none", "LTF", "SRF", "CIF")]
     cases += [wheel_leg("none", legs=legs) for legs in (2, 3, 6)]
     lines = [
@@ -63,7 +63,7 @@ def walking() -> str:
         "|---|---:|---:|---:|---:|---:|",
     ]
     started = time.perf_counter()
-    fine = walk(cases, ground, turns=1.0, steps=FINE, step=explicit, fading=SHARP)
+    fine = walk(cases, ground, turns=1.0, steps=FINE, step=explicit_step, fading=SHARP)
     spent = time.perf_counter() - started
     lines.append(f"| {FINE} (1e-4 s, explicit) | {len(cases)} | {spent:.0f} | | | |")
     for steps in (500, 1000, 2000):
@@ -95,7 +95,7 @@ def climbing() -> str:
     table = []
     for slopes, given, known in LINES:
         angles = np.deg2rad([float(s) for s in slopes.split(",")])
-        found = coverage(SEEDS, angles.tolist(), given=given, knows_loads=known)
+        found = simulate_coverage(SEEDS, angles.tolist(), fixed=given, known_loads=known)
         cells = [
             f"{100 * found[n].inside:.0f} %, {found[n].score:.2f}" if n in found else ""
             for n in ("friction_angle", "shear_modulus", "pull", "steepest")

@@ -15,7 +15,7 @@ from soilml.numerics.prior import Prior
 from soilml.parameters import check, declared
 from soilml.physics.soils import Soil
 from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, amplitude
+from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class StickSlip:
         )
         angle = np.append(np.broadcast_to(soil.friction_angle, slip.shape), 0.5)
         increment = np.append(hidden["increment"], 0.0)
-        return amplitude(leg, np.append(slip, 0.0), angle, increment)[:-1]
+        return vibration_amplitude(leg, np.append(slip, 0.0), angle, increment)[:-1]
 
 
 def normal_stiffness(soil: Soil, width: Any) -> Floats:

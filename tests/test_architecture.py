@@ -20,6 +20,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
     "soilml/identification/nonlinear.py": {"scipy"},
+    "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/plot.py": {"matplotlib"},
     "soilml/gap/html/page.py": {"jinja2"},
     "soilml/gap/html/plots.py": {"matplotlib"},

@@ -13,10 +13,10 @@ import numpy as np
 
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
-from soilml.systems.climbing import SimulatedRover, modulus_of_each
+from soilml.systems.climbing import SimulatedRover, modulus_per_climb
 from soilml.systems.climbing.climb import Climb, WheelRun
-from soilml.systems.climbing.files.write_tables import logged
-from soilml.systems.climbing.simulated_rover import ARTIFICIAL, SLOPES
+from soilml.systems.climbing.files.write_tables import climb_tables
+from soilml.systems.climbing.simulated_rover import ARTIFICIAL_SLIPS, SLOPES
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -54,8 +54,8 @@ def run() -> None:
     FILES.mkdir(parents=True, exist_ok=True)
     true = SimulatedRover()
     rng = np.random.default_rng(4)
-    climbs = true.climbs(rng, GENTLE)
-    artificial = true.artificial(rng)
+    climbs = true.simulate_climbs(rng, GENTLE)
+    artificial = true.simulate_artificial_slip(rng)
     write_files(climbs, artificial)
     print(
         f"A simulated rover of 12 kg on sand (c 0, phi 38 deg, k_x {1e3 * true.shear[2]:.1f} mm) "
@@ -75,7 +75,7 @@ def run() -> None:
 def write_files(climbs: list[Climb], artificial: tuple[list[WheelRun], list[WheelRun]]) -> None:
     """ROVER.toml, RUNS.csv and STRESS.csv, as a rover would log them."""
     (FILES / "rover.toml").write_text(ROVER)
-    runs, stress = logged(climbs, *artificial, rim_speed=0.00915)
+    runs, stress = climb_tables(climbs, *artificial, rim_speed=0.00915)
     (FILES / "runs.csv").write_text(csv_text(runs))
     (FILES / "stress.csv").write_text(csv_text(stress))
 
@@ -97,8 +97,8 @@ def draw(
 
 def draw_stress(axis, front: list[WheelRun]) -> None:
     """Stress on the front wheel at the artificial slips: it moves forward."""
-    colours = plt.cm.viridis(np.linspace(0.0, 0.85, len(ARTIFICIAL)))
-    for number, slip in enumerate(ARTIFICIAL):
+    colours = plt.cm.viridis(np.linspace(0.0, 0.85, len(ARTIFICIAL_SLIPS)))
+    for number, slip in enumerate(ARTIFICIAL_SLIPS):
         runs = [run for run in front if abs(run.slip - slip) < 0.03]
         for i, run in enumerate(runs):
             stressed = run.profile.normal > 0
@@ -119,11 +119,11 @@ def draw_stress(axis, front: list[WheelRun]) -> None:
 
 def draw_modulus(axis, true: SimulatedRover) -> None:
     """k_x of each slope, and what a wrong speed does to it."""
-    climbs = true.climbs(np.random.default_rng(8))
+    climbs = true.simulate_climbs(np.random.default_rng(8))
     cohesion, friction, modulus = true.shear
     slopes = np.rad2deg(SLOPES)
     for error, colour, mark in ((-0.015, "C0", "v"), (0.0, "k", "o"), (0.015, "C3", "^")):
-        each = modulus_of_each(
+        each = modulus_per_climb(
             true.rover, climbs, cohesion=cohesion, friction_angle=friction, speed_error=error
         )
         mean = 1e3 * np.asarray([np.mean(each[4 * i : 4 * i + 4]) for i in range(len(slopes))])
@@ -155,7 +155,7 @@ def draw_pull(axis, true: SimulatedRover, climbs: list[Climb], found: dict) -> N
     later = SLOPES[2:]
     needed = weight * np.sin(later)
     axis.plot(
-        [true.slip(s) for s in later], needed, "C1s", label="8, 10 and 12 deg: not driven yet"
+        [true.slip_at(s) for s in later], needed, "C1s", label="8, 10 and 12 deg: not driven yet"
     )
     axis.axhline(0.0, color="0.8", lw=0.8)
     axis.set(

@@ -15,19 +15,19 @@ from soilml.gap import gap
 from soilml.io.text_tables import aligned
 from soilml.numerics.prior import Prior
 from soilml.systems.force_sensor_wheel import (
-    Run,
     SensingWheel,
-    Strength,
+    ShearStrength,
+    SteadyRun,
     StressProfile,
-    averaged,
     balanced_arc,
-    conventional,
-    estimate,
-    forces,
-    profiled,
-    pull,
-    sensed,
-    solve,
+    bekker_stress_profile,
+    bin_stress,
+    estimate_shear_modulus,
+    forces_from_profile,
+    predict_pull,
+    profile_from_readings,
+    simulate_readings,
+    solve_force_balance,
 )
 
 matplotlib.use("Agg")
@@ -35,7 +35,7 @@ import matplotlib.pyplot as plt
 
 OUT = Path("demo/papers")
 SAND = soil("nagatani2009/toyoura_sand")
-STRENGTH = Strength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
+STRENGTH = ShearStrength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
 SENSORS = SensingWheel()
 WHEEL = Wheel(radius=SENSORS.radius, width=SENSORS.width)
 WEIGHT, TRUE = 28.92, float(SAND.shear_modulus)
@@ -53,23 +53,29 @@ def main() -> None:
     """The story, and its picture."""
     rng = np.random.default_rng(1)
     true_runs = [
-        Run(slip=s, weight=WEIGHT, slope=np.radians(a)) for s, a in zip(SLIPS, SLOPES, strict=True)
+        SteadyRun(slip=s, weight=WEIGHT, slope=np.radians(a))
+        for s, a in zip(SLIPS, SLOPES, strict=True)
     ]
     arcs = [balanced_arc(np.radians(30.0), at, SENSORS, STRENGTH, TRUE) for at in true_runs]
     readings = [
-        sensed(arc, SENSORS, turns=9, crown=0.3, lugs=(0.3, 0.3), seed=i)
+        simulate_readings(arc, SENSORS, turns=9, crown=0.3, lugs=(0.3, 0.3), seed=i)
         for i, arc in enumerate(arcs)
     ]
     runs = [measured(at, rng) for at in true_runs]
-    grips = [estimate(r, at, SENSORS, STRENGTH) for r, at in zip(readings, runs, strict=True)]
+    grips = [
+        estimate_shear_modulus(r, at, SENSORS, STRENGTH)
+        for r, at in zip(readings, runs, strict=True)
+    ]
     flat = grips[0]
     later = list(zip(readings, runs, strict=True))[1:]
-    pulls = [pull(r, at, SENSORS, STRENGTH, flat) for r, at in later]
-    wide = [conventional(WHEEL, SAND, slip=s, sinkage=SINKAGE, rebound=REBOUND) for s in SLIPS]
-    refitted = solve(wide[0], true_runs[0], SENSORS, STRENGTH).shear_modulus
+    pulls = [predict_pull(r, at, SENSORS, STRENGTH, flat) for r, at in later]
+    wide = [
+        bekker_stress_profile(WHEEL, SAND, slip=s, sinkage=SINKAGE, rebound=REBOUND) for s in SLIPS
+    ]
+    refitted = solve_force_balance(wide[0], true_runs[0], SENSORS, STRENGTH).shear_modulus
     known = [pulled(w, at, TRUE) for w, at in zip(wide, true_runs, strict=True)]
     tuned = [pulled(w, at, refitted) for w, at in zip(wide, true_runs, strict=True)]
-    felt = averaged(readings[0], SENSORS)
+    felt = bin_stress(readings[0], SENSORS)
     raw = felt.angle[felt.normal > 0]
 
     print("Where an arc of 30 degrees must lie for one k_x of 7.2 mm, and what the sensors make")
@@ -105,7 +111,7 @@ def main() -> None:
     drawn(arcs, felt, grips, wide, pulls, known, tuned)
 
 
-def without_noise(runs: list[Run], arcs: list[StressProfile]) -> None:
+def without_noise(runs: list[SteadyRun], arcs: list[StressProfile]) -> None:
     """How much hangs on the printed k_x, the contact, the disc, the lugs and the speed."""
     print("\nWithout noise")
     asked = [
@@ -118,32 +124,32 @@ def without_noise(runs: list[Run], arcs: list[StressProfile]) -> None:
     for front in np.radians([35.0, 45.0, 50.0]):
         first, last = 1.0 - np.cos(front), 1.0 - np.cos(FRONT + REAR - front)
         sunk, back = float(SENSORS.radius * first), float(last / first)
-        wide = conventional(WHEEL, SAND, slip=SLIPS[0], sinkage=sunk, rebound=back)
+        wide = bekker_stress_profile(WHEEL, SAND, slip=SLIPS[0], sinkage=sunk, rebound=back)
         pulls.append(f"{pulled(wide, runs[0], TRUE):.1f}")
     print(f"  pull of the conventional 70 deg, 35, 45 or 50 in front, N  {' '.join(pulls)}")
     quiet = replace(SENSORS, noise=0.0)
     ways = {
-        "disc taken off": ((0.3, 0.3), profiled),
+        "disc taken off": ((0.3, 0.3), profile_from_readings),
         "as read": ((0.3, 0.3), as_read),
-        "lugs 50 % in front, 10 % behind": ((0.5, 0.1), profiled),
+        "lugs 50 % in front, 10 % behind": ((0.5, 0.1), profile_from_readings),
     }
     for name, (lugs, way) in ways.items():
-        level, later = (way(sensed(arcs[i], quiet, lugs=lugs), quiet) for i in (0, 3))
-        found = solve(level, runs[0], quiet, STRENGTH).shear_modulus
+        level, later = (way(simulate_readings(arcs[i], quiet, lugs=lugs), quiet) for i in (0, 3))
+        found = solve_force_balance(level, runs[0], quiet, STRENGTH).shear_modulus
         off = pulled(later, runs[3], found) - NEEDED[3]
         print(f"  {name}: k_x off by {found / TRUE - 1:+.0%}, pull at slip 0.39 by {off:+.2f} N")
     fast = replace(runs[0], slip=1.0 - (1.0 - SLIPS[0]) * (1.0 - SPEED_ERROR))
-    found = solve(arcs[0], fast, quiet, STRENGTH).shear_modulus
+    found = solve_force_balance(arcs[0], fast, quiet, STRENGTH).shear_modulus
     print(f"  speed read 1.5 % low at slip 0.11: k_x off by {found / TRUE - 1:+.0%}")
 
 
 def as_read(readings, wheel: SensingWheel) -> StressProfile:
     """The mean of the readings, blurred by the disc."""
-    felt = averaged(readings, wheel)
+    felt = bin_stress(readings, wheel)
     return StressProfile(felt.angle, felt.normal)
 
 
-def measured(at: Run, rng: np.random.Generator) -> Run:
+def measured(at: SteadyRun, rng: np.random.Generator) -> SteadyRun:
     """The run as its sensors report it."""
     slip_std = SPEED_ERROR * (1.0 - at.slip)
     return replace(
@@ -155,9 +161,9 @@ def measured(at: Run, rng: np.random.Generator) -> Run:
     )
 
 
-def pulled(profile, at: Run, modulus: float) -> float:
+def pulled(profile, at: SteadyRun, modulus: float) -> float:
     """Drawbar pull (N) of a profile scaled to carry the load."""
-    found = forces(
+    found = forces_from_profile(
         profile,
         shear_modulus=modulus,
         friction_angle=STRENGTH.friction_angle,
@@ -216,7 +222,7 @@ def drawn(arcs, felt, grips, wide, pulls, known, tuned) -> None:
     a.plot(deg(arcs[0].angle), arcs[0].normal / 1e3, color="k", lw=3, alpha=0.35, label="true")
     found = grips[0].profile
     a.plot(deg(found.angle), scale * found.normal / 1e3, "C0", label="found, disc taken off")
-    load = forces(
+    load = forces_from_profile(
         wide[0], shear_modulus=TRUE, friction_angle=STRENGTH.friction_angle, slip=SLIPS[0],
         radius=SENSORS.radius, width=SENSORS.width,
     ).load  # fmt: skip

@@ -19,14 +19,18 @@ from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
 from soilml.papers.wang2018 import LEVEL, plateau, printed
 from soilml.systems.tracked_robot.group_identification import (
-    FIVE,
-    Groups,
-    driven,
-    identified,
-    predicted,
+    PARAMETERS,
+    GroupFits,
+    identify_groups,
+    predicted_pull,
+    simulate_group,
 )
-from soilml.systems.tracked_robot.pull_regression import Regression, points_behind, regression
-from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018, balance
+from soilml.systems.tracked_robot.pull_regression import (
+    Regression,
+    implied_points,
+    linear_regression,
+)
+from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018, track_balance
 
 OUT = Path("demo/papers/tracked_robot.png")
 PRINTED = {("sand", False): 600, ("sand", True): 620, ("clay", False): 800, ("clay", True): 950}
@@ -59,14 +63,16 @@ def main() -> None:
     print("soil  front wheel  belt between  rear wheel  sinkage mm  tension kN")
     for ground in COLOURS:
         model = Model(WANG2018.track, BEYOND_PEAK[ground])
-        stands = balance(model, soil(f"wang2018/{ground}"), at)
+        stands = track_balance(model, soil(f"wang2018/{ground}"), at)
         sunk = 1e3 * float(model(soil(f"wang2018/{ground}"), at).sinkage)
         print(
             f"{ground}  {stands.front:11.0%}  {stands.middle:12.0%}  {stands.rear:10.0%}"
             f"  {sunk:10.1f}  {1e-3 * stands.tension:10.1f}"
         )
     case, groups = eight_groups()
-    fresh = driven(case, np.linspace(0.06, 0.84, 18), WANG2018.load, np.random.default_rng(18))
+    fresh = simulate_group(
+        case, np.linspace(0.06, 0.84, 18), WANG2018.load, np.random.default_rng(18)
+    )
     lines = told_by(case, groups, fresh)
     draw(case, groups, fresh, lines)
     print(f"\npicture: {OUT}")
@@ -99,17 +105,17 @@ def hanging() -> None:
         print(f"{name:29s}" + "{:4.0f}  {:8.0f}  {:4.0f}  {:8.0f}".format(*found))
 
 
-def eight_groups() -> tuple[Case, Groups]:
+def eight_groups() -> tuple[Case, GroupFits]:
     """Eight groups of pulls on the paper's sand with the gauge's noise, and what they say."""
     noise = {"drawbar_pull_N": Noise(constant=10.0, share=0.05)}
     case = Case(Model(WANG2018.track), soil("wang2018/sand"), PRIOR, noise)
     rng = np.random.default_rng(2018)
     slips = np.linspace(0.05, 0.85, 10)
-    tables = [driven(case, slips, WANG2018.load, rng) for _ in range(8)]
-    groups = identified(case, tables)
+    tables = [simulate_group(case, slips, WANG2018.load, rng) for _ in range(8)]
+    groups = identify_groups(case, tables)
     print("\nEight groups of ten pulls each, 5 % and 10 N noise, one load, five unknowns")
     print("parameter       true     mean      std  prior std  left of prior, a group  all rows")
-    for i, name in enumerate(FIVE):
+    for i, name in enumerate(PARAMETERS):
         scale = UNITS.get(name, 1.0)
         true = float(getattr(case.soil, name))
         print(
@@ -121,11 +127,11 @@ def eight_groups() -> tuple[Case, Groups]:
     return case, groups
 
 
-def told_by(case: Case, groups: Groups, fresh: object) -> Regression:
+def told_by(case: Case, groups: GroupFits, fresh: object) -> Regression:
     """Predictions of the groups' average on rows that no group has seen."""
-    line = regression(averaged(case, groups, fresh), fresh["drawbar_pull_N"])
+    line = linear_regression(averaged(case, groups, fresh), fresh["drawbar_pull_N"])
     book = printed()
-    n = points_behind(book["regression_r2"], book["regression_f"])
+    n = implied_points(book["regression_r2"], book["regression_f"])
     print("\nMeasured against predicted, fresh rows      r2       F   slope  points")
     print(
         f"here                                    {line.r2:6.3f}  {line.f:6.1f}  {line.slope:6.2f}"
@@ -138,12 +144,12 @@ def told_by(case: Case, groups: Groups, fresh: object) -> Regression:
     return line
 
 
-def averaged(case: Case, groups: Groups, table: object) -> np.ndarray:
+def averaged(case: Case, groups: GroupFits, table: object) -> np.ndarray:
     """Pull that the average of the groups predicts, N."""
-    return predicted(case, replace(groups.joint, values=groups.mean), table)
+    return predicted_pull(case, replace(groups.joint, values=groups.mean), table)
 
 
-def draw(case: Case, groups: Groups, fresh: object, line: Regression) -> None:
+def draw(case: Case, groups: GroupFits, fresh: object, line: Regression) -> None:
     """Four panels."""
     figure, axes = plt.subplots(2, 2, figsize=(11.5, 8.6), layout="constrained")
     draw_pull(axes[0, 0])
@@ -202,10 +208,10 @@ def draw_stress(ax: plt.Axes) -> None:
     ax.legend(fontsize=8, loc="upper center")
 
 
-def draw_groups(ax: plt.Axes, case: Case, groups: Groups) -> None:
+def draw_groups(ax: plt.Axes, case: Case, groups: GroupFits) -> None:
     """Where in its prior each group puts each parameter: simulated and printed ones."""
     book = printed()
-    for i, name in enumerate(FIVE):
+    for i, name in enumerate(PARAMETERS):
         prior = PRIOR[name]
         true = prior.fraction(float(getattr(case.soil, name)))
         ours = [prior.fraction(float(v)) for v in groups.values[:, i]]
@@ -238,7 +244,7 @@ def draw_groups(ax: plt.Axes, case: Case, groups: Groups) -> None:
 
 
 def draw_regression(
-    ax: plt.Axes, case: Case, groups: Groups, fresh: object, line: Regression
+    ax: plt.Axes, case: Case, groups: GroupFits, fresh: object, line: Regression
 ) -> None:
     """Fresh measurements against what the average of the groups predicts."""
     x, y = averaged(case, groups, fresh), 1.0 * fresh["drawbar_pull_N"]

@@ -22,23 +22,27 @@ from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency,
 from soilml.systems.wheel_legs.sensing.sensor_fusion import (
     PROPERTIES,
     RULES,
-    SENSES,
-    judged,
-    learned,
+    SENSORS,
+    fit_estimators,
+    score_estimators,
 )
 from soilml.systems.wheel_legs.sensing.simulated_stances import (
     FOOT,
     LOAD,
     SLIPS,
-    felt,
     four_soils,
-    torques,
-    varied_soils,
+    midstance_torques,
+    sample_soils,
+    simulate_stances,
 )
 from soilml.systems.wheel_legs.sensing.slip_fits import fit_torque_slip
 from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.sensing.soil_from_slip import from_torque
-from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, amplitude, stance
+from soilml.systems.wheel_legs.sensing.soil_from_slip import soil_from_torque
+from soilml.systems.wheel_legs.sensing.stick_slip import (
+    SpringLeg,
+    simulate_stance,
+    vibration_amplitude,
+)
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg
 from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
 from soilml.systems.wheel_legs.walking.walk import walk
@@ -67,7 +71,7 @@ def run() -> None:
 
 def torque_slip(axes: plt.Axes) -> None:
     """Torque in midstance: simulated, the fitted law, and the printed one."""
-    known, torque = four_soils(), torques(four_soils())
+    known, torque = four_soils(), midstance_torques(four_soils())
     fitted, printed = chapter.torque_fit(), TORQUE_SLIP["terramechanics"]
     print(f"Torque in midstance (N m), {LOAD:g} N on one load testing foot")
     print("  slip     " + "".join(f"{name:>9}" for name in NAMES))
@@ -79,10 +83,10 @@ def torque_slip(axes: plt.Axes) -> None:
     for name, row in rows.items():
         print(f"    {name:<29}" + "".join(f"{value:9.3f}" for value in row))
     others = {f"fitted at {load:g} N": (known, load) for load in (9.0, 15.0)}
-    others["200 soils drawn between"] = (varied_soils(200, seed=1), LOAD)
+    others["200 soils drawn between"] = (sample_soils(200, seed=1), LOAD)
     for name, (ground, load) in others.items():
         drawn = (
-            torques(ground, load=load),
+            midstance_torques(ground, load=load),
             SLIPS,
             ground.soil.friction_angle,
             ground.normal_stiffness,
@@ -95,7 +99,7 @@ def torque_slip(axes: plt.Axes) -> None:
     rows["printed"] = (*printed.stiffness[:2], 0.899)
     for name, row in rows.items():
         print(f"    {name:<29}" + "{:9.3f}{:9.3f}         {:9.3f}".format(*row))
-    one = from_torque(torque[2, 1], SLIPS[2], "simplified")
+    one = soil_from_torque(torque[2, 1], SLIPS[2], "simplified")
     angle, spread = np.rad2deg(one.friction_angle), np.rad2deg(one.std[0])
     print(f"  one stance on SSC-2, printed simplified model: phi = {angle:.0f} +- {spread:.0f}"
           f" degrees ({np.rad2deg(known.soil.friction_angle[1]):.1f} measured)")  # fmt: skip
@@ -117,14 +121,14 @@ def vibration_slip(axes: plt.Axes) -> None:
     """One stance of the rotating spring, and its amplitude against slip."""
     friction = chapter.FRICTION
     leg = SpringLeg(stiffness=4000.0)
-    found = stance(leg, 0.25, friction, np.deg2rad(10.0))
+    found = simulate_stance(leg, 0.25, friction, np.deg2rad(10.0))
     axes.plot(found.time, found.acceleration / 9.81, color="tab:purple", lw=0.8)
     axes.set(xlabel="time since midstance, s", ylabel="hub acceleration, g", ylim=(-0.75, 1.9))
     axes.set_title("Stick-slip: a leg of 4 kN/m, friction drops by 10 degrees, slip 0.25")
     slips = np.linspace(0.02, 0.5, 25)
     inner = axes.inset_axes((0.1, 0.54, 0.86, 0.43))
     for drop in (5.0, 10.0, 20.0):
-        shaken = amplitude(leg, slips, friction, np.deg2rad(drop)) / 9.81
+        shaken = vibration_amplitude(leg, slips, friction, np.deg2rad(drop)) / 9.81
         inner.plot(slips, shaken, ".-", lw=0.8, label=f"drop {drop:g} degrees")
     known = four_soils()
     increment, spring = soil_spring(known.soil.friction_angle, known.normal_stiffness)
@@ -148,18 +152,18 @@ def vibration_slip(axes: plt.Axes) -> None:
 
 def fusion(axes: plt.Axes) -> None:
     """Torque, vibration and sinkage on simulated soils: each alone and joined."""
-    learn, hold = felt(400, seed=1), felt(400, seed=2)
+    learn, hold = simulate_stances(400, seed=1), simulate_stances(400, seed=2)
     print("\nOne stance on each of 400 simulated soils not learned from")
-    names = (*SENSES, *RULES)
+    names = (*SENSORS, *RULES)
     for k, name in enumerate(PROPERTIES):
         unit, scale = (("degrees", 180.0 / np.pi), ("N/cm^2", 1e-4))[k]
-        senses = learned(learn, name)
-        found = judged(senses, hold)
+        senses = fit_estimators(learn, name)
+        found = score_estimators(senses, hold)
         print(f"  {name.replace('_', ' '):<24} {'RMSE':>8} {'claimed':>8} {'in 95 %':>8}  {unit}")
         for sense in names:
             row = found[sense]
-            print(f"    {sense:<22} {scale * row.rmse:8.2f} {scale * row.claimed:8.2f}"
-                  f" {100 * row.within_two:7.0f}%")  # fmt: skip
+            print(f"    {sense:<22} {scale * row.rmse:8.2f} {scale * row.predicted_std:8.2f}"
+                  f" {100 * row.coverage_95:7.0f}%")  # fmt: skip
         between = {
             "torque, vibration": (0, 1),
             "torque, sinkage": (0, 2),
@@ -171,7 +175,7 @@ def fusion(axes: plt.Axes) -> None:
         place = np.arange(len(names)) + 0.38 * (k - 0.5)
         label = f"{name.replace('_', ' ')} (spread {scale * truth:.1f} {unit})"
         bars = axes.bar(place, [found[n].rmse / truth for n in names], 0.36, label=label)
-        axes.bar_label(bars, [f"{100 * found[n].within_two:.0f}" for n in names], fontsize=8)
+        axes.bar_label(bars, [f"{100 * found[n].coverage_95:.0f}" for n in names], fontsize=8)
     axes.set_xticks(range(len(names)), [n.replace(" ", "\n") for n in names])
     axes.set(ylabel="RMSE over the spread of the soils", ylim=(0, 1.35))
     axes.set_title("Three senses and three rules; above: truths inside the claimed 95 %")

@@ -16,15 +16,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from soilml.systems.wheel_legs.sensing.sinkage_fit import fitted_to, simulated
-from soilml.systems.wheel_legs.walking.gait_metrics import feet_compared, legs_compared
+from soilml.systems.wheel_legs.sensing.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
+from soilml.systems.wheel_legs.walking.gait_metrics import compare_feet, compare_legs
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
-from soilml.systems.wheel_legs.walking.plate_stresses import stresses
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
+from soilml.systems.wheel_legs.walking.plate_stresses import plate_stresses
 from soilml.systems.wheel_legs.walking.walk import walk
 
 OUT = Path("demo/papers/wheel_legs.png")
-SAND = Ground(stiffness=0.7e6)
+SAND = LinearGround(stiffness=0.7e6)
 FOOT_COLOURS = {"none": "#8a8f98", "LTF": "#d1495b", "SRF": "#2e86ab", "CIF": "#3a7d44"}
 STATE_MARKS = {"loose": "v", "medium": "o", "dense": "^"}
 SOIL_COLOURS = ("#d1495b", "#edae49", "#2e86ab", "#3a7d44")
@@ -37,7 +37,7 @@ def figures(legs, feet, soils, fit):
     print("Legs without feet on alpha_z = 0.7 N/cm3, a full turn:")
     print("  legs   slip rms   sinkage rms   sinkage max")
     for n, (slip, rms, most) in enumerate(
-        zip(legs.rms_slip, legs.rms_sinkage, legs.most_sinkage, strict=True), 1
+        zip(legs.rms_slip, legs.rms_sinkage, legs.max_sinkage, strict=True), 1
     ):
         print(f"  {n:4d} {slip:10.2f} {rms * CM:10.1f} cm {most * CM:10.1f} cm")
     print("\nFive legs, alpha_z from 0.4 to 1.0 N/cm3:")
@@ -60,7 +60,7 @@ def figures(legs, feet, soils, fit):
     print(f"  s_I, rad         {fit.s_i:8.2f}      0.76")
     print(f"  s_Z, rad/cm      {fit.s_z / CM:8.3f}    -0.07")
     print(f"  R2               {fit.friction_r2:8.2f}      0.98")
-    more = fitted_to(simulated(offset=True))
+    more = fit_simulated_sinkage(simulate_sinkage(offset=True))
     print(
         f"  missed on soils left out: sigma_1 by {fit.stiffness_scatter:.0%}\n"
         f"  with sigma_0 in the walk: s_sigma {more.s_sigma / CM:.1f}, R2 {more.stiffness_r2:.2f}, "
@@ -84,7 +84,7 @@ def strip(axes):
     origin = walked.x[start, 0]
     spots = []
     for k, i in enumerate(moments):
-        found = stresses(walked, i, wheel, SAND)
+        found = plate_stresses(walked, i, wheel, SAND)
         move = -origin + k * shift - (walked.x[i, 0] - origin)
         x, z = found.x[:-1] + move, found.z[:-1]
         spots.append((walked.x[i, 0] + move, walked.z[i, 0]))
@@ -138,7 +138,7 @@ def numbers(axes, legs):
     )
     axes.set(xlabel="legs, without feet", ylabel="slip", ylim=(0, 1), xticks=n)
     other = axes.twinx()
-    other.plot(n, legs.most_sinkage * CM, "s-", color="#b5651d", label="sinkage, largest")
+    other.plot(n, legs.max_sinkage * CM, "s-", color="#b5651d", label="sinkage, largest")
     other.plot(n, legs.rms_sinkage * CM, "s:", color="#b5651d", mfc="w", label="sinkage, rms")
     other.set_ylim(0, 20)
     other.set_ylabel("sinkage, cm", color="#b5651d")
@@ -215,9 +215,9 @@ def characterised(axes, soils, fit):
 
 def main():
     """Simulate, tell, draw."""
-    legs, feet = legs_compared(SAND), feet_compared()
-    soils = simulated()
-    fit = fitted_to(soils)
+    legs, feet = compare_legs(SAND), compare_feet()
+    soils = simulate_sinkage()
+    fit = fit_simulated_sinkage(soils)
     figures(legs, feet, soils, fit)
     figure = plt.figure(figsize=(13, 8.2), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=[0.95, 1.0])

@@ -20,9 +20,9 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import pull_efficiency
 from soilml.physics.soils import soil
-from soilml.systems.wheel_legs.sensing.simulated_stances import SLIPS, four_soils, torques
+from soilml.systems.wheel_legs.sensing.simulated_stances import SLIPS, four_soils, midstance_torques
 from soilml.systems.wheel_legs.sensing.slip_fits import (
-    Fitted,
+    SlipModelFit,
     fit_torque_slip,
     fit_vibration_slip,
 )
@@ -32,7 +32,7 @@ from soilml.systems.wheel_legs.sensing.slip_models import (
     TorqueSlip,
     VibrationSlip,
 )
-from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, amplitude
+from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 
@@ -47,11 +47,15 @@ STD = {"friction": (14.0, 14.0, 9.0), "stiffness": (54.0, 27.0, 24.0)}
 
 
 @cache
-def torque_fit() -> Fitted[TorqueSlip]:
+def torque_fit() -> SlipModelFit[TorqueSlip]:
     """The terramechanics form of table IV, on the four soils."""
     known = four_soils()
     return fit_torque_slip(
-        torques(known), SLIPS, known.soil.friction_angle, known.normal_stiffness, "terramechanics"
+        midstance_torques(known),
+        SLIPS,
+        known.soil.friction_angle,
+        known.normal_stiffness,
+        "terramechanics",
     )
 
 
@@ -59,12 +63,12 @@ def torque_fit() -> Fitted[TorqueSlip]:
 def vibrations() -> tuple[Floats, Floats, Floats]:
     """(vibration in m/s^2 (slips, springs), drop of friction, stiffness) of all springs."""
     stiffness, drop = (v.ravel() for v in np.meshgrid(STIFFNESSES, DROPS))
-    felt = amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
+    felt = vibration_amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
     return felt, drop, stiffness
 
 
 @cache
-def vibration_fit(planar: bool) -> Fitted[VibrationSlip]:
+def vibration_fit(planar: bool) -> SlipModelFit[VibrationSlip]:
     """Table V fitted to the rotating spring."""
     felt, drop, stiffness = vibrations()
     return fit_vibration_slip(felt, SLIPS[1:], drop, stiffness, planar)
@@ -122,7 +126,9 @@ def _vibration(planar: bool, name: str) -> float:
     return float(getattr(vibration_fit(planar).law, name))
 
 
-def _goodness(fit: Callable[[], Fitted[TorqueSlip] | Fitted[VibrationSlip]], part: str) -> float:
+def _goodness(
+    fit: Callable[[], SlipModelFit[TorqueSlip] | SlipModelFit[VibrationSlip]], part: str
+) -> float:
     return fit().goodness[part]
 
 

@@ -9,43 +9,43 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.systems.wheel_legs.sensing.sinkage_fit import (
-    Simulated,
+    SimulatedSinkage,
     SinkageFit,
-    fitted_to,
-    simulated,
+    fit_simulated_sinkage,
+    simulate_sinkage,
 )
 from soilml.systems.wheel_legs.walking.gait_metrics import (
-    FeetCompared,
-    Gait,
-    falls_until,
-    feet_compared,
-    legs_compared,
+    FeetComparison,
+    GaitMetrics,
+    compare_feet,
+    compare_legs,
+    decreasing_until,
 )
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.resistive_force import stress_gains
 
 #: Ground on which numbers of legs are compared, the middle of the paper's range; not printed.
-MIDDLE = Ground(stiffness=0.7e6)
+MIDDLE = LinearGround(stiffness=0.7e6)
 
 
 @cache
-def _legs() -> Gait:
-    return legs_compared(MIDDLE)
+def _legs() -> GaitMetrics:
+    return compare_legs(MIDDLE)
 
 
 @cache
-def _feet() -> FeetCompared:
-    return feet_compared()
+def _feet() -> FeetComparison:
+    return compare_feet()
 
 
 @cache
-def _soils() -> Simulated:
-    return simulated()
+def _soils() -> SimulatedSinkage:
+    return simulate_sinkage()
 
 
 @cache
 def _fit() -> SinkageFit:
-    return fitted_to(_soils())
+    return fit_simulated_sinkage(_soils())
 
 
 def _rank(values: Array, foot: str) -> float:
@@ -63,12 +63,12 @@ def _slope(values: Array) -> Array:
 COMPUTED: dict[str, Callable[[], float]] = {
     "alpha_z_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[1]),
     "alpha_x_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[0]),
-    "rms_slip_legs": lambda: falls_until(_legs().rms_slip),
-    "rms_slip_to_five": lambda: falls_until(_legs().rms_slip[:5]) - 1,
-    "rms_sinkage_legs": lambda: falls_until(-_legs().rms_sinkage),
+    "rms_slip_legs": lambda: decreasing_until(_legs().rms_slip),
+    "rms_slip_to_five": lambda: decreasing_until(_legs().rms_slip[:5]) - 1,
+    "rms_sinkage_legs": lambda: decreasing_until(-_legs().rms_sinkage),
     "max_sinkage_drop": lambda: 2 + int(np.argmax(_drop() >= 0.05)),
     "rms_sinkage_six": lambda: 5 + int(np.argmin(_legs().rms_sinkage[4:])),
-    "max_sinkage_six": lambda: 5 + int(np.argmin(_legs().most_sinkage[4:])),
+    "max_sinkage_six": lambda: 5 + int(np.argmin(_legs().max_sinkage[4:])),
     "rank_sinkage_none": lambda: _rank(_feet().sinkage, "none"),
     "rank_sinkage_cif": lambda: _rank(_feet().sinkage, "CIF"),
     "rank_slip_none": lambda: _rank(_feet().slip, "none"),
@@ -88,5 +88,5 @@ COMPUTED: dict[str, Callable[[], float]] = {
 
 def _drop() -> Array:
     """Share by which each added leg lowers the largest sinkage."""
-    most = _legs().most_sinkage
+    most = _legs().max_sinkage
     return 1.0 - most[1:] / most[:-1]

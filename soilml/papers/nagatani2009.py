@@ -14,14 +14,14 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import soil
 from soilml.systems.force_sensor_wheel import (
-    Run,
     SensingWheel,
-    Strength,
+    ShearStrength,
+    SteadyRun,
     StressProfile,
     balanced_arc,
-    profiled,
-    sensed,
-    solve,
+    profile_from_readings,
+    simulate_readings,
+    solve_force_balance,
 )
 
 GRAVITY = 9.80665
@@ -30,17 +30,17 @@ SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
 #: Share of the way to the entry angle that keeps 30 of 70 degrees, rounded as the effect cites it.
 SHIFT = 0.57
 WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
-STRENGTH = Strength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
+STRENGTH = ShearStrength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
 WEIGHT = 28.92
 
 
 @cache
 def _found(slip: float) -> tuple[StressProfile, float]:
     """The stress and the k_x (m) that the sensors give of an arc of 30 degrees with one k_x."""
-    at = Run(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
+    at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
     true = balanced_arc(math.radians(30.0), at, WHEEL, STRENGTH, float(SAND.shear_modulus))
-    profile = profiled(sensed(true, WHEEL), WHEEL)
-    return profile, solve(profile, at, WHEEL, STRENGTH).shear_modulus
+    profile = profile_from_readings(simulate_readings(true, WHEEL), WHEEL)
+    return profile, solve_force_balance(profile, at, WHEEL, STRENGTH).shear_modulus
 
 
 def _modulus(slip: float) -> float:

@@ -1,8 +1,8 @@
-"""What Nagatani et al. print of climbing ability, computed on a simulated rover.
+"""The numbers that Nagatani et al. print on climbing ability, computed for a simulated rover.
 
-The paper prints no measured force, stress or shear modulus as a number: what it claims, that the
-pull on steep slopes follows from slopes of 0 and 4 degrees, is tried on a rover whose ground is
-known (`soilml.systems.climbing.SimulatedRover`), driven as the paper's was.
+The paper prints no measured force, stress or shear modulus as a number. Its claim, that the pull on
+steep slopes follows from slopes of 0 and 4 degrees, is tested with a rover on a known soil
+(`soilml.systems.climbing.SimulatedRover`) under the same conditions.
 """
 
 from __future__ import annotations
@@ -15,46 +15,46 @@ import numpy as np
 from soilml.errors import FitError
 from soilml.quantities import SHEAR
 from soilml.systems.climbing import (
-    Ability,
     Climb,
+    ClimbingAbility,
     SimulatedRover,
     StressBySlip,
     climbing_ability,
     identify_ground,
-    modulus_of_each,
+    modulus_per_climb,
 )
 from soilml.systems.climbing.simulated_rover import SLOPES
 
-#: Slopes on which the paper's prediction rests, and repetitions of each.
+#: Slopes from which the paper predicts, and repetitions of each.
 GENTLE, REPEATS = SLOPES[:2], 4
 
 
 @cache
 def _climbs() -> tuple[Climb, ...]:
-    return tuple(SimulatedRover().climbs(np.random.default_rng(0), SLOPES, REPEATS))
+    return tuple(SimulatedRover().simulate_climbs(np.random.default_rng(0), SLOPES, REPEATS))
 
 
 @cache
-def _ability() -> Ability:
-    """Predicted from slopes of 0 and 4 degrees and artificial slip, c and phi given."""
+def _ability() -> ClimbingAbility:
+    """Prediction from slopes of 0 and 4 degrees and artificial slip, with known c and phi."""
     true = SimulatedRover()
-    front, rear = true.artificial(np.random.default_rng(1))
+    front, rear = true.simulate_artificial_slip(np.random.default_rng(1))
     known = dict(zip(SHEAR[:2], true.shear[:2], strict=True))
     climbs = _climbs()[: len(GENTLE) * REPEATS]
-    ground = identify_ground(true.rover, climbs, given=known)
+    ground = identify_ground(true.rover, climbs, fixed=known)
     front += [climb.front for climb in climbs]
     rear += [climb.rear for climb in climbs]
-    return climbing_ability(ground, StressBySlip.of(front), StressBySlip.of(rear))
+    return climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
 
 
-def _slope(driven: float) -> float:
-    """Slope (deg) predicted at the slip at which the rover climbs the slope `driven` (deg)."""
-    ability, slip = _ability(), SimulatedRover().slip(float(np.deg2rad(driven)))
+def _predicted_slope(climbed: float) -> float:
+    """Slope (deg) predicted at the slip at which the rover climbs the slope `climbed` (deg)."""
+    ability, slip = _ability(), SimulatedRover().slip_at(float(np.deg2rad(climbed)))
     return float(np.rad2deg(np.interp(slip, ability.slip, np.median(ability.slope, axis=0))))
 
 
-def _conditions() -> float:
-    """The least number of slopes from which c, phi and k_x are found."""
+def _required_slopes() -> float:
+    """The smallest number of slopes from which c, phi and k_x can be identified."""
     true = SimulatedRover()
     for count in range(1, len(SLOPES) + 1):
         try:
@@ -65,10 +65,10 @@ def _conditions() -> float:
     return float("nan")
 
 
-def _constancy() -> float:
-    """Largest over smallest k_x, each the mean of the runs of one slope."""
+def _modulus_ratio() -> float:
+    """Largest over smallest k_x, each the mean over the runs of one slope."""
     cohesion, friction, _ = SimulatedRover().shear
-    each = modulus_of_each(
+    each = modulus_per_climb(
         SimulatedRover().rover, _climbs(), cohesion=cohesion, friction_angle=friction
     )
     mean = each.reshape(len(SLOPES), REPEATS).mean(axis=1)
@@ -77,7 +77,7 @@ def _constancy() -> float:
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
-    **{f"slope_{slope}": partial(_slope, slope) for slope in (0, 4, 8, 10, 12)},
-    "conditions": _conditions,
-    "modulus_constant": _constancy,
+    **{f"slope_{slope}": partial(_predicted_slope, slope) for slope in (0, 4, 8, 10, 12)},
+    "conditions": _required_slopes,
+    "modulus_constant": _modulus_ratio,
 }

@@ -16,7 +16,7 @@ COLUMNS = ("key", "what", "source", "unit", "published", "tolerance", "reason")
 
 
 @dataclass(frozen=True)
-class Published:
+class PrintedNumber:
     """A number that a paper prints, how near a faithful model must come, or why it cannot.
 
     `tolerance` is a share of the number where the file gives per cent, else in its unit. A row
@@ -29,7 +29,7 @@ class Published:
     what: str
     source: str
     unit: str
-    published: float
+    printed_numbers: float
     tolerance: float
     relative: bool
     reason: str
@@ -41,17 +41,17 @@ class Published:
         """Largest difference that counts as reproduced, in the number's unit."""
         return self.tolerance * (abs(self.published) if self.relative else 1.0)
 
-    def compared(self) -> Compared:
+    def compared(self) -> Comparison:
         """Compute the number and judge it; takes as long as its model takes."""
         value = math.nan if self.compute is None else float(self.compute())
-        return Compared(self, value, bool(abs(value - self.published) <= self.allowed))
+        return Comparison(self, value, bool(abs(value - self.published) <= self.allowed))
 
 
 @dataclass(frozen=True)
-class Compared:
+class Comparison:
     """A printed number, the computed one (NaN where nothing computes it), and the judgement."""
 
-    row: Published
+    row: PrintedNumber
     computed: float
     holds: bool
 
@@ -70,7 +70,7 @@ class Compared:
         return self.holds != bool(self.row.reason)
 
 
-def published(paper: str | None = None) -> Iterator[Published]:
+def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
     """Every row of one paper, or of all; raises `InputError` for a paper that is not there."""
     if paper is not None and paper not in PAPERS:
         raise InputError(f"no paper {paper!r}; there are: {', '.join(PAPERS)}")
@@ -86,9 +86,9 @@ def published(paper: str | None = None) -> Iterator[Published]:
 
 def _row(
     paper: str, entry: dict[str, str], compute: Callable[[], float] | None, given: bool
-) -> Published:
+) -> PrintedNumber:
     tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
-    return Published(
+    return PrintedNumber(
         paper=paper,
         key=entry["key"],
         what=entry["what"],

@@ -11,7 +11,7 @@ from importlib import resources
 import numpy as np
 
 from soilml.physics.soils import soil
-from soilml.systems.tracked_robot.pull_regression import points_behind
+from soilml.systems.tracked_robot.pull_regression import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
 #: Slips over which a curve of drawbar pull counts as level.
@@ -44,7 +44,7 @@ def averaged(name: str) -> float:
 def variance_ratio() -> float:
     """F of a straight line with the printed r2 through the number of points that both imply."""
     r2 = printed()["regression_r2"]
-    points = round(points_behind(r2, printed()["regression_f"]))
+    points = round(implied_points(r2, printed()["regression_f"]))
     return r2 / (1.0 - r2) * (points - 2)
 
 

@@ -10,8 +10,8 @@ from soilml.cli import main
 from soilml.config.measurement_noise import Noise
 from soilml.io.text_tables import csv_text
 from soilml.systems.climbing import SimulatedRover
-from soilml.systems.climbing.files.read_tables import read_driven
-from soilml.systems.climbing.files.write_tables import logged
+from soilml.systems.climbing.files.read_tables import read_climb_data
+from soilml.systems.climbing.files.write_tables import climb_tables
 
 ROVER = """\
 [rover]
@@ -40,8 +40,8 @@ def true():
 @pytest.fixture(scope="module")
 def tables(true):
     rng = np.random.default_rng(6)
-    climbs = true.climbs(rng, np.deg2rad([0.0, 4.0, 8.0]).tolist(), 2)
-    return logged(climbs, *true.artificial(rng, repeats=2), rim_speed=0.00915)
+    climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0, 8.0]).tolist(), 2)
+    return climb_tables(climbs, *true.simulate_artificial_slip(rng, repeats=2), rim_speed=0.00915)
 
 
 @pytest.fixture
@@ -93,14 +93,14 @@ def test_the_same_seed_gives_the_same_answer(folder):
 
 
 def test_tables_give_back_what_was_logged(folder, tables):
-    driven = read_driven("runs.csv", "stress.csv", Noise(share=0.05))
-    again = logged(driven.climbs, rim_speed=0.00915)
+    data = read_climb_data("runs.csv", "stress.csv", Noise(share=0.05))
+    again = climb_tables(data.climbs, rim_speed=0.00915)
     for name, values in tables[0].items():
         if isinstance(values[0], str):
             assert again[0][name] == values
         else:
             np.testing.assert_allclose(again[0][name], values, rtol=1e-8, atol=1e-12)
-    assert len(driven.front) == len(driven.rear) == 6 + 8
+    assert len(data.front) == len(data.rear) == 6 + 8
 
 
 def changed(table, name, change):
@@ -166,11 +166,11 @@ FAULTS = {
     ),
     "a slope beyond grip": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 1.2), s),
-        "run 8deg_1: a slope of 1.2 rad takes",
+        "run 8deg_1: a slope of 1.2 rad requires",
     ),
     "climbs that contradict": (
         lambda r, s: (of_run(r, "slope_rad", "8deg_1", 0.5), s),
-        "no one soil within the ranges explains these climbs",
+        "no single soil within the ranges explains these climbs",
     ),
     "stress at one slip": (
         lambda r, s: (only(r, lambda run: run[0] == "0"), only(s, lambda run: run[0] == "0")),
@@ -182,7 +182,7 @@ FAULTS = {
     ),
     "two slopes of one run": (
         lambda r, s: ({**r, "slope_rad": [0.01 * i for i in range(12)]}, s),
-        "needed is one slope for a run",
+        "needed is one slope per run",
     ),
     "unit in kPa": (
         lambda r, s: (r, {("normal_kPa" if n == "normal_Pa" else n): v for n, v in s.items()}),
@@ -190,7 +190,7 @@ FAULTS = {
     ),
     "a std that is not read": (
         lambda r, s: ({**r, "slope_rad_std": [0.01] * 12}, s),
-        "say it in [noise]",
+        "set it in [noise]",
     ),
 }
 
@@ -220,12 +220,12 @@ ROVER_FAULTS = {
     "no weight": (ROVER.replace("12.0", "0"), "mass is 0 kg"),
     "number and range": (
         ROVER.replace("[soil.prior]", "[soil.prior]\ncohesion = [0.0, 9.0]"),
-        "one of both must go",
+        "remove one of them",
     ),
     "range the wrong way": (ROVER.replace("[0.001, 0.05]", "[0.05, 0.001]"), "lower below upper"),
     "unknown noise": (ROVER.replace("slope_rad", "slope_deg"), "did you mean 'slope_rad'?"),
-    "noise below zero": (ROVER.replace("0.005", "-0.005"), "between 0 and 1"),
-    "speed without share": (ROVER.replace('"0.87 %"', "0.001"), "must be a share"),
+    "noise below zero": (ROVER.replace("0.005", "-0.005"), "in [0, 1)"),
+    "speed without share": (ROVER.replace('"0.87 %"', "0.001"), "must be a percentage"),
 }
 
 
@@ -245,7 +245,7 @@ def test_too_few_slopes_are_refused_with_the_number_needed(folder, tables, capsy
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--slip-limit", "0.95"], "nothing is said outside"),
+        (["--slip-limit", "0.95"], "there is no prediction outside"),
         (["--slip-limit", "30"], "needed is a slip from 0 to 1"),
         (["--seed", "-1"], "needed is a whole number"),
     ],

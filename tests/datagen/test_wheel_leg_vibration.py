@@ -13,7 +13,7 @@ from datagen.wheel_leg_vibration import normal_stiffness
 from soilml import read_table, soil
 from soilml.errors import InputError
 from soilml.systems.wheel_legs.sensing.slip_models import spring_soil
-from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, amplitude
+from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, vibration_amplitude
 
 RECIPE = """\
 rows = {rows}
@@ -56,7 +56,9 @@ def recipe(tmp_path, text=RECIPE, rows=400):
 def test_the_hub_feels_what_the_spring_says(tmp_path):
     made = piece(recipe(tmp_path), 0, 0, 60)
     felt = [
-        amplitude(SpringLeg(stiffness=k, hub_mass=load / GRAVITY, turning=3.0), slip, angle, drop)
+        vibration_amplitude(
+            SpringLeg(stiffness=k, hub_mass=load / GRAVITY, turning=3.0), slip, angle, drop
+        )
         for k, load, slip, angle, drop in zip(
             *(made[c] for c in ("stick-slip.stiffness", "load_N", "slip", "friction_angle_rad")),
             made["stick-slip.increment"],

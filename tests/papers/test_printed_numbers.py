@@ -8,9 +8,9 @@ import pytest
 
 from soilml.cli import main
 from soilml.papers import PAPERS, TITLES
-from soilml.papers.published import COLUMNS, published
+from soilml.papers.published import COLUMNS, printed_numbers
 
-ROWS = list(published())
+ROWS = list(printed_numbers())
 CHAPTERS = [chapter for chapters in PAPERS.values() for chapter in chapters]
 
 

@@ -58,5 +58,5 @@ def test_the_lines_on_the_page_run():
     page = (ROOT / "docs/papers/comin2017_slip.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
-    assert names["found"].std[0] > 0 and names["shaken"] > 0 and names["torque"] > 0
+    assert names["found"].std[0] > 0 and names["vibration"] > 0 and names["torque"] > 0
     assert names["traffic_class"](names["eta"]) == CLASSES[2]

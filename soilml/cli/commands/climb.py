@@ -72,7 +72,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Identify, predict and deliver."""
-    from soilml.systems.climbing.files.read_tables import read_driven
+    from soilml.systems.climbing.files.read_tables import read_climb_data
     from soilml.systems.climbing.files.report import climbing_report
     from soilml.systems.climbing.files.rover_file import read_rover
 
@@ -81,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
         raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip from 0 to 1")
     file = read_rover(args.rover)
-    driven = read_driven(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
-    report = climbing_report(file, driven, slip_limit=args.slip_limit, seed=args.seed)
+    data = read_climb_data(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
+    report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
     text = json.dumps(report.as_json(), indent=2, allow_nan=False) + "\n"
     if args.out is None and not watched():
         put(text)
@@ -117,17 +117,17 @@ def _curve(report: ClimbingReport) -> dict[str, Any]:
 def _runs(report: ClimbingReport) -> dict[str, Any]:
     from soilml.systems.climbing.files.report import SPEED_ERROR
 
-    climbs = report.driven.climbs
+    climbs = report.data.climbs
     return {
         "run": [c.name for c in climbs],
         "slope_rad": [c.slope for c in climbs],
         "slip_front": [c.front.slip for c in climbs],
         "slip_rear": [c.rear.slip for c in climbs],
-        "off_N": report.ground.off,
-        "off_N_std": report.ground.off_std,
-        "shear_modulus_m_if_speed_low": report.each[-SPEED_ERROR],
-        "shear_modulus_m": report.each[0.0],
-        "shear_modulus_m_if_speed_high": report.each[SPEED_ERROR],
+        "off_N": report.ground.residual,
+        "off_N_std": report.ground.residual_std,
+        "shear_modulus_m_if_speed_low": report.modulus_per_climb[-SPEED_ERROR],
+        "shear_modulus_m": report.modulus_per_climb[0.0],
+        "shear_modulus_m_if_speed_high": report.modulus_per_climb[SPEED_ERROR],
     }
 
 
@@ -144,7 +144,7 @@ def _for_people(report: ClimbingReport) -> str:
         within = band(ability.steepest_within(report.slip_limit))
         text = _of_band(within, _UNITS["rad"][0], ".1f")
         found.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
-    climbs, slopes = fit.rows_used, report.ground.slopes
+    climbs, slopes = fit.rows_used, report.ground.distinct_slopes
     parts = [
         f"{climbs} climb{'s'[: climbs > 1]} on {slopes} slope{'s'[: slopes > 1]}",
         aligned(("parameter", "value", "std", "unit", "left of range"), _parameters(report)),

@@ -14,7 +14,7 @@ from soilml.io.atomic_files import named
 from soilml.io.text_tables import aligned
 from soilml.optional_imports import need
 from soilml.papers import PAPERS, TITLES
-from soilml.papers.published import Compared, published
+from soilml.papers.published import Comparison, printed_numbers
 
 HELP = "the source papers' printed numbers beside the computed ones"
 DESCRIPTION = """\
@@ -51,7 +51,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Compute and deliver the table."""
     need("scipy", "papers")
-    rows = list(published(args.paper))
+    rows = list(printed_numbers(args.paper))
     found = []
     for i, row in enumerate(rows):
         if sys.stderr.isatty():
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if count["NO"] else 0
 
 
-def _page(paper: str, found: list[Compared], every: bool) -> str:
+def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it; the rest in a line a reason."""
     shown = [c for c in found if every or c.said in ("yes", "known", "NO")]
     notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
@@ -94,7 +94,7 @@ def _page(paper: str, found: list[Compared], every: bool) -> str:
     return "\n".join(page + ([] if every else _rest(found)))
 
 
-def _rest(found: list[Compared]) -> list[str]:
+def _rest(found: list[Comparison]) -> list[str]:
     """What the table leaves out: inputs, and numbers that nothing computes, by reason."""
     given = [c.row.what for c in found if c.said == "given"]
     said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
@@ -112,7 +112,7 @@ def _wrapped(text: str) -> str:
     return textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
-def _columns(found: list[Compared]) -> dict[str, list[object]]:
+def _columns(found: list[Comparison]) -> dict[str, list[object]]:
     return {
         "paper": [c.row.paper for c in found],
         "key": [c.row.key for c in found],

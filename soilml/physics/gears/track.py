@@ -55,7 +55,7 @@ class Track:
     Crolla, J. agric. Engng Res. 69, 1998. The trim angle comes from the balance of displacements,
     so that the centre of mass and the hitch are those which that trim needs; tensions at the joints
     are inner forces, and the middle arc's tension is the one that its pressure and radius ask for
-    (`soilml.systems.tracked_robot.robot.balance`). While it brakes, shear turns at places that the
+    (`soilml.systems.tracked_robot.track_balance`). While it brakes, shear turns at places that the
     nodes do not know: forces are then good to some parts in a thousand, at worst in a hundred, and
     where shear is many times the load, sinkage need not rise from one load to the next. Not for
     belts stiff in bending, road wheels between the end wheels, or turning.

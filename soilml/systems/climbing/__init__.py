@@ -1,17 +1,24 @@
-"""Climbing ability of a rover, from gentle slopes and artificial slip."""
+"""Climbing ability of a rover, predicted from gentle slopes and artificial slip.
 
-from soilml.systems.climbing.ability import Ability, band, climbing_ability
+`identify_ground` estimates cohesion, friction angle and shear modulus from `Climb`s,
+`StressBySlip.fit` describes the stress on the rims as a function of slip, and `climbing_ability`
+predicts drawbar pull and slope against slip; `band` summarises the samples. `SimulatedRover`
+provides climbs on a known soil. Source: Nagatani et al., online estimation of climbing ability.
+"""
+
+from soilml.systems.climbing.ability import Band, ClimbingAbility, band, climbing_ability
 from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
-from soilml.systems.climbing.identify import Ground, identify_ground
-from soilml.systems.climbing.modulus_per_climb import modulus_of_each
+from soilml.systems.climbing.identify import GroundEstimate, identify_ground
 from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.shear_modulus_per_climb import modulus_per_climb
 from soilml.systems.climbing.simulated_rover import SimulatedRover
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 
 __all__ = [
-    "Ability",
+    "Band",
     "Climb",
-    "Ground",
+    "ClimbingAbility",
+    "GroundEstimate",
     "Rover",
     "SimulatedRover",
     "StressBySlip",
@@ -20,5 +27,5 @@ __all__ = [
     "band",
     "climbing_ability",
     "identify_ground",
-    "modulus_of_each",
+    "modulus_per_climb",
 ]

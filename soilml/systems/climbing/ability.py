@@ -1,4 +1,4 @@
-"""Drawbar pull against slip, and the steepest slope, on ground not yet driven."""
+"""Drawbar pull against slip, and the steepest slope, predicted before the climb."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 from soilml.arrays import Real
 from soilml.errors import FitError, InputError
 from soilml.systems.climbing.climb import WheelRun
-from soilml.systems.climbing.identify import Ground
+from soilml.systems.climbing.identify import GroundEstimate
 from soilml.systems.climbing.rover import Rover
 from soilml.systems.climbing.stress_by_slip import StressBySlip
-from soilml.systems.climbing.wheel_force_parts import Parts, parts
+from soilml.systems.climbing.wheel_force_components import ForceComponents, force_components
 
 Floats = NDArray[np.float64]
 
-#: Slips of the curve; redrawn stresses, and soils taken with each.
-SLIPS, REDRAWN, SOILS = 25, 24, 16
+#: Points of the curve over slip; resamples of the measured stress; soil samples taken with each
+#: resample. Forces are computed for all soils of a resample at once: 24 x 16 samples determine the
+#: ends of a 90 % interval to about 1.5 % of probability.
+CURVE_SLIPS, STRESS_RESAMPLES, SOILS_PER_RESAMPLE = 25, 24, 16
 #: Shares of draws below the band and below its upper end.
 BAND = (0.05, 0.95)
 
@@ -33,37 +35,37 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Ability:
-    """What a rover will do on this ground, within the slips at which stress was measured."""
+class ClimbingAbility:
+    """Predicted pull and slope over the slips at which stress was measured."""
 
     slip: Floats  # (n,)
-    pull: Floats  # (draws, n), N, drawbar pull of the rover on the flat
-    slope: Floats  # (draws, n), rad, that it climbs steadily at each slip
+    pull: Floats  # (samples, n), N, drawbar pull of the rover on level ground
+    slope: Floats  # (samples, n), rad, climbed steadily at each slip
 
     @property
     def steepest(self) -> Floats:
-        """The steepest slope of each draw, rad (draws,)."""
+        """The steepest slope of each sample, rad (samples,)."""
         return np.asarray(self.slope.max(axis=1))
 
     @property
     def steepest_slip(self) -> Floats:
-        """The slip at which each draw climbs it (draws,)."""
+        """The slip at which each sample climbs its steepest slope (samples,)."""
         return np.asarray(self.slip[np.argmax(self.slope, axis=1)])
 
     @property
-    def open_end(self) -> float:
-        """Share of draws whose slope still rises at the highest slip: they might do more."""
+    def fraction_still_rising(self) -> float:
+        """Fraction of samples whose slope is largest at the highest slip, where the curve ends."""
         return float(np.mean(np.argmax(self.slope, axis=1) == len(self.slip) - 1))
 
     def steepest_within(self, slip_limit: float) -> Floats:
-        """The steepest slope (rad) of each draw at slips up to a limit.
+        """The steepest slope (rad) of each sample at slips up to a limit, (samples,).
 
         Raises `InputError` for a limit outside the slips at which stress was measured.
         """
         check_slip(slip_limit, (float(self.slip[0]), float(self.slip[-1])))
-        at = np.asarray([np.interp(slip_limit, self.slip, slope) for slope in self.slope])
+        at_limit = np.asarray([np.interp(slip_limit, self.slip, slope) for slope in self.slope])
         below = np.where(self.slip <= slip_limit, self.slope, -np.inf).max(axis=1)
-        return np.asarray(np.maximum(at, below))
+        return np.asarray(np.maximum(at_limit, below))
 
 
 def band(draws: Floats) -> Band:
@@ -73,13 +75,13 @@ def band(draws: Floats) -> Band:
 
 
 def shared_slips(front: StressBySlip, rear: StressBySlip) -> tuple[float, float]:
-    """From which to which slip the stress of both wheels is known; raises `FitError` if none."""
+    """Range of slips at which the stress of both wheels is known; raises `FitError` if empty."""
     lowest, highest = max(front.lowest, rear.lowest), min(front.highest, rear.highest)
     if not lowest < highest:
         raise FitError(
             f"stress was measured on the front wheel at slips {front.lowest:.3g} to "
             f"{front.highest:.3g} and on the rear at {rear.lowest:.3g} to {rear.highest:.3g}; "
-            "needed are slips that both had"
+            "the two ranges must overlap"
         )
     return lowest, highest
 
@@ -89,91 +91,133 @@ def check_slip(limit: float, measured: tuple[float, float]) -> None:
     if not measured[0] <= limit <= measured[1]:
         raise InputError(
             f"slip limit {limit:g}: stress was measured at slips from {measured[0]:.3g} to "
-            f"{measured[1]:.3g} only; nothing is said outside"
+            f"{measured[1]:.3g} only; there is no prediction outside"
         )
 
 
 def climbing_ability(
-    ground: Ground, front: StressBySlip, rear: StressBySlip, *, seed: int = 0
-) -> Ability:
-    """Pull against slip, and slope against slip, for draws of soil, stress and front load.
+    ground: GroundEstimate, front: StressBySlip, rear: StressBySlip, *, seed: int = 0
+) -> ClimbingAbility:
+    """Predict drawbar pull and slope against slip, with their uncertainty.
 
-    All wheels slip alike. The curve runs over the slips at which the stress of both front and
-    rear wheels was measured. References: Nagatani et al., section 7. Raises `FitError` where
-    front and rear share no slips.
+    The samples vary the soil, the measured stress and the load of the front wheels. All wheels have
+    the same slip. The curve covers the slips at which the stress of both wheels was measured.
+
+    Parameters
+    ----------
+    ground
+        Result of `identify_ground`.
+    front, rear
+        Stress on a front and on a rear wheel against slip.
+    seed
+        Seed of the samples.
+
+    Raises
+    ------
+    FitError
+        If the slips measured on front and rear wheel do not overlap.
+
+    References
+    ----------
+    Nagatani et al., section 7.
+
+    Examples
+    --------
+    >>> from soilml.systems.climbing import SimulatedRover, band, identify_ground
+    >>> true, rng = SimulatedRover(), np.random.default_rng(0)
+    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist(), repeats=2)
+    >>> sand = {"cohesion": 0.0, "friction_angle": 0.6632}
+    >>> ground = identify_ground(true.rover, climbs, fixed=sand)
+    >>> front, rear = true.simulate_artificial_slip(rng)
+    >>> ability = climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
+    >>> round(float(np.rad2deg(band(ability.steepest).middle)))  # 14.6 is the truth
+    15
     """
     lowest, highest = shared_slips(front, rear)
     rng = np.random.default_rng(seed)
-    slip = np.linspace(lowest, highest, SLIPS)
+    slip = np.linspace(lowest, highest, CURVE_SLIPS)
     pull, slope = [], []
-    for _ in range(REDRAWN):
-        soils = ground.as_read[rng.integers(len(ground.as_read), size=SOILS)]
-        off = 1.0 + ground.noise.front_load * rng.normal(size=SOILS)
-        share = np.clip((ground.rover.front_share or 0.5) * off, 0.05, 0.95)
-        profiles = [w.redrawn(rng).profiles(slip) for w in (front, rear)]
-        columns = []
+    for _ in range(STRESS_RESAMPLES):
+        chosen = rng.integers(len(ground.samples_as_measured), size=SOILS_PER_RESAMPLE)
+        soils = ground.samples_as_measured[chosen]
+        load_factor = 1.0 + ground.noise.front_load * rng.normal(size=SOILS_PER_RESAMPLE)
+        # without a known centre of mass the weight is shared equally; at least 5 % on each axle
+        front_share = np.clip((ground.rover.front_share or 0.5) * load_factor, 0.05, 0.95)
+        profiles = [wheel.resampled(rng).profiles(slip) for wheel in (front, rear)]
+        by_slip = []
         for s, *both in zip(slip, *profiles, strict=True):
-            wheels = [parts(WheelRun(float(s), p), ground.rover, soils[:, 2]) for p in both]
-            grip = grip_of_rover(
-                ground.rover, (wheels[0], wheels[1]), soils[:, 0], np.tan(soils[:, 1]), share
+            wheels = [
+                force_components(WheelRun(float(s), profile), ground.rover, soils[:, 2])
+                for profile in both
+            ]
+            forces = slope_pull(
+                ground.rover, (wheels[0], wheels[1]), soils[:, 0], np.tan(soils[:, 1]), front_share
             )
-            columns.append((grip.pull(0.0), grip.slope()))
-        found: Floats = np.asarray(columns)  # (n, 2, SOILS)
-        pull.append(found[:, 0].T)
-        slope.append(found[:, 1].T)
-    return Ability(slip=slip, pull=np.concatenate(pull), slope=np.concatenate(slope))
+            by_slip.append((forces.pull(0.0), forces.equilibrium_slope()))
+        pull_and_slope: Floats = np.asarray(by_slip)  # (n, 2, SOILS_PER_RESAMPLE)
+        pull.append(pull_and_slope[:, 0].T)
+        slope.append(pull_and_slope[:, 1].T)
+    return ClimbingAbility(slip=slip, pull=np.concatenate(pull), slope=np.concatenate(slope))
 
 
 @dataclass(frozen=True)
-class Grip:
-    """Drawbar pull of a rover as `across` cos(slope) + `along` sin(slope) + `stuck`, N."""
+class SlopePull:
+    """Drawbar pull (N) as cos_term cos(slope) + sin_term sin(slope) + constant."""
 
-    weight: float
-    across: Real
-    along: Real
-    stuck: Real
+    weight: float  # N
+    cos_term: Real
+    sin_term: Real
+    constant: Real
 
     def pull(self, slope: Real) -> Real:
         """Drawbar pull on a slope (rad), N."""
-        return self.across * np.cos(slope) + self.along * np.sin(slope) + self.stuck
+        return self.cos_term * np.cos(slope) + self.sin_term * np.sin(slope) + self.constant
 
-    def slope(self) -> Real:
-        """The slope (rad) on which the pull carries the weight's part down it."""
-        needed = self.weight - self.along
-        held = np.clip(self.stuck / np.hypot(needed, self.across), -1.0, 1.0)
-        return np.arctan2(self.across, needed) + np.arcsin(held)
+    def equilibrium_slope(self) -> Real:
+        r"""The slope (rad) on which the pull equals the weight's component along it.
+
+        .. math::
+            (m g - S) \sin\alpha - C \cos\alpha = K \quad\Rightarrow\quad
+            \alpha = \arctan\frac{C}{m g - S} + \arcsin\frac{K}{\sqrt{(m g - S)^2 + C^2}}
+
+        with C, S and K the three terms; the argument of the arcsine is limited to [-1, 1].
+        """
+        net_weight = self.weight - self.sin_term
+        sine = np.clip(self.constant / np.hypot(net_weight, self.cos_term), -1.0, 1.0)
+        return np.arctan2(self.cos_term, net_weight) + np.arcsin(sine)
 
 
-def grip_of_rover(
+def slope_pull(
     rover: Rover,
-    wheels: tuple[Parts, Parts],
+    wheels: tuple[ForceComponents, ForceComponents],
     cohesion: Real,
-    tangent: Real,
+    tan_friction: Real,
     front_share: Real,
-) -> Grip:
-    r"""Pull of a rover whose wheels stand at one slip, on any slope.
+) -> SlopePull:
+    r"""Drawbar pull of a rover whose wheels have one slip, as a function of the slope.
 
-    With each wheel's pull over load :math:`\rho` on soil without cohesion, loads
-    :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha`, and M of
-    each wheel from its load,
+    Each wheel's ratio of pull to load on soil without cohesion is :math:`\rho`, the loads are
+    :math:`a \cos\alpha - h \sin\alpha` and :math:`(1 - a) \cos\alpha + h \sin\alpha` times the
+    weight, and M of each wheel follows from its load:
 
     .. math::
         F_x = m g [(a \rho_f + (1 - a) \rho_r) \cos\alpha + h (\rho_r - \rho_f) \sin\alpha]
               + 2 c \sum (C_x - \rho C_z)
     """
-    front, rear = (
-        (w.pressure_pull + tangent * w.friction_pull)
-        / (w.pressure_lift + tangent * w.friction_lift)
+    front_ratio, rear_ratio = (
+        (w.pressure_pull + tan_friction * w.friction_pull)
+        / (w.pressure_lift + tan_friction * w.friction_lift)
         for w in wheels
     )
-    stuck = sum(
+    # what 1 Pa of cohesion adds, less the pull of the load that cohesion carries instead of M
+    per_cohesion = sum(
         w.cohesion_pull - ratio * w.cohesion_lift
-        for w, ratio in zip(wheels, (front, rear), strict=True)
+        for w, ratio in zip(wheels, (front_ratio, rear_ratio), strict=True)
     )
     height = rover.height_ratio or 0.0
-    return Grip(
+    return SlopePull(
         weight=rover.weight,
-        across=rover.weight * (front_share * front + (1.0 - front_share) * rear),
-        along=rover.weight * height * (rear - front),
-        stuck=2.0 * cohesion * stuck,
+        cos_term=rover.weight * (front_share * front_ratio + (1.0 - front_share) * rear_ratio),
+        sin_term=rover.weight * height * (rear_ratio - front_ratio),
+        constant=2.0 * cohesion * per_cohesion,
     )

@@ -1,4 +1,4 @@
-"""How well a soil explains the balance of all climbs together."""
+"""Residuals of the force balance of all climbs, and their joint covariance."""
 
 from __future__ import annotations
 
@@ -9,50 +9,63 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.numerics.prior import Prior
-from soilml.systems.climbing.balance_noise import Shear, spread
+from soilml.systems.climbing.balance_noise import ShearParameters, balance_std
 from soilml.systems.climbing.climb import Climb, Uncertainty
 from soilml.systems.climbing.rover import Rover
-from soilml.systems.climbing.wheel_force_parts import Parts, parts, pull_of_rover, stacked
+from soilml.systems.climbing.wheel_force_components import (
+    ForceComponents,
+    force_components,
+    pull_of_rover,
+    stack_components,
+)
 
 Floats = NDArray[np.float64]
 
-#: Values of k_x, even in the logarithm, between which forces are straight lines.
+#: Values of k_x, evenly spaced in the logarithm, between which forces are interpolated linearly.
 KNOTS = 256
-#: Share of the weight below which no standard deviation of a balance is believed.
-LEAST = 1e-4
+#: Extension of the table of ln k_x beyond both ends of the prior, against rounding.
+MARGIN = 1e-6
+#: Lower limit of the standard deviation of a balance, as a fraction of the weight.
+MIN_STD_FRACTION = 1e-4
 
 
 @dataclass(frozen=True)
-class Balances:
-    """The climbs of one rover, with forces worked out over the range of k_x."""
+class ForceBalances:
+    """The climbs of one rover, with wheel forces tabulated over the range of k_x."""
 
     rover: Rover
     climbs: tuple[Climb, ...]
     log_modulus: Floats  # (KNOTS,)
-    wheels: tuple[Parts, Parts]  # front and rear, each part (climbs, KNOTS)
+    wheels: tuple[ForceComponents, ForceComponents]  # front and rear, each (climbs, KNOTS)
 
     @classmethod
-    def over(cls, rover: Rover, climbs: Sequence[Climb], modulus: Prior) -> Balances:
-        """Worked out between the ends of a prior."""
-        knots = np.linspace(np.log(modulus.lower) - 1e-6, np.log(modulus.upper) + 1e-6, KNOTS)
-        front = stacked([parts(climb.front, rover, np.exp(knots)) for climb in climbs])
-        rear = stacked([parts(climb.rear, rover, np.exp(knots)) for climb in climbs])
+    def tabulate(cls, rover: Rover, climbs: Sequence[Climb], modulus: Prior) -> ForceBalances:
+        """Tabulate the wheel forces between the ends of the prior of k_x (m)."""
+        knots = np.linspace(np.log(modulus.lower) - MARGIN, np.log(modulus.upper) + MARGIN, KNOTS)
+        front = stack_components([force_components(c.front, rover, np.exp(knots)) for c in climbs])
+        rear = stack_components([force_components(c.rear, rover, np.exp(knots)) for c in climbs])
         return cls(rover, tuple(climbs), knots, (front, rear))
 
-    def off(self, soils: Floats) -> Floats:
-        """Pull less weight down the slope (n, climbs), N, at soils (n, 3): c, phi, k_x."""
+    def residuals(self, soils: Floats) -> Floats:
+        """Pull less the weight's component along the slope, N (n, climbs).
+
+        `soils` (n, 3) are cohesion (Pa), friction angle (rad) and shear modulus (m).
+        """
         cohesion, friction, modulus = soils.T
-        place = np.interp(np.log(modulus), self.log_modulus, np.arange(len(self.log_modulus)))
-        low = np.minimum(place.astype(int), len(self.log_modulus) - 2)
-        front, rear = (wheel.between(low, place - low) for wheel in self.wheels)
+        position = np.interp(np.log(modulus), self.log_modulus, np.arange(len(self.log_modulus)))
+        knot = np.minimum(position.astype(int), len(self.log_modulus) - 2)
+        front, rear = (wheel.interpolated(knot, position - knot) for wheel in self.wheels)
         slope = np.asarray([climb.slope for climb in self.climbs])[:, None]
         pull = pull_of_rover(self.rover, slope, (front, rear), cohesion, np.tan(friction))
         return np.asarray(pull - self.rover.weight * np.sin(slope)).T
 
-    def whitener(self, shear: Shear, noise: Uncertainty) -> tuple[Floats, Floats]:
-        """(L, std): L @ off has unit noise (climbs, climbs); std of each climb, N, (climbs,)."""
-        found = np.asarray([spread(self.rover, c, shear, noise) for c in self.climbs])
-        shared = found[:, 1:]
-        least = LEAST * self.rover.weight
-        covariance = np.diag(found[:, 0] ** 2 + least**2) + shared @ shared.T
+    def whitener(self, shear: ShearParameters, noise: Uncertainty) -> tuple[Floats, Floats]:
+        """Whitening matrix and standard deviations of the residuals at one soil.
+
+        Returns (L, std): L @ residuals has unit covariance, L (climbs, climbs); std (climbs,), N.
+        """
+        stds = np.asarray([balance_std(self.rover, c, shear, noise) for c in self.climbs])
+        independent, shared = stds[:, 0], stds[:, 1:]
+        lower_limit = MIN_STD_FRACTION * self.rover.weight
+        covariance = np.diag(independent**2 + lower_limit**2) + shared @ shared.T
         return np.linalg.inv(np.linalg.cholesky(covariance)), np.sqrt(np.diag(covariance))

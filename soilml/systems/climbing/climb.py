@@ -1,4 +1,4 @@
-"""What was measured on a climb: slope, slip and stress of both wheels."""
+"""Measurements of a climb: slope, slip and stress of both wheels."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class WheelRun:
-    """A wheel at one slip, and the stress on its rim."""
+    """Stress on the rim of a wheel at one slip."""
 
     slip: float
     profile: StressProfile
-    normal_std: Floats = field(default_factory=lambda: np.zeros(0))  # (p,) Pa; empty: exact
+    normal_std: Floats = field(default_factory=lambda: np.zeros(0))  # (p,) Pa; empty: no noise
 
     def __post_init__(self) -> None:
         if len(self.normal_std) == 0:
@@ -28,7 +28,7 @@ class WheelRun:
 
 @dataclass(frozen=True)
 class Climb:
-    """A steady climb straight up a slope; the wheels of both sides do the same."""
+    """A steady climb straight up a slope; the wheels of both sides behave equally."""
 
     name: str
     slope: float  # rad
@@ -41,36 +41,42 @@ class Climb:
         return self.front, self.rear
 
     def with_speed_error(self, share: float) -> Climb:
-        """The same climb, had the speed been read too high by this share: slips lower."""
+        """The climb as measured with a speed too high by this fraction, and slips thus too low."""
         front, rear = (replace(w, slip=1.0 - (1.0 - w.slip) * (1.0 + share)) for w in self.wheels)
         return replace(self, front=front, rear=rear)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Uncertainty:
-    """Standard deviations of what is measured on a climb.
+    """Standard deviations of the measurements on a climb.
 
-    `speed` is the share by which the speed of each run is off on its own, `speed_scale` that by
-    which all are off alike; both wheels of a rover have its speed. `entry_angle` is how far all
-    are off alike, by the sensors' size, sampling and deadband. `front_load` is the share by which
-    the load of the front wheels is off, or, where it is not known, the share by which the front
-    wheels' magnification differs from the rear's.
+    `speed` is the relative error of the speed of each run, `speed_scale` a relative error common to
+    all runs; both wheels of a rover have its speed. `entry_angle` is an error common to all runs,
+    due to size, sampling and deadband of the sensors. `front_load` is the relative error of the
+    load on the front wheels or, where that load is not known, the relative difference between the
+    magnifications of front and rear wheels.
     """
 
-    speed: float = 0.0087  # within 1.5 %, evenly
+    speed: float = 0.0087  # uniform within 1.5 %
     speed_scale: float = 0.0
     slope: float = 0.005  # rad
     entry_angle: float = 0.005  # rad, about half a sample
     front_load: float = 0.05
 
 
-def conditions(climbs: Sequence[Climb], slope_std: float) -> list[list[int]]:
-    """Climbs grouped by slope: neighbours that noise alone could set apart are one condition."""
+#: Slopes that differ by less than this many standard deviations of a difference are one condition.
+SLOPE_SIGMAS = 3.0
+#: Smallest difference of slopes that counts, rad: about half a degree.
+MIN_SLOPE_DIFFERENCE = 0.009
+
+
+def group_by_slope(climbs: Sequence[Climb], slope_std: float) -> list[list[int]]:
+    """Indices of the climbs grouped by slope; slopes that differ by noise alone are one group."""
     order = np.argsort([climb.slope for climb in climbs], kind="stable")
-    apart = max(3.0 * np.sqrt(2.0) * slope_std, 0.009)
+    tolerance = max(SLOPE_SIGMAS * np.sqrt(2.0) * slope_std, MIN_SLOPE_DIFFERENCE)
     groups = [[int(order[0])]]
     for i in order[1:]:
-        if climbs[i].slope - climbs[groups[-1][0]].slope > apart:
+        if climbs[i].slope - climbs[groups[-1][0]].slope > tolerance:
             groups.append([])
         groups[-1].append(int(i))
     return groups

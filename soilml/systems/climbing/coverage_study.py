@@ -1,4 +1,4 @@
-"""Whether bands hold the truth as often as they say, over rovers whose ground is known."""
+"""Coverage of the predicted intervals over simulated rovers whose soil is known."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from soilml.quantities import SHEAR
 from soilml.systems.climbing.ability import BAND, climbing_ability
 from soilml.systems.climbing.identify import identify_ground
 from soilml.systems.climbing.rover import Rover
-from soilml.systems.climbing.simulated_rover import Arc, SimulatedRover
+from soilml.systems.climbing.simulated_rover import SimulatedRover, StressArc
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 
 Floats = NDArray[np.float64]
 
-#: Slip at which the pull is looked at; the steepest slope that a drawn rover must at least climb.
-SLIP, CLIMBS = 0.4, 0.2
+#: Slip at which the pull is compared; slope (rad) that a random rover must at least climb.
+SLIP, MIN_STEEPEST = 0.4, 0.2
 
 
 @dataclass(frozen=True)
-class Covered:
-    """Rovers (n,): how far off, the std that was claimed, the share of draws below the truth."""
+class PredictionCoverage:
+    """Error, predicted std, and fraction of samples below the truth, for each rover (n,)."""
 
     error: Floats
     std: Floats
@@ -31,63 +31,66 @@ class Covered:
 
     @property
     def inside(self) -> float:
-        """Share of rovers whose truth lies in the band of nine tenths."""
+        """Fraction of rovers whose true value lies in the 90 % interval."""
         return float(np.mean((self.below > BAND[0]) & (self.below < BAND[1])))
 
     @property
     def score(self) -> float:
-        """Root mean square of error over std: 1 where the std is what it says."""
+        """Root mean square of error over std: 1 if the std is calibrated."""
         return float(np.sqrt(np.mean((self.error / self.std) ** 2)))
 
 
-def coverage(
+def simulate_coverage(
     seeds: Sequence[int],
     slopes: Sequence[float],
     *,
-    given: Sequence[str] = ("cohesion", "friction_angle"),
-    knows_loads: bool = True,
-) -> Mapping[str, Covered]:
-    """Drive a rover drawn by each seed on `slopes` (rad), predict, and compare with its truth.
+    fixed: Sequence[str] = ("cohesion", "friction_angle"),
+    known_loads: bool = True,
+) -> Mapping[str, PredictionCoverage]:
+    """Simulate a random rover for each seed on `slopes` (rad), predict, and compare with its truth.
 
-    Keys: the parameters not given, `pull` (N, at slip 0.4 on the flat) and `steepest` (rad).
+    Keys: the parameters that are not fixed, `pull` (N, at slip 0.4 on level ground) and `steepest`
+    (rad).
     """
     rows: dict[str, list[tuple[float, float, float]]] = {}
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        true = drawn_rover(rng)
-        climbs, (front, rear) = true.climbs(rng, slopes), true.artificial(rng)
+        true = random_rover(rng)
+        climbs = true.simulate_climbs(rng, slopes)
+        front, rear = true.simulate_artificial_slip(rng)
         known = dict(zip(SHEAR, true.shear, strict=True))
         ground = identify_ground(
-            true.rover if knows_loads else replace(true.rover, front_share=None, height_ratio=None),
+            true.rover if known_loads else replace(true.rover, front_share=None, height_ratio=None),
             climbs,
-            given={name: known[name] for name in given},
+            fixed={name: known[name] for name in fixed},
             noise=true.noise,
             seed=seed,
         )
         ability = climbing_ability(
             ground,
-            StressBySlip.of([*(c.front for c in climbs), *front]),
-            StressBySlip.of([*(c.rear for c in climbs), *rear]),
+            StressBySlip.fit([*(c.front for c in climbs), *front]),
+            StressBySlip.fit([*(c.rear for c in climbs), *rear]),
             seed=seed,
         )
         slips, pulls, steeps = true.curve
         i = int(np.argmin(np.abs(ability.slip - SLIP)))
-        looked = {
-            name: (ground.draws[:, SHEAR.index(name)], known[name]) for name in ground.fit.names
+        compared = {
+            name: (ground.samples[:, SHEAR.index(name)], known[name]) for name in ground.fit.names
         }
-        looked["pull"] = ability.pull[:, i], float(np.interp(ability.slip[i], slips, pulls))
-        looked["steepest"] = ability.steepest, float(steeps[slips <= ability.slip[-1]].max())
-        for name, (draws, truth) in looked.items():
-            row = float(draws.mean() - truth), float(draws.std()), float(np.mean(draws < truth))
+        compared["pull"] = ability.pull[:, i], float(np.interp(ability.slip[i], slips, pulls))
+        compared["steepest"] = ability.steepest, float(steeps[slips <= ability.slip[-1]].max())
+        for name, (samples, truth) in compared.items():
+            below = float(np.mean(samples < truth))
+            row = float(samples.mean() - truth), float(samples.std()), below
             rows.setdefault(name, []).append(row)
-    return {name: Covered(*np.asarray(values).T) for name, values in rows.items()}
+    return {name: PredictionCoverage(*np.asarray(values).T) for name, values in rows.items()}
 
 
-def drawn_rover(rng: np.random.Generator) -> SimulatedRover:
-    """A rover whose soil, stresses and centre of mass are drawn; it climbs 11 degrees or more."""
+def random_rover(rng: np.random.Generator) -> SimulatedRover:
+    """A rover with random soil, stresses and centre of mass that climbs 11 degrees or more."""
 
-    def arc(entry: float) -> Arc:
-        return Arc(
+    def arc(entry: float) -> StressArc:
+        return StressArc(
             entry=entry + rng.uniform(-0.02, 0.02),
             forward=rng.uniform(0.20, 0.34),
             bend=rng.uniform(1.2, 2.2),
@@ -105,6 +108,6 @@ def drawn_rover(rng: np.random.Generator) -> SimulatedRover:
             height_ratio=rng.uniform(0.2, 0.5),
         )
         shear = 0.0, float(rng.uniform(0.6, 0.73)), float(rng.uniform(0.005, 0.010))
-        found = SimulatedRover(rover=rover, shear=shear, arcs=(arc(0.33), arc(0.31)))
-        if found.steepest > CLIMBS:
-            return found
+        candidate = SimulatedRover(rover=rover, shear=shear, arcs=(arc(0.33), arc(0.31)))
+        if candidate.steepest > MIN_STEEPEST:
+            return candidate

@@ -1,4 +1,4 @@
-"""Cohesion, friction angle and shear modulus from climbs on several slopes."""
+"""Cohesion, friction angle and shear modulus from climbs of several slopes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from soilml.identification.diagnostics import HARDLY, NOT, TRADE_OFF
 from soilml.identification.fit_result import Fit
 from soilml.numerics.prior import Prior
 from soilml.quantities import QUANTITIES, SHEAR
-from soilml.systems.climbing.balance_likelihood import Balances
-from soilml.systems.climbing.balance_noise import Shear
-from soilml.systems.climbing.climb import Climb, Uncertainty, conditions
+from soilml.systems.climbing.balance_likelihood import ForceBalances
+from soilml.systems.climbing.balance_noise import ShearParameters
+from soilml.systems.climbing.climb import Climb, Uncertainty, group_by_slope
 from soilml.systems.climbing.rover import Rover
-from soilml.systems.climbing.soil_sampling import Found, Search
-from soilml.systems.climbing.wheel_loads import with_loads
+from soilml.systems.climbing.soil_sampling import SoilPosterior, SoilSampler
+from soilml.systems.climbing.wheel_loads import estimate_wheel_loads
 
 Floats = NDArray[np.float64]
 
-#: Where the shear parameters of sands lie, for a user who gives neither value nor range.
-USUAL = {
+#: Priors of the shear parameters of sands, used where neither a value nor a range is given.
+DEFAULT_PRIORS = {
     "cohesion": Prior(0.0, 2000.0),
     "friction_angle": Prior(0.35, 0.87),
     "shear_modulus": Prior(0.001, 0.05, log=True),
@@ -31,27 +31,27 @@ USUAL = {
 
 
 @dataclass(frozen=True)
-class Ground:
-    """What climbs tell of the ground, and how each of them fits.
+class GroundEstimate:
+    """Soil parameters estimated from climbs, and the residual of each climb.
 
-    `as_read` are draws that go with the stresses as they were read: an error of the entry angles
-    which all runs share is in the stresses and in k_x, and hardly changes the pull of both.
+    `samples_as_measured` are consistent with the stresses as measured: an error of the entry angles
+    common to all runs affects stresses and k_x, and the two effects nearly cancel in the pull.
     """
 
     fit: Fit
-    draws: Floats  # (n, 3): c (Pa), phi (rad), k_x (m); what is given is the same in all
-    as_read: Floats  # (n, 3)
-    rover: Rover  # with the loads of its wheels, given or found
+    samples: Floats  # (n, 3): c (Pa), phi (rad), k_x (m); fixed parameters are constant
+    samples_as_measured: Floats  # (n, 3)
+    rover: Rover  # with the loads of its wheels, known or estimated
     noise: Uncertainty
-    names: tuple[str, ...]  # of the climbs
-    off: Floats  # (climbs,) N, pull less weight down the slope, at the mean of the draws
-    off_std: Floats  # (climbs,) N
-    slopes: int  # that differ
+    climb_names: tuple[str, ...]
+    residual: Floats  # (climbs,) N, pull less the weight along the slope, at the posterior mean
+    residual_std: Floats  # (climbs,) N
+    distinct_slopes: int
 
     @property
-    def shear(self) -> Shear:
-        """Mean (c, phi, k_x) of the draws."""
-        mean = self.draws.mean(axis=0)
+    def shear(self) -> ShearParameters:
+        """Posterior mean of (c, phi, k_x)."""
+        mean = self.samples.mean(axis=0)
         return float(mean[0]), float(mean[1]), float(mean[2])
 
 
@@ -59,45 +59,85 @@ def identify_ground(
     rover: Rover,
     climbs: Sequence[Climb],
     *,
-    given: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
     prior: Mapping[str, Prior] | None = None,
     noise: Uncertainty | None = None,
     seed: int = 0,
-) -> Ground:
-    r"""(c, phi, k_x) from the balance of forces on slopes, with what stays open of them.
+) -> GroundEstimate:
+    r"""Estimate (c, phi, k_x) and their posterior from the force balance on slopes.
 
     .. math::
         2 (F_{xf} + F_{xr}) = m g \sin\alpha, \qquad 2 (F_{zf} + F_{zr}) = m g \cos\alpha
 
-    The second equation gives M of each run in closed form; the first is then one equation for
-    each run, weighed by what noise does to it (`spread`). Parameters in `given` are held, others
-    drawn within `prior` from the posterior, whose mean and covariance are the answer. One slope is
-    one condition however often it was driven: p parameters need p slopes. One M for each wheel
-    and run is found only where the rover knows its loads; with the two sums alone each run would
-    bring as many unknowns as equations. References: Nagatani et al., section 6. Raises
-    `FitError` for too few slopes and for climbs that no one soil explains together, `InputError`
-    for a climb that no soil of the prior explains alone.
+    The second equation gives M of each run in closed form; the first is then one equation for each
+    run, weighted by the noise of its balance (`balance_std`). The posterior mean and covariance are
+    the estimate. Repeated climbs of one slope are one condition: p parameters need p slopes. Each
+    wheel has its own M only if the loads of the wheels are known; with the two sums alone each run
+    would add as many unknowns as equations.
+
+    Parameters
+    ----------
+    rover
+        Mass, wheels and, where known, the centre of mass.
+    climbs
+        Steady climbs with slip and stress of both wheels.
+    fixed
+        Known values of `cohesion` (Pa), `friction_angle` (rad) or `shear_modulus` (m).
+    prior
+        Ranges of the others; `DEFAULT_PRIORS` where missing.
+    noise
+        Standard deviations of the measurements.
+    seed
+        Seed of the posterior samples.
+
+    Raises
+    ------
+    FitError
+        For too few slopes, and for climbs that no single soil explains.
+    InputError
+        For an unknown parameter, and for a climb that no soil of the prior explains.
+
+    References
+    ----------
+    Nagatani et al., section 6.
+
+    Examples
+    --------
+    >>> from soilml.systems.climbing import SimulatedRover
+    >>> true = SimulatedRover()  # its shear modulus is 7.2 mm
+    >>> rng = np.random.default_rng(0)
+    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist())
+    >>> ground = identify_ground(
+    ...     true.rover, climbs, fixed={"cohesion": 0.0, "friction_angle": 0.6632}
+    ... )
+    >>> round(1e3 * ground.fit["shear_modulus"], 1), round(1e3 * float(ground.fit.std[0]), 1)  # mm
+    (7.4, 0.3)
     """
-    given, prior, noise = dict(given or {}), dict(prior or {}), noise or Uncertainty()
-    if unknown := sorted((given.keys() | prior.keys()) - set(SHEAR)):
+    fixed, prior, noise = dict(fixed or {}), dict(prior or {}), noise or Uncertainty()
+    if unknown := sorted((fixed.keys() | prior.keys()) - set(SHEAR)):
         raise InputError(f"no soil parameter {unknown[0]!r}; there are: {', '.join(SHEAR)}")
-    ranges = {name: prior.get(name, USUAL[name]) for name in SHEAR if name not in given}
-    slopes = len(conditions(climbs, noise.slope)) if climbs else 0
+    ranges = {name: prior.get(name, DEFAULT_PRIORS[name]) for name in SHEAR if name not in fixed}
+    slopes = len(group_by_slope(climbs, noise.slope)) if climbs else 0
     _refuse_too_few(slopes, list(ranges))
-    held = given.get("shear_modulus", 0.0)
-    balances = Balances.over(rover, climbs, ranges.get("shear_modulus") or Prior(held, held))
-    found = Search(balances, given, ranges, noise).found(np.random.default_rng(seed))
-    shear = found.draws.mean(axis=0)
-    return Ground(
-        fit=_fit(found, ranges, len(climbs), slopes, assumed=[n for n in ranges if n not in prior]),
-        draws=found.draws,
-        as_read=found.as_read,
-        rover=with_loads(rover, climbs, (float(shear[0]), float(shear[1]), float(shear[2]))),
+    fixed_modulus = fixed.get("shear_modulus", 0.0)
+    modulus_range = ranges.get("shear_modulus") or Prior(fixed_modulus, fixed_modulus)
+    balances = ForceBalances.tabulate(rover, climbs, modulus_range)
+    posterior = SoilSampler(balances, fixed, ranges, noise).sample(np.random.default_rng(seed))
+    shear = posterior.samples.mean(axis=0)
+    return GroundEstimate(
+        fit=_fit(
+            posterior, ranges, len(climbs), slopes, assumed=[n for n in ranges if n not in prior]
+        ),
+        samples=posterior.samples,
+        samples_as_measured=posterior.samples_as_measured,
+        rover=estimate_wheel_loads(
+            rover, climbs, (float(shear[0]), float(shear[1]), float(shear[2]))
+        ),
         noise=noise,
-        names=tuple(climb.name for climb in climbs),
-        off=found.off,
-        off_std=found.off_std,
-        slopes=slopes,
+        climb_names=tuple(climb.name for climb in climbs),
+        residual=posterior.residual,
+        residual_std=posterior.residual_std,
+        distinct_slopes=slopes,
     )
 
 
@@ -105,19 +145,23 @@ def _refuse_too_few(slopes: int, free: list[str]) -> None:
     needed = max(len(free), 1)
     if slopes < needed:
         count = {0: "no climb", 1: "one slope"}.get(slopes, f"{slopes} slopes")
-        given = [name for name in SHEAR if name in free and name != "shear_modulus"]
-        hint = f", or {' or '.join(given)} as a number in [soil]" if given else ""
+        fixable = [name for name in SHEAR if name in free and name != "shear_modulus"]
+        hint = f", or {' or '.join(fixable)} as a number in [soil]" if fixable else ""
         raise FitError(
-            f"{count} for {needed} parameters ({', '.join(free)}): each slope brings one equation "
-            f"beside that for M; needed are {needed} slopes that differ{hint}"
+            f"{count} for {needed} parameters ({', '.join(free)}): each slope adds one equation "
+            f"besides that for M; needed are {needed} different slopes{hint}"
         )
 
 
 def _fit(
-    found: Found, ranges: Mapping[str, Prior], climbs: int, slopes: int, assumed: list[str]
+    posterior: SoilPosterior,
+    ranges: Mapping[str, Prior],
+    climbs: int,
+    slopes: int,
+    assumed: list[str],
 ) -> Fit:
     free = list(ranges)
-    values = found.draws[:, [SHEAR.index(name) for name in free]]
+    values = posterior.samples[:, [SHEAR.index(name) for name in free]]
     covariance = np.atleast_2d(np.cov(values, rowvar=False)) if free else np.zeros((0, 0))
     fit = Fit(
         method="climbing",
@@ -127,34 +171,34 @@ def _fit(
         covariance=covariance,
         warnings=(),
         rows_used=climbs,
-        left={n: float(np.std(found.u[:, i]) * np.sqrt(12.0)) for i, n in enumerate(free)},
-        misfit=found.misfit,
+        left={n: float(np.std(posterior.u[:, i]) * np.sqrt(12.0)) for i, n in enumerate(free)},
+        misfit=posterior.misfit,
         channels=("slope_rad",),
     )
-    said = []
+    warnings = []
     for name, left in fit.left.items():
         if left > NOT:
-            said.append(f"{name} is not identified: the climbs leave {left:.0%} of its range")
+            warnings.append(f"{name} is not identified: {left:.0%} of its prior width remains")
         elif left > HARDLY:
-            said.append(f"{name} is hardly identified: the climbs leave {left:.0%} of its range")
+            warnings.append(f"{name} is hardly identified: {left:.0%} of its prior width remains")
     correlation = fit.correlation
-    said += [
-        f"{a} and {b} trade for one another (correlation {correlation[i, j]:+.2f}): believe the "
-        "pull that follows from both, not each"
+    warnings += [
+        f"{a} and {b} compensate each other (correlation {correlation[i, j]:+.2f}): rely on the "
+        "pull that follows from both, not on each value"
         for i, a in enumerate(free)
         for j, b in enumerate(free)
         if i < j and abs(correlation[i, j]) > TRADE_OFF
     ]
-    if found.widened > 1.0:
-        said.append(
-            f"the climbs miss their balance by {found.widened:.1f} times what the noise allows; "
-            "std is widened by as much"
+    if posterior.noise_scale > 1.0:
+        warnings.append(
+            f"the residuals of the force balances are {posterior.noise_scale:.1f} times the noise; "
+            "standard deviations are scaled up by the same factor"
         )
     if slopes == 1:
-        said.append("one slope: whether the parameters are the same on others is not checked")
-    said += [
-        f"{name} has neither value nor range in [soil]: {ranges[name].lower:g} to "
+        warnings.append("only one slope: that the parameters hold on other slopes is not checked")
+    warnings += [
+        f"{name} has neither a value nor a range in [soil]: {ranges[name].lower:g} to "
         f"{ranges[name].upper:g} {QUANTITIES[name].unit} is assumed"
         for name in assumed
     ]
-    return replace(fit, warnings=tuple(said))
+    return replace(fit, warnings=tuple(warnings))

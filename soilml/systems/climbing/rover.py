@@ -11,17 +11,30 @@ from soilml.arrays import Real
 from soilml.errors import InputError
 from soilml.parameters import Parameter
 
-#: The wheels of one side; both sides carry and pull alike.
+#: The wheels of one side; both sides carry and pull equally.
 WHEELS = ("front", "rear")
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class Rover:
-    """Two front and two rear wheels of one kind; `front_share` and `height_ratio` may be unknown.
+    """Two front and two rear wheels of equal size; the centre of mass may be unknown.
 
-    Where both are known, the load of each wheel is, and so each wheel can have a magnification of
-    its own. Where they are not, both wheels of a run share one.
+    If `front_share` and `height_ratio` are known, so is the load of each wheel, and each wheel has
+    a magnification of its own. Otherwise both wheels of a run share one.
+
+    Parameters
+    ----------
+    mass
+        Mass of the rover, kg.
+    radius, width
+        Of a wheel, m.
+    gravity
+        m/s^2.
+    front_share
+        Fraction of the weight on the front wheels on level ground.
+    height_ratio
+        Height of the centre of mass over the wheelbase.
     """
 
     mass: Annotated[float, Parameter("kg", 0.01, 1e5, "mass of the whole rover")]
@@ -48,8 +61,8 @@ class Rover:
         return self.mass * self.gravity
 
     @property
-    def knows_loads(self) -> bool:
-        """Whether the load of each wheel follows from the slope."""
+    def has_known_loads(self) -> bool:
+        """Whether the load of each wheel follows from the slope alone."""
         return self.front_share is not None
 
     def loads(self, slope: Real) -> tuple[Real, Real]:
@@ -59,9 +72,9 @@ class Rover:
             F_{zf} = \tfrac12 m g (a \cos\alpha - h \sin\alpha), \quad
             F_{zr} = \tfrac12 m g ((1 - a) \cos\alpha + h \sin\alpha)
 
-        with a the front's share on the flat and h the height of the centre of mass over the
-        wheelbase: moments about the wheels' contacts, of a rover that does not accelerate. That
-        the forces on a wheel act somewhat in front of its axle is left out.
+        with a the front share on level ground and h the height of the centre of mass over the
+        wheelbase: balance of moments about the wheel contacts at constant speed. The offset of
+        the wheel forces from the axle is neglected.
         """
         if self.front_share is None or self.height_ratio is None:
             raise InputError("the loads of the wheels need front_share and height_ratio")

@@ -1,4 +1,4 @@
-"""A rover whose ground is known: climbs and stresses to try the identification on."""
+"""A simulated rover on a known soil: climbs and stresses to test the identification."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.systems.climbing.ability import grip_of_rover
-from soilml.systems.climbing.balance_noise import Shear
+from soilml.systems.climbing.ability import slope_pull
+from soilml.systems.climbing.balance_noise import ShearParameters
 from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
 from soilml.systems.climbing.rover import WHEELS, Rover
-from soilml.systems.climbing.wheel_force_parts import parts
+from soilml.systems.climbing.wheel_force_components import force_components
 from soilml.systems.force_sensor_wheel import StressProfile
 
 Floats = NDArray[np.float64]
 
 #: Slopes of the test field and artificial slips on the flat, as in Nagatani et al., sections 3, 5.
 SLOPES = tuple(np.deg2rad([0.0, 4.0, 8.0, 10.0, 12.0]).tolist())
-ARTIFICIAL = (0.04, 0.13, 0.36, 0.68)
-#: rad between samples: a rim of 9.15 mm/s and r = 0.055 m, sampled every 50 ms.
+ARTIFICIAL_SLIPS = (0.04, 0.13, 0.36, 0.68)
+#: rad between samples: a rim speed of 9.15 mm/s, r = 0.055 m, sampled every 50 ms.
 SAMPLING = 0.0083
 
 
 @dataclass(frozen=True)
-class Arc:
-    """A stressed arc that moves forward with slip: entry, width, and how its shape leans.
+class StressArc:
+    """A stressed arc that moves forward with slip.
 
     Entry angle (rad) a + b s^d; width in rad; the stress runs as x^p (1 - x)^q from exit to
     entry, x from 0 to 1.
@@ -42,11 +42,11 @@ class Arc:
     ahead: float = 0.9
 
     def entry_angle(self, slip: float) -> float:
-        """Where the stress begins in front, rad."""
+        """Entry angle at a slip, rad."""
         return self.entry + self.forward * float(max(slip, 0.0) ** self.bend)
 
     def stress(self, slip: float, angle: Floats) -> Floats:
-        """Shape of the stress, 1 at most, at angles (p,)."""
+        """Shape of the stress at angles (p,), with maximum 1."""
         entry = self.entry_angle(slip)
         x = np.clip((angle - entry + self.width) / self.width, 0.0, 1.0)
         peak = self.behind / (self.behind + self.ahead)
@@ -56,11 +56,12 @@ class Arc:
 
 @dataclass(frozen=True)
 class SimulatedRover:
-    """A rover on a known soil; its wheels' stresses follow `arcs`, not any sinkage model.
+    """A rover on a known soil; the stresses under its wheels follow `arcs`, not a sinkage model.
 
-    `noise` is what its sensors do: the share of speed is even within sqrt(3) times its standard
-    deviation, the entry angle is not read but found in the noisy stress. `stress` is the share by
-    which each sample errs, `front_load` that by which the magnifications of front and rear differ.
+    `noise` describes its sensors: the relative error of the speed is uniform within sqrt(3) times
+    its standard deviation; the entry angle is not measured but follows from the noisy stress.
+    `stress` is the relative error of each sample, `noise.front_load` the relative difference
+    between the magnifications of front and rear wheels.
     """
 
     rover: Rover = field(
@@ -68,28 +69,30 @@ class SimulatedRover:
             mass=12.0, radius=0.055, width=0.064, front_share=0.52, height_ratio=0.4
         )
     )
-    shear: Shear = (0.0, float(np.deg2rad(38.0)), 0.0072)
-    arcs: tuple[Arc, Arc] = (Arc(), Arc(entry=0.31, width=0.50))
+    shear: ShearParameters = (0.0, float(np.deg2rad(38.0)), 0.0072)
+    arcs: tuple[StressArc, StressArc] = (StressArc(), StressArc(entry=0.31, width=0.50))
     noise: Uncertainty = field(default_factory=Uncertainty)
     stress: float = 0.05
     magnification: float = 1.3
 
     @cached_property
     def curve(self) -> tuple[Floats, Floats, Floats]:
-        """Slip of all wheels (n,), true pull on the flat (N) and slope (rad) climbed at it."""
+        """Slip of all wheels (n,), true pull on level ground (N) and slope (rad) climbed at it."""
         cohesion, friction, modulus = self.shear
         slips = np.linspace(0.005, 0.9, 100)
-        found = []
+        pull_and_slope = []
         for slip in slips:
-            front, rear = (parts(self._exact(arc, slip), self.rover, modulus) for arc in self.arcs)
+            front, rear = (
+                force_components(self._exact(arc, slip), self.rover, modulus) for arc in self.arcs
+            )
             share = self.rover.front_share or 0.5
-            grip = grip_of_rover(
+            forces = slope_pull(
                 self.rover, (front, rear), cohesion, np.tan(friction), front_share=share
             )
-            found.append((grip.pull(0.0), grip.slope()))
-        return slips, *np.asarray(found, dtype=np.float64).T
+            pull_and_slope.append((forces.pull(0.0), forces.equilibrium_slope()))
+        return slips, *np.asarray(pull_and_slope, dtype=np.float64).T
 
-    def slip(self, slope: float) -> float:
+    def slip_at(self, slope: float) -> float:
         """The smallest slip at which the rover climbs a slope; raises `InputError` if none."""
         slips, _, slopes = self.curve
         above = np.flatnonzero(slopes >= slope)
@@ -105,35 +108,37 @@ class SimulatedRover:
         """The steepest slope (rad) that the rover climbs."""
         return float(self.curve[2].max())
 
-    def climbs(
+    def simulate_climbs(
         self, rng: np.random.Generator, slopes: Sequence[float] = SLOPES, repeats: int = 4
     ) -> list[Climb]:
-        """Each slope driven so many times, as the sensors read it."""
+        """Each slope climbed `repeats` times, as measured by the sensors."""
         scale = self.noise.speed_scale * rng.normal()
-        found = []
+        climbs = []
         for slope in slopes:
-            slip = self.slip(slope)
+            slip = self.slip_at(slope)
             for turn in range(repeats):
                 error = scale + np.sqrt(3.0) * self.noise.speed * rng.uniform(-1.0, 1.0)
-                wheels = [self.read(wheel, slip, slope, rng, speed_error=error) for wheel in WHEELS]
+                wheels = [
+                    self.measure(wheel, slip, slope, rng, speed_error=error) for wheel in WHEELS
+                ]
                 name = f"{np.rad2deg(slope):.3g}deg_{turn + 1}"
                 reading = slope + self.noise.slope * rng.normal()
-                found.append(Climb(name, float(reading), wheels[0], wheels[1]))
-        return found
+                climbs.append(Climb(name, float(reading), wheels[0], wheels[1]))
+        return climbs
 
-    def artificial(
-        self, rng: np.random.Generator, slips: Sequence[float] = ARTIFICIAL, repeats: int = 5
+    def simulate_artificial_slip(
+        self, rng: np.random.Generator, slips: Sequence[float] = ARTIFICIAL_SLIPS, repeats: int = 5
     ) -> tuple[list[WheelRun], list[WheelRun]]:
-        """Stress of the front and of the rear wheels, made to slip on the flat."""
+        """Stress on front and on rear wheels at artificial slips on level ground."""
         found: tuple[list[WheelRun], list[WheelRun]] = ([], [])
         for runs, wheel in zip(found, WHEELS, strict=True):
             for slip in slips:
                 for _ in range(repeats):
                     error = np.sqrt(3.0) * self.noise.speed * rng.uniform(-1.0, 1.0)
-                    runs.append(self.read(wheel, slip, 0.0, rng, speed_error=error))
+                    runs.append(self.measure(wheel, slip, 0.0, rng, speed_error=error))
         return found
 
-    def read(
+    def measure(
         self,
         wheel: str,
         slip: float,
@@ -142,15 +147,17 @@ class SimulatedRover:
         *,
         speed_error: float = 0.0,
     ) -> WheelRun:
-        """What a wheel's sensors read: slip, and true stress over M with noise."""
+        """Measured slip, and measured stress: the true one over M, with noise."""
         cohesion, friction, modulus = self.shear
         i = WHEELS.index(wheel)
-        of_wheel = parts(self._exact(self.arcs[i], slip), self.rover, modulus)
+        components = force_components(self._exact(self.arcs[i], slip), self.rover, modulus)
         load = self.rover.loads(slope)[i]
-        scale = of_wheel.magnification(load, cohesion, np.tan(friction))
-        felt = self.magnification * np.exp(self.noise.front_load * rng.normal() / np.sqrt(2.0))
+        scale = components.magnification(load, cohesion, np.tan(friction))
+        # front and rear differ by front_load, so that each deviates by front_load / sqrt(2)
+        deviation = self.noise.front_load * rng.normal() / np.sqrt(2.0)
+        magnification = self.magnification * np.exp(deviation)
         angle: Floats = SAMPLING * (np.arange(-30.0, 115.0) + rng.random())
-        normal = scale / felt * self.arcs[i].stress(slip, angle)
+        normal = scale / magnification * self.arcs[i].stress(slip, angle)
         normal = normal * (1.0 + self.stress * np.clip(rng.normal(size=len(normal)), -3.0, 3.0))
         return WheelRun(
             slip=1.0 - (1.0 - slip) * (1.0 + speed_error),
@@ -158,7 +165,7 @@ class SimulatedRover:
             normal_std=self.stress * normal,
         )
 
-    def _exact(self, arc: Arc, slip: float) -> WheelRun:
+    def _exact(self, arc: StressArc, slip: float) -> WheelRun:
         entry = arc.entry_angle(slip)
         angle = np.linspace(entry - arc.width, entry, 101)
         return WheelRun(slip, StressProfile(angle, arc.stress(slip, angle)))

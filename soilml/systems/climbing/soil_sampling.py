@@ -1,4 +1,4 @@
-"""The soils that explain a rover's climbs, drawn from the range that is searched."""
+"""Posterior samples of the soil parameters, given the force balances of a rover's climbs."""
 
 from __future__ import annotations
 
@@ -13,144 +13,164 @@ from soilml.errors import FitError, InputError
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.prior import Prior
 from soilml.quantities import SHEAR
-from soilml.systems.climbing.balance_likelihood import Balances
-from soilml.systems.climbing.balance_noise import Shear
+from soilml.systems.climbing.balance_likelihood import ForceBalances
+from soilml.systems.climbing.balance_noise import ShearParameters
 from soilml.systems.climbing.climb import Uncertainty
 
 Floats = NDArray[np.float64]
 
-#: Soils looked at first, draws in the end, and rounds in which the noise is taken anew.
-LOOKS, DRAWS, ROUNDS = 2048, 6000, 2
-#: Standard deviations by which a climb must miss every soil of the range to be refused.
-BEYOND = 6.0
-#: Misfit, in standard deviations of the noise, at which climbs contradict each other.
-CONTRADICTION = 5.0
+#: Random soils among which the search starts; posterior samples returned; iterations in which the
+#: noise covariance, which depends on the soil, is updated at the current centre. Two suffice: the
+#: covariance changes little over the posterior.
+START_SOILS, SAMPLES, ITERATIONS = 2048, 6000, 2
+#: A climb is refused if its balance misses every soil of the priors by this many standard
+#: deviations.
+MAX_MISS = 6.0
+#: Climbs are refused as contradictory if the noise would have to be this many times larger.
+MAX_NOISE_SCALE = 5.0
+#: Standard deviations of the reduced chi-square above which the noise is scaled up.
+MISFIT_LIMIT = 2.5
+#: Distance of the corner soils from the edges of the unit cube.
+EDGE = 1e-6
 
 
 @dataclass(frozen=True)
-class Found:
-    """Draws of the soil, and how the climbs fit their mean."""
+class SoilPosterior:
+    """Posterior samples of the soil, and how well the climbs agree with their mean."""
 
-    u: Floats  # (n, p), fractions of the ranges
-    draws: Floats  # (n, 3): c (Pa), phi (rad), k_x (m)
-    as_read: Floats  # (n, 3), had the entry angles no error that all runs share
-    off: Floats  # (climbs,) N, pull less weight down the slope at the mean
-    off_std: Floats  # (climbs,) N
-    misfit: float  # mean square of what noise should make 1, per degree of freedom
-    widened: float  # by how much the noise was raised to match the misfit
+    u: Floats  # (n, p), fractions of the priors
+    samples: Floats  # (n, 3): c (Pa), phi (rad), k_x (m)
+    samples_as_measured: Floats  # (n, 3), without the shared error of the entry angles
+    residual: Floats  # (climbs,) N, pull less the weight's component along the slope, at the mean
+    residual_std: Floats  # (climbs,) N
+    misfit: float  # reduced chi-square, expected value 1
+    noise_scale: float  # factor by which the noise was scaled up to match the misfit
 
 
 @dataclass(frozen=True)
-class Search:
-    """Climbs, the parameters held, and the ranges of the others."""
+class SoilSampler:
+    """Force balances of the climbs, the fixed parameters, and the priors of the others."""
 
-    balances: Balances
-    given: Mapping[str, float]
-    ranges: Mapping[str, Prior]
+    balances: ForceBalances
+    fixed: Mapping[str, float]
+    priors: Mapping[str, Prior]
     noise: Uncertainty
 
     def soils(self, u: Floats) -> Floats:
-        """(c, phi, k_x) (n, 3) at fractions (n, p) of the ranges."""
-        free = list(self.ranges)
+        """(c, phi, k_x) (n, 3) at fractions (n, p) of the priors."""
+        free = list(self.priors)
         columns = [
-            self.ranges[name].at(u[:, free.index(name)])
+            self.priors[name].at(u[:, free.index(name)])
             if name in free
-            else np.full(len(u), self.given[name])
+            else np.full(len(u), self.fixed[name])
             for name in SHEAR
         ]
         return np.stack(columns, axis=1)
 
-    def off(self, u: Floats) -> Floats:
-        """Pull less weight down the slope (n, climbs), N."""
-        return self.balances.off(self.soils(u))
+    def residuals(self, u: Floats) -> Floats:
+        """Pull less the weight's component along the slope, N (n, climbs)."""
+        return self.balances.residuals(self.soils(u))
 
-    def found(self, rng: np.random.Generator) -> Found:
-        """Draws from the posterior; raises `InputError` or `FitError` where none explains them."""
-        p = len(self.ranges)
-        u = np.vstack([rng.random((LOOKS, p)), _corners(p)])
-        off = self.off(u)
-        centre, widened = self.soils(np.full((1, p), 0.5))[0], 1.0
-        for _ in range(ROUNDS):
+    def sample(self, rng: np.random.Generator) -> SoilPosterior:
+        """Draw from the posterior.
+
+        The covariance of the residuals depends on the soil. It is evaluated at the best of the
+        starting soils first, then at the mean of the samples. If the misfit at that mean exceeds
+        what noise explains, the noise is scaled up to match it.
+
+        Raises `InputError` for a climb that no soil explains, `FitError` for climbs that no single
+        soil explains.
+        """
+        free = len(self.priors)
+        start = np.vstack([rng.random((START_SOILS, free)), _corners(free)])
+        start_residuals = self.residuals(start)
+        centre = self.soils(np.full((1, free), 0.5))[0]
+        for _ in range(ITERATIONS):
             whitener, std = self.balances.whitener(_shear(centre), self.noise)
-            best = int(np.argmin(((off @ whitener.T) ** 2).sum(axis=1)))
-            centre = self.soils(u[best : best + 1])[0]
-        self._refuse_unexplained(off, std)
-        for _ in range(ROUNDS):
-            u = self._drawn(whitener / widened, rng)
+            chi_square = ((start_residuals @ whitener.T) ** 2).sum(axis=1)
+            best = int(np.argmin(chi_square))
+            centre = self.soils(start[best : best + 1])[0]
+        self._refuse_unexplained(start_residuals, std)
+        noise_scale = 1.0
+        for _ in range(ITERATIONS):
+            u = self._draw(whitener / noise_scale, rng)
             centre = self.soils(u).mean(axis=0)
             whitener, std = self.balances.whitener(_shear(centre), self.noise)
             misfit = self._misfit(centre, whitener)
-            widened = float(np.sqrt(misfit)) if misfit > self._expected else 1.0
-        self._refuse_contradiction(centre, std, widened)
-        unshared, _ = self.balances.whitener(_shear(centre), replace(self.noise, entry_angle=0.0))
-        return Found(
+            noise_scale = float(np.sqrt(misfit)) if misfit > self._misfit_limit else 1.0
+        self._refuse_contradiction(centre, std, noise_scale)
+        without_entry_error = replace(self.noise, entry_angle=0.0)
+        as_measured, _ = self.balances.whitener(_shear(centre), without_entry_error)
+        return SoilPosterior(
             u=u,
-            draws=self.soils(u),
-            as_read=self.soils(self._drawn(unshared / widened, rng)),
-            off=self.balances.off(centre[None])[0],
-            off_std=std,
+            samples=self.soils(u),
+            samples_as_measured=self.soils(self._draw(as_measured / noise_scale, rng)),
+            residual=self.balances.residuals(centre[None])[0],
+            residual_std=std,
             misfit=misfit,
-            widened=widened,
+            noise_scale=noise_scale,
         )
 
-    def _drawn(self, whitener: Floats, rng: np.random.Generator) -> Floats:
-        """Draws (n, p) of fractions, with all noise Gaussian and as `whitener` has it."""
-        if not self.ranges:
-            return np.zeros((DRAWS, 0))
+    def _draw(self, whitener: Floats, rng: np.random.Generator) -> Floats:
+        """Posterior samples (n, p) of the fractions, for Gaussian residuals whitened as given."""
+        if not self.priors:
+            return np.zeros((SAMPLES, 0))
 
         def log_density(u: Floats) -> Floats:
-            return np.asarray(-0.5 * ((self.off(u) @ whitener.T) ** 2).sum(axis=1))
+            return np.asarray(-0.5 * ((self.residuals(u) @ whitener.T) ** 2).sum(axis=1))
 
-        found = importance_sample(log_density, len(self.ranges), int(rng.integers(2**31)))
-        return found.u[rng.choice(len(found.u), DRAWS, p=found.weights)]
-
-    @property
-    def _freedom(self) -> int:
-        return len(self.balances.climbs) - len(self.ranges)
+        weighted = importance_sample(log_density, len(self.priors), int(rng.integers(2**31)))
+        return weighted.u[rng.choice(len(weighted.u), SAMPLES, p=weighted.weights)]
 
     @property
-    def _expected(self) -> float:
-        """Misfit that noise alone hardly ever exceeds."""
-        return 1.0 + 2.5 * float(np.sqrt(2.0 / max(self._freedom, 1)))
+    def _degrees_of_freedom(self) -> int:
+        return len(self.balances.climbs) - len(self.priors)
+
+    @property
+    def _misfit_limit(self) -> float:
+        """Reduced chi-square that noise alone rarely exceeds; its variance is 2 / freedom."""
+        return 1.0 + MISFIT_LIMIT * float(np.sqrt(2.0 / max(self._degrees_of_freedom, 1)))
 
     def _misfit(self, centre: Floats, whitener: Floats) -> float:
-        residual = whitener @ self.balances.off(centre[None])[0]
-        return float(residual @ residual) / max(self._freedom, 1)
+        residual = whitener @ self.balances.residuals(centre[None])[0]
+        return float(residual @ residual) / max(self._degrees_of_freedom, 1)
 
-    def _refuse_unexplained(self, off: Floats, std: Floats) -> None:
-        """Raise `InputError` for the climb that lies farthest beyond all soils of the ranges."""
-        beyond = np.maximum(off.min(axis=0), -off.max(axis=0)) / std
-        if beyond.max() <= BEYOND:
+    def _refuse_unexplained(self, residuals: Floats, std: Floats) -> None:
+        """Raise `InputError` for the climb that is farthest from all soils of the priors."""
+        miss = np.maximum(residuals.min(axis=0), -residuals.max(axis=0)) / std
+        if miss.max() <= MAX_MISS:
             return
-        i = int(np.argmax(beyond))
+        i = int(np.argmax(miss))
         climb, rover = self.balances.climbs[i], self.balances.rover
-        needed = rover.weight * np.sin(climb.slope)
-        most = off[:, i].max() < 0.0
-        reach = (off[:, i].max() if most else off[:, i].min()) + needed
+        required = rover.weight * np.sin(climb.slope)
+        too_little = residuals[:, i].max() < 0.0
+        nearest = residuals[:, i].max() if too_little else residuals[:, i].min()
+        pull = nearest + required
         raise InputError(
-            f"run {climb.name}: a slope of {climb.slope:.3g} rad takes {needed:.3g} N, the wheels "
-            f"pull {'at most' if most else 'no less than'} {reach:.3g} N at these slips and "
-            "stresses on any soil within the ranges; check slope_rad (rad, positive uphill), slip, "
-            "angle_rad (positive forward) and the mass, or widen [soil.prior]"
+            f"run {climb.name}: a slope of {climb.slope:.3g} rad requires {required:.3g} N, but on "
+            f"every soil within the ranges the wheels pull "
+            f"{'at most' if too_little else 'at least'} {pull:.3g} N at these slips and stresses; "
+            "check slope_rad (rad, positive uphill), slip, angle_rad (positive forward) and the "
+            "mass, or widen [soil.prior]"
         )
 
-    def _refuse_contradiction(self, centre: Floats, std: Floats, widened: float) -> None:
-        """Raise `FitError` where no one soil explains all climbs, with the one farthest off."""
-        if widened <= CONTRADICTION:
+    def _refuse_contradiction(self, centre: Floats, std: Floats, noise_scale: float) -> None:
+        """Raise `FitError` if no single soil explains all climbs, naming the largest outlier."""
+        if noise_scale <= MAX_NOISE_SCALE:
             return
-        off = self.balances.off(centre[None])[0]
-        i = int(np.argmax(np.abs(off) / std))
+        residual = self.balances.residuals(centre[None])[0]
+        i = int(np.argmax(np.abs(residual) / std))
         raise FitError(
-            f"no one soil within the ranges explains these climbs: they miss their balance by "
-            f"{widened:.0f} times what the noise allows, run {self.balances.climbs[i].name} by "
-            f"{off[i]:+.3g} N; check its slope_rad, slip and stress, and [noise]"
+            f"no single soil within the ranges explains these climbs: their force balances miss by "
+            f"{noise_scale:.0f} times the noise, run {self.balances.climbs[i].name} by "
+            f"{residual[i]:+.3g} N; check its slope_rad, slip and stress, and [noise]"
         )
 
 
-def _shear(values: Floats) -> Shear:
+def _shear(values: Floats) -> ShearParameters:
     return float(values[0]), float(values[1]), float(values[2])
 
 
 def _corners(p: int) -> Floats:
-    """The corners of the unit cube, a hair inside, (2^p, p)."""
-    return np.asarray(list(product((1e-6, 1.0 - 1e-6), repeat=p)), dtype=np.float64)
+    """The corners of the unit cube, just inside, (2^p, p)."""
+    return np.asarray(list(product((EDGE, 1.0 - EDGE), repeat=p)), dtype=np.float64)

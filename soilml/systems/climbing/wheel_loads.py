@@ -1,4 +1,4 @@
-"""How a rover's weight stands on its wheels, found from what they measured."""
+"""Distribution of a rover's weight over its wheels, estimated from the measured stresses."""
 
 from __future__ import annotations
 
@@ -7,34 +7,40 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.systems.climbing.balance_noise import Shear
+from soilml.systems.climbing.balance_noise import ShearParameters
 from soilml.systems.climbing.climb import Climb
 from soilml.systems.climbing.rover import Rover
-from soilml.systems.climbing.wheel_force_parts import parts, shared_magnification
+from soilml.systems.climbing.wheel_force_components import force_components, shared_magnification
+
+#: Smallest range of tan(slope) from which the height of the centre of mass is estimated.
+MIN_SPAN = 0.1
 
 
-def with_loads(rover: Rover, climbs: Sequence[Climb], shear: Shear) -> Rover:
-    r"""The rover with the loads of its wheels, found where it does not know them.
+def estimate_wheel_loads(rover: Rover, climbs: Sequence[Climb], shear: ShearParameters) -> Rover:
+    r"""The rover with its centre of mass estimated from the climbs if it is unknown.
 
     .. math:: \frac{F_{zf}}{F_{zf} + F_{zr}} = a - h \tan\alpha
 
-    is a straight line through what the front wheels carry in each climb at the soil `shear`, with
-    one magnification for both wheels of a run; its slope is taken where three climbs or more span
-    0.1 rad, else it is nil. A line of least squares: a and h are then kept in their bounds.
+    is fitted by least squares to the front wheels' share of the load in each climb at the soil
+    `shear`, with one magnification for both wheels of a run. h is estimated if three climbs or more
+    span 0.1 in tan(alpha), and is 0 otherwise; a and h are limited to their bounds.
     """
-    if rover.knows_loads:
+    if rover.has_known_loads:
         return rover
     cohesion, friction, modulus = shear
-    tangent = np.tan(friction)
+    tan_friction = np.tan(friction)
     shares = []
     for climb in climbs:
-        wheels = parts(climb.front, rover, modulus), parts(climb.rear, rover, modulus)
-        shared = shared_magnification(rover, climb.slope, wheels, cohesion, tangent)
-        front, rear = (wheel.load(shared, cohesion, tangent) for wheel in wheels)
+        wheels = (
+            force_components(climb.front, rover, modulus),
+            force_components(climb.rear, rover, modulus),
+        )
+        shared = shared_magnification(rover, climb.slope, wheels, cohesion, tan_friction)
+        front, rear = (wheel.load(shared, cohesion, tan_friction) for wheel in wheels)
         shares.append(float(front / (front + rear)))
-    steep = np.tan([climb.slope for climb in climbs])
-    spans = len(climbs) > 2 and np.ptp(steep) > 0.1
-    fall, share = np.polyfit(steep, shares, 1) if spans else (0.0, np.mean(shares))
+    gradient = np.tan([climb.slope for climb in climbs])
+    spans = len(climbs) > 2 and np.ptp(gradient) > MIN_SPAN
+    fall, share = np.polyfit(gradient, shares, 1) if spans else (0.0, np.mean(shares))
     return replace(
         rover,
         front_share=float(np.clip(share, 0.05, 0.95)),

@@ -1,37 +1,52 @@
-"""A wheel that measures the normal stress on its rim, and what follows from that."""
+"""A wheel with force sensors in its rim: from readings to shear modulus and drawbar pull.
 
-from soilml.systems.force_sensor_wheel.bekker_profile import conventional
-from soilml.systems.force_sensor_wheel.bin_average import Felt, averaged
-from soilml.systems.force_sensor_wheel.deconvolution import sharpened
-from soilml.systems.force_sensor_wheel.force_balance import Balanced, solve
-from soilml.systems.force_sensor_wheel.pull_prediction import Pull, pull
-from soilml.systems.force_sensor_wheel.sensor_model import Readings, SensingWheel, sensed
-from soilml.systems.force_sensor_wheel.shear_modulus import Grip, estimate, profiled
-from soilml.systems.force_sensor_wheel.steady_run import Run, Strength
+Readings of the sensors (`SensorReadings`) are averaged in bins of angle (`bin_stress`), the
+averaging over the sensor's disc is removed (`deconvolve`), and the resulting `StressProfile` is
+integrated to load, drawbar pull and torque (`forces_from_profile`). `estimate_shear_modulus` solves
+the force balance of a `SteadyRun`, and `predict_pull` predicts the pull at another slip. Source:
+Nagatani, Ikeda, Sato and Yoshida, IROS 2009.
+"""
+
+from soilml.systems.force_sensor_wheel.bekker_profile import bekker_stress_profile
+from soilml.systems.force_sensor_wheel.bin_average import BinnedStress, bin_stress
+from soilml.systems.force_sensor_wheel.deconvolution import deconvolve
+from soilml.systems.force_sensor_wheel.force_balance import BalanceSolution, solve_force_balance
+from soilml.systems.force_sensor_wheel.pull_prediction import PullPrediction, predict_pull
+from soilml.systems.force_sensor_wheel.sensor_model import (
+    SensingWheel,
+    SensorReadings,
+    simulate_readings,
+)
+from soilml.systems.force_sensor_wheel.shear_modulus import (
+    ShearModulusEstimate,
+    estimate_shear_modulus,
+    profile_from_readings,
+)
+from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
-from soilml.systems.force_sensor_wheel.synthetic_arc import balanced_arc, stressed_arc
-from soilml.systems.force_sensor_wheel.wheel_forces import WheelForces, forces
+from soilml.systems.force_sensor_wheel.synthetic_arc import balanced_arc, parabolic_arc
+from soilml.systems.force_sensor_wheel.wheel_forces import WheelForces, forces_from_profile
 
 __all__ = [
-    "Balanced",
-    "Felt",
-    "Grip",
-    "Pull",
-    "Readings",
-    "Run",
+    "BalanceSolution",
+    "BinnedStress",
+    "PullPrediction",
     "SensingWheel",
-    "Strength",
+    "SensorReadings",
+    "ShearModulusEstimate",
+    "ShearStrength",
+    "SteadyRun",
     "StressProfile",
     "WheelForces",
-    "averaged",
     "balanced_arc",
-    "conventional",
-    "estimate",
-    "forces",
-    "profiled",
-    "pull",
-    "sensed",
-    "sharpened",
-    "solve",
-    "stressed_arc",
+    "bekker_stress_profile",
+    "bin_stress",
+    "deconvolve",
+    "estimate_shear_modulus",
+    "forces_from_profile",
+    "parabolic_arc",
+    "predict_pull",
+    "profile_from_readings",
+    "simulate_readings",
+    "solve_force_balance",
 ]

@@ -1,4 +1,4 @@
-"""The stress that the conventional model puts under a wheel whose sinkage is seen."""
+"""Stress profile of the conventional model for a wheel of known sinkage."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
+#: Points of the profile from entry to exit.
 POINTS = 201
 
 
-def conventional(
+def bekker_stress_profile(
     wheel: Wheel, soil: Soil, *, slip: float, sinkage: float, rebound: float = 0.0
 ) -> StressProfile:
-    r"""Bekker's stress over all of the visible contact.
+    r"""Bekker's normal stress over the visible contact.
 
     .. math::
         \theta_f = \arccos(1 - h / r), \quad \theta_r = -\arccos(1 - \kappa h / r), \quad
         \theta_m = (a_0 + a_1 s) \theta_f
 
-    `sinkage` is h in m, `rebound` is kappa. References: Nagatani et al. 2009, eqs. 3-7, after
-    Bekker and after Wong and Reece 1967. Under the small wheel that they measured, the true arc is
-    less than half as long (section IV).
+    `sinkage` is h in m, `rebound` is kappa, the rear contact's height over the sinkage. Raises
+    `InputError` for a sinkage or rebound out of range. Under the small wheel that Nagatani et al.
+    measured, the true arc is less than half as long (section IV). References: Nagatani et al.
+    2009, eqs. 3-7, after Bekker and after Wong and Reece 1967.
     """
     at = Operating(slip=slip, load=1.0)
     check(at)
@@ -40,9 +42,9 @@ def conventional(
             f"the radius, {wheel.radius:g} m, and a rebound from 0 to 1"
         )
     depth = np.asarray([sinkage], dtype=np.float64)
-    driven = Operating(slip=np.asarray([slip], dtype=np.float64), load=np.ones(1))
-    rim = wheel.shape(depth, soil, driven)
+    conditions = Operating(slip=np.asarray([slip], dtype=np.float64), load=np.ones(1))
+    rim = wheel.shape(depth, soil, conditions)
     rim = replace(rim, exit=-2.0 * np.arcsin(np.sqrt(rebound * depth / (2.0 * wheel.radius))))
-    angle, contact = wheel.stations(rim, driven, POINTS)
-    normal = stress(contact, soil, driven).normal
+    angle, contact = wheel.stations(rim, conditions, POINTS)
+    normal = stress(contact, soil, conditions).normal
     return StressProfile(angle[::-1, 0], normal[::-1, 0])

@@ -1,4 +1,4 @@
-"""The stress at points of the rim, from its means over the area of a sensor."""
+"""Normal stress at points of the rim, deconvolved from its means over the area of a sensor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.bin_average import Felt
+from soilml.systems.force_sensor_wheel.bin_average import BinnedStress
 from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 
@@ -27,24 +27,26 @@ ROUGH = 0.1
 POINTS = 41
 
 
-def sharpened(felt: Felt, wheel: SensingWheel, start: Floats | None = None) -> StressProfile:
-    r"""The stress whose means over the sensor's disc come nearest to what was felt.
+def deconvolve(
+    binned: BinnedStress, wheel: SensingWheel, start: Floats | None = None
+) -> StressProfile:
+    r"""Remove the averaging over the sensor's disc: fit an arc whose disc means match the bins.
 
     .. math::
         \sigma = \sigma_m (1 - v^a)^n, \quad
         v = \frac{\theta - \theta_m}{\theta_f - \theta_m} \text{ or }
             \frac{\theta_m - \theta}{\theta_m - \theta_r}
 
-    with a bend `a` of its own on either side of the peak: a = 1, n about 1 is a wedge as under
-    Bekker's wheel, a = 2 a parabola. Seven numbers by least squares on the bins that lie whole
-    between deadband and saturation, so that both ends of the arc, which decide the shear, come
-    from the flanks. The sensor of 9.5 mm spans 10 degrees of a rim of 55 mm: without this step the
-    arc looks longer and k_x comes out 14 % too large. Own derivation; Nagatani et al. 2009 take
-    the readings as they are. Not for an arc with two peaks. `start` is what `fitted`
-    found for nearly the same readings, and saves time. Raises `FitError` where too few bins are
-    left, or they show no single arc.
+    with an exponent `a` of its own on either side of the peak: a = 1, n about 1 is a wedge as under
+    Bekker's wheel, a = 2 a parabola. Seven parameters are fitted by least squares to the bins that
+    lie entirely between deadband and saturation, so that both ends of the arc, which determine the
+    shear displacement, follow from the flanks. The sensor of 9.5 mm spans 10 degrees of a rim of 55
+    mm: without this step the arc appears longer and k_x is overestimated by 14 %. Own derivation;
+    Nagatani et al. 2009 use the readings uncorrected. Not valid for an arc with two peaks. `start`
+    is what `fit_stress_arc` returned for nearly the same readings, and saves time. Raises
+    `FitError` if too few bins remain, or they do not form a single arc.
     """
-    x = fitted(felt, wheel, start)
+    x = fit_stress_arc(binned, wheel, start)
     leave, entry, peak = x[:3]
     points = np.concatenate(
         [np.linspace(leave, peak, POINTS)[:-1], np.linspace(peak, entry, POINTS)]
@@ -54,13 +56,15 @@ def sharpened(felt: Felt, wheel: SensingWheel, start: Floats | None = None) -> S
     return StressProfile(points, normal)
 
 
-def fitted(felt: Felt, wheel: SensingWheel, start: Floats | None = None) -> Floats:
-    """The seven numbers: exit, entry, peak (rad), ln of the bends and of n, largest stress (Pa)."""
-    angle, seen = felt.angle[felt.whole], felt.normal[felt.whole]
+def fit_stress_arc(
+    binned: BinnedStress, wheel: SensingWheel, start: Floats | None = None
+) -> Floats:
+    """Exit, entry, peak (rad), ln of both exponents a and of n, and maximum stress (Pa), (7,)."""
+    angle, seen = binned.angle[binned.in_range], binned.normal[binned.in_range]
     if len(angle) < LEAST_BINS:
         raise FitError(
-            f"{len(angle)} places on the rim where every sample lies between the deadband and the "
-            f"end of the sensors; {LEAST_BINS} are needed: drive more turns, or sample faster"
+            f"{len(angle)} bins of the rim in which every sample lies between deadband and "
+            f"saturation; {LEAST_BINS} are needed: record more turns, or sample faster"
         )
     offset, share = wheel.chords(CHORDS)
     at, most = angle[:, None] + offset, float(seen.max())
@@ -80,14 +84,14 @@ def fitted(felt: Felt, wheel: SensingWheel, start: Floats | None = None) -> Floa
     off = float(np.sqrt(np.mean(misfit(x)[: len(seen)] ** 2)))
     if off > ROUGH:
         raise FitError(
-            f"what the sensors felt is {100 * off:.0f} % of its peak off any single arc of stress: "
-            "look for two peaks, a wrong angle, or a sensor that fails"
+            f"the readings deviate from any single stress arc by {100 * off:.0f} % of the peak: "
+            "check for two peaks, a wrong angle, or a failed sensor"
         )
     return np.concatenate([x, [size(x)[1]]])
 
 
 def _shape(angle: Floats, x: Floats) -> Floats:
-    """The shape at some angles (rad); `x` as `fitted` gives it."""
+    """Shape of the arc at angles (rad); `x` as returned by `fit_stress_arc`."""
     leave, entry, peak = x[:3]
     front, rear, exponent = np.exp(x[3:6])
     ahead = angle > peak

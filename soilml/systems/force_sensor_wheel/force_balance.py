@@ -1,4 +1,4 @@
-"""Shear modulus and magnification from the two balances of a wheel on a slope."""
+"""Shear modulus and stress magnification from the force balance of a wheel on a slope."""
 
 from __future__ import annotations
 
@@ -10,77 +10,127 @@ from numpy.typing import NDArray
 
 from soilml.errors import FitError
 from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel
-from soilml.systems.force_sensor_wheel.steady_run import Run, Strength
+from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
-from soilml.systems.force_sensor_wheel.wheel_forces import Sheared, integrated
+from soilml.systems.force_sensor_wheel.wheel_forces import ShearInputs, integrate_profile
 
-#: Shear moduli (m) looked at: from grip at once to none within any wheel's contact.
+#: Range of shear moduli searched, m: at the lower end the shear strength is mobilised at once, at
+#: the upper end practically no shear is mobilised within the contact of any wheel.
 STIFFEST, SOFTEST = 1e-5, 10.0
-LOOKS, ZOOMS = 32, 6
+#: The range is searched on a grid, and the interval with the sign change is refined by a grid of
+#: the same size: 6 refinements determine k_x to a relative 1e-9.
+GRID_SIZE, REFINEMENTS = 32, 6
 
 
 @dataclass(frozen=True)
-class Balanced:
-    """What satisfies both balances: true over measured stress M, and the shear modulus k_x (m)."""
+class BalanceSolution:
+    """Solution of both balances: true over measured stress M, and the shear modulus k_x (m)."""
 
     magnification: float
     shear_modulus: float
 
 
-def solve(profile: StressProfile, at: Run, wheel: SensingWheel, strength: Strength) -> Balanced:
-    r"""M and k_x from the two force balances on a slope.
+def solve_force_balance(
+    profile: StressProfile, at: SteadyRun, wheel: SensingWheel, strength: ShearStrength
+) -> BalanceSolution:
+    r"""Solve the vertical and the horizontal force balance of a wheel on a slope for M and k_x.
 
     .. math::
         F_z(M, k_x) = m g \cos\alpha, \qquad F_x(M, k_x) = m g \sin\alpha
 
-    F_z is a straight line in M, so that M follows from k_x outright; the pull left over is then
-    looked at over all k_x, and the one interval in which it changes sign is narrowed. References:
-    Nagatani et al. 2009, eqs. 11-15, who bisect twice. Without cohesion, and where angle on
-    the rim and slope sum to less than a right angle, the pull left over crosses zero one way only,
-    so that there is at most one answer; with cohesion, none of 3000 random arcs had two. Raises
-    `FitError` where there is none, and which side that is, or more than one.
+    F_z is linear in M, so that M follows from k_x in closed form. The excess of the drawbar pull
+    over the pull that the slope requires is then evaluated on a grid of k_x, and the one interval
+    in which it changes sign is refined. Without cohesion, and if the angle on the rim plus the
+    slope stays below a right angle, the excess changes sign at most once; with cohesion, none of
+    3000 random arcs had two solutions.
+
+    Parameters
+    ----------
+    profile
+        Measured normal stress on the rim.
+    at
+        Slip, weight on the wheel (N) and slope (rad).
+    wheel
+        Radius and width.
+    strength
+        Cohesion (Pa) and friction angle (rad) of the soil.
+
+    Raises
+    ------
+    FitError
+        If there is no solution (the message names the side on which the balance fails), or more
+        than one.
+
+    References
+    ----------
+    Nagatani et al. 2009, eqs. 11-15, who bisect for both unknowns.
+
+    Examples
+    --------
+    >>> import math
+    >>> run = SteadyRun(slip=0.29, weight=28.92, slope=math.radians(4.0))
+    >>> wheel, sand = SensingWheel(), ShearStrength(friction_angle=math.radians(38.0))
+    >>> from soilml.systems.force_sensor_wheel import balanced_arc
+    >>> arc = balanced_arc(math.radians(30.0), run, wheel, sand, shear_modulus=0.0072)
+    >>> solution = solve_force_balance(arc, run, wheel, sand)
+    >>> round(solution.magnification, 3), round(solution.shear_modulus, 5)
+    (1.0, 0.0072)
     """
-    modulus = np.geomspace(STIFFEST, SOFTEST, LOOKS)
-    left, magnification = excess(profile, at, wheel, strength, modulus)
-    if not np.isfinite(left).any():
+    modulus = np.geomspace(STIFFEST, SOFTEST, GRID_SIZE)
+    excess, magnification = excess_pull(profile, at, wheel, strength, modulus)
+    if not np.isfinite(excess).any():
         raise FitError(
             "no magnification carries the weight at any shear modulus: cohesion alone carries "
             "more, or the shear of this braking wheel pulls it down; check cohesion and slip"
         )
-    ends = _crossings(left)
-    if len(ends) == 0:
-        raise FitError(_one_sided(left, at))
-    if len(ends) > 1:
-        said = ", ".join(f"{modulus[i]:.2g} to {modulus[i + 1]:.2g}" for i in ends)
+    crossings = _sign_changes(excess)
+    if len(crossings) == 0:
+        raise FitError(_no_solution(excess, at))
+    if len(crossings) > 1:
+        intervals = ", ".join(f"{modulus[i]:.2g} to {modulus[i + 1]:.2g}" for i in crossings)
         raise FitError(
-            f"{len(ends)} shear moduli satisfy both balances, in m: {said}; a run at another slip "
-            "or slope is needed to choose"
+            f"{len(crossings)} shear moduli satisfy both balances, in m: {intervals}; a run at "
+            "another slip or slope is needed to choose"
         )
-    i = int(ends[0])
-    for _ in range(ZOOMS):
-        modulus = np.geomspace(modulus[i], modulus[i + 1], LOOKS)
-        left, magnification = excess(profile, at, wheel, strength, modulus)
-        ends = _crossings(left)
-        i = int(ends[0]) if len(ends) else 0  # rounding may hide the last of it
-    return Balanced(float(magnification[i]), float(modulus[i]))
+    i = int(crossings[0])
+    for _ in range(REFINEMENTS):
+        modulus = np.geomspace(modulus[i], modulus[i + 1], GRID_SIZE)
+        excess, magnification = excess_pull(profile, at, wheel, strength, modulus)
+        crossings = _sign_changes(excess)
+        i = int(crossings[0]) if len(crossings) else 0  # rounding may hide the last sign change
+    return BalanceSolution(float(magnification[i]), float(modulus[i]))
 
 
-def excess(
-    profile: StressProfile, at: Run, wheel: SensingWheel, strength: Strength, modulus: Floats
+def excess_pull(
+    profile: StressProfile,
+    at: SteadyRun,
+    wheel: SensingWheel,
+    strength: ShearStrength,
+    modulus: Floats,
 ) -> tuple[Floats, Floats]:
-    """Pull (N) beyond what the slope needs, and M, at some shear moduli (m); NaN without an M."""
+    """Drawbar pull (N) beyond what the slope requires, and M, at shear moduli (m), (n,).
+
+    NaN where no magnification carries the weight.
+    """
     weight, slope = float(at.weight), float(at.slope)
-    magnification, forces = carrying(profile, at, wheel, strength, modulus)
-    return forces - weight * math.sin(slope), magnification
+    magnification, pull = solve_vertical_balance(profile, at, wheel, strength, modulus)
+    return pull - weight * math.sin(slope), magnification
 
 
-def carrying(
-    profile: StressProfile, at: Run, wheel: SensingWheel, strength: Strength, modulus: Floats
+def solve_vertical_balance(
+    profile: StressProfile,
+    at: SteadyRun,
+    wheel: SensingWheel,
+    strength: ShearStrength,
+    modulus: Floats,
 ) -> tuple[Floats, Floats]:
-    """The M that carries the weight at some shear moduli (m), and the drawbar pull (N) then."""
-    both = integrated(
+    """M that carries the weight at shear moduli (m), (n,), and the drawbar pull (N) with that M.
+
+    Load and pull are linear in M: their values at M = 0 and M = 1 determine them.
+    """
+    at_zero_and_one = integrate_profile(
         profile,
-        Sheared(
+        ShearInputs(
             magnification=np.asarray([[0.0], [1.0]]),
             shear_modulus=modulus,
             cohesion=strength.cohesion,
@@ -90,32 +140,34 @@ def carrying(
             width=wheel.width,
         ),
     )
-    load, pull = both.load, both.drawbar_pull
-    gain = load[1] - load[0]
-    needed = float(at.weight) * math.cos(float(at.slope)) - load[0]
-    possible = (gain > 0) & (needed > 0)
-    magnification = np.where(possible, needed / np.where(possible, gain, 1.0), np.nan)
+    load, pull = at_zero_and_one.load, at_zero_and_one.drawbar_pull
+    load_per_magnification = load[1] - load[0]
+    required = float(at.weight) * math.cos(float(at.slope)) - load[0]
+    solvable = (load_per_magnification > 0) & (required > 0)
+    magnification = np.where(
+        solvable, required / np.where(solvable, load_per_magnification, 1.0), np.nan
+    )
     return magnification, pull[0] + magnification * (pull[1] - pull[0])
 
 
-def _crossings(left: Floats) -> NDArray[np.intp]:
-    """The intervals in which the pull left over changes its sign."""
-    known, above = np.isfinite(left), left > 0
-    return np.flatnonzero((above[1:] != above[:-1]) & known[1:] & known[:-1])
+def _sign_changes(excess: Floats) -> NDArray[np.intp]:
+    """Indices of the intervals in which the excess pull changes sign."""
+    finite, positive = np.isfinite(excess), excess > 0
+    return np.flatnonzero((positive[1:] != positive[:-1]) & finite[1:] & finite[:-1])
 
 
-def _one_sided(left: Floats, at: Run) -> str:
+def _no_solution(excess: Floats, at: SteadyRun) -> str:
     """Why no shear modulus balances the pull."""
-    needed = float(at.weight) * math.sin(float(at.slope))
-    known = left[np.isfinite(left)]
-    if known[0] < 0:
+    required = float(at.weight) * math.sin(float(at.slope))
+    finite = excess[np.isfinite(excess)]
+    if finite[0] < 0:
         return (
-            f"even with perfect grip the wheel pulls {known.max() + needed:.3g} N, and the slope "
-            f"needs {needed:.3g} N: the stress sits too far forward for this friction angle, slip "
-            "and slope; check the zero of the angle, and that forward is positive"
+            f"even with fully mobilised shear the wheel pulls {finite.max() + required:.3g} N, and "
+            f"the slope requires {required:.3g} N: the stress is too far forward for this friction "
+            "angle, slip and slope; check the zero of the angle, and that forward is positive"
         )
     return (
-        f"even with hardly any grip the wheel pulls {known.min() + needed:.3g} N, and the slope "
-        f"needs {needed:.3g} N: the stress sits too far back; check the zero of the angle, that "
-        "forward is positive, and the sign of the slope"
+        f"even with hardly any shear the wheel pulls {finite.min() + required:.3g} N, and the "
+        f"slope requires {required:.3g} N: the stress is too far back; check the zero of the "
+        "angle, that forward is positive, and the sign of the slope"
     )

@@ -1,4 +1,4 @@
-"""Drawbar pull at another slip, from the stress measured there and a shear modulus found before."""
+"""Drawbar pull at another slip, from the stress measured there and a known shear modulus."""
 
 from __future__ import annotations
 
@@ -7,77 +7,110 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.bin_average import averaged
-from soilml.systems.force_sensor_wheel.deconvolution import fitted
-from soilml.systems.force_sensor_wheel.force_balance import carrying
-from soilml.systems.force_sensor_wheel.sensor_model import Readings, SensingWheel
-from soilml.systems.force_sensor_wheel.shear_modulus import Grip, profiled
-from soilml.systems.force_sensor_wheel.steady_run import Run, Strength
+from soilml.systems.force_sensor_wheel.bin_average import bin_stress
+from soilml.systems.force_sensor_wheel.deconvolution import fit_stress_arc
+from soilml.systems.force_sensor_wheel.force_balance import solve_vertical_balance
+from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel, SensorReadings
+from soilml.systems.force_sensor_wheel.shear_modulus import (
+    ShearModulusEstimate,
+    profile_from_readings,
+)
+from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 from soilml.systems.force_sensor_wheel.uncertainty import (
-    NUDGE,
-    between_turns,
-    freedom,
-    from_run,
-    student,
+    STEP_IN_STD,
+    delta_method_covariance,
+    effective_degrees_of_freedom,
+    jackknife_covariance,
+    student_t_quantile,
 )
 
-#: Above this slip the measured k_x fell to a third of what it was (Table I).
-BELIEVED = 0.5
+#: Above this slip the measured k_x dropped to a third of its value at small slip (Table I).
+MAX_VALID_SLIP = 0.5
 
 
 @dataclass(frozen=True)
-class Pull:
+class PullPrediction:
     """Drawbar pull (N) with its standard deviation, and the magnification that carries the load."""
 
     drawbar_pull: float
     std: float
     magnification: float
-    freedom: float  # of the variance of the drawbar pull
+    degrees_of_freedom: float  # of the variance of the drawbar pull
     warnings: tuple[str, ...]
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The drawbar pull (N) lies in here nine times in ten."""
-        reach = student(self.freedom) * self.std
-        return self.drawbar_pull - reach, self.drawbar_pull + reach
+        """90 % interval of the drawbar pull, N."""
+        half_width = student_t_quantile(self.degrees_of_freedom) * self.std
+        return self.drawbar_pull - half_width, self.drawbar_pull + half_width
 
 
-def pull(readings: Readings, at: Run, wheel: SensingWheel, strength: Strength, grip: Grip) -> Pull:
-    """The drawbar pull with the k_x of `grip` and the stress read at this run.
+def predict_pull(
+    readings: SensorReadings,
+    at: SteadyRun,
+    wheel: SensingWheel,
+    strength: ShearStrength,
+    modulus: ShearModulusEstimate,
+) -> PullPrediction:
+    """Predict the drawbar pull from the readings of a run and a shear modulus estimated before.
 
-    The slope of `at` serves for the load only, weight cos(slope). References: Nagatani et al.
-    2009, section VI. Errors of `grip`, of these readings and of this run are taken to be
-    independent. Holds for slips up to 0.5 (their section V.C). Raises `FitError` where no
-    magnification carries the load.
+    Valid for slips up to 0.5 (section V.C of the source). Errors of the estimate, of these readings
+    and of this run are treated as independent.
+
+    Parameters
+    ----------
+    readings
+        Readings of three turns or more.
+    at
+        The run; its slope serves for the load only, weight cos(slope).
+    wheel, strength
+        The sensors, and the soil's cohesion and friction angle.
+    modulus
+        Result of `estimate_shear_modulus` from another run.
+
+    Raises
+    ------
+    FitError
+        If no magnification carries the load, or the readings do not form a single arc.
+
+    References
+    ----------
+    Nagatani et al. 2009, section VI.
     """
-    start = fitted(averaged(readings, wheel), wheel)
-    profile = profiled(readings, wheel, start)
+    start = fit_stress_arc(bin_stress(readings, wheel), wheel)
+    profile = profile_from_readings(readings, wheel, start)
 
-    def figures(profile: StressProfile, at: Run, log_modulus: float) -> Floats:
-        found = carrying(profile, at, wheel, strength, np.exp(np.asarray([log_modulus])))
-        return np.concatenate(found)
+    def balance(profile: StressProfile, at: SteadyRun, log_modulus: float) -> Floats:
+        """(magnification, drawbar pull)."""
+        modulus = np.exp(np.asarray([log_modulus]))
+        return np.concatenate(solve_vertical_balance(profile, at, wheel, strength, modulus))
 
-    modulus = float(np.log(grip.shear_modulus))
-    value = figures(profile, at, modulus)
+    log_modulus = float(np.log(modulus.shear_modulus))
+    value = balance(profile, at, log_modulus)
     if not np.isfinite(value).all():
         raise FitError("no magnification carries the weight at this slip and shear modulus")
-    std = float(np.sqrt(grip.covariance[0, 0]))
-    up, down = (figures(profile, at, modulus + k * NUDGE * std) for k in (1.0, -1.0))
-    rate = (up - down) / (2.0 * NUDGE)
-    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel, start), at, modulus))
-    covariance = scatter + from_run(at, lambda a: figures(profile, a, modulus))
-    covariance = covariance + np.outer(rate, rate)
-    said: tuple[str, ...] = ()
-    if float(at.slip) > BELIEVED:
-        said = (
-            f"slip {float(at.slip):g} lies above {BELIEVED:g}, where the shear modulus found at "
-            "small slip was measured not to hold",
+    std = float(np.sqrt(modulus.covariance[0, 0]))
+    up, down = (balance(profile, at, log_modulus + k * STEP_IN_STD * std) for k in (1.0, -1.0))
+    change_per_std = (up - down) / (2.0 * STEP_IN_STD)
+    between_turns = jackknife_covariance(
+        readings, lambda r: balance(profile_from_readings(r, wheel, start), at, log_modulus)
+    )
+    from_run = delta_method_covariance(at, lambda a: balance(profile, a, log_modulus))
+    covariance = between_turns + from_run
+    covariance = covariance + np.outer(change_per_std, change_per_std)
+    warnings: tuple[str, ...] = ()
+    if float(at.slip) > MAX_VALID_SLIP:
+        warnings = (
+            f"slip {float(at.slip):g} exceeds {MAX_VALID_SLIP:g}: measurements show that the shear "
+            "modulus found at small slip does not apply there",
         )
-    return Pull(
+    return PullPrediction(
         drawbar_pull=float(value[1]),
         std=float(np.sqrt(covariance[1, 1])),
         magnification=float(value[0]),
-        freedom=freedom(covariance[1, 1], scatter[1, 1], len(readings.angle)),
-        warnings=said,
+        degrees_of_freedom=effective_degrees_of_freedom(
+            covariance[1, 1], between_turns[1, 1], len(readings.angle)
+        ),
+        warnings=warnings,
     )

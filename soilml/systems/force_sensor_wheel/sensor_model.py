@@ -1,4 +1,4 @@
-"""What force sensors in the rim of a wheel read while it turns."""
+"""Readings of force sensors in the rim of a turning wheel."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ CHORDS = 48
 class SensingWheel:
     """A wheel with a row of round force sensors across its rim.
 
-    The defaults are the wheel of Nagatani et al. 2009, sections III and IV. Where the sensors of
-    the row sit and their noise are not printed: evenly spread, and 0.02 N, are assumed.
+    The defaults are the wheel of Nagatani et al. 2009, sections III and IV. The positions of the
+    sensors in the row and their noise are not printed: even spacing and 0.02 N are assumed.
     """
 
     radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r")] = 0.055
@@ -35,8 +35,8 @@ class SensingWheel:
     diameter: Annotated[Real, Parameter("m", 1e-4, 0.1, "of the sensing area")] = 0.0095
     interval: Annotated[Real, Parameter("s", 1e-5, 10.0, "between samples")] = 0.05
     rim_speed: Annotated[Real, Parameter("m/s", 1e-5, 10.0, "r omega")] = 0.0104
-    deadband: Annotated[Real, Parameter("N", 0.0, 1e3, "less reads as nothing")] = 0.1
-    saturation: Annotated[Real, Parameter("N", 1e-3, 1e5, "more reads as this")] = 4.4
+    deadband: Annotated[Real, Parameter("N", 0.0, 1e3, "smaller forces read 0")] = 0.1
+    saturation: Annotated[Real, Parameter("N", 1e-3, 1e5, "larger forces read this")] = 4.4
     noise: Annotated[Real, Parameter("N", 0.0, 1e3, "standard deviation of a sample")] = 0.02
 
     def __post_init__(self) -> None:
@@ -56,17 +56,17 @@ class SensingWheel:
 
     @property
     def step(self) -> float:
-        """Angle (rad) that the rim turns between two samples."""
+        """Angle (rad) through which the rim turns between two samples."""
         return float(self.interval * self.rim_speed / self.radius)
 
     @property
     def across(self) -> Floats:
-        """Where the sensors sit across the rim, in half widths from its middle, (sensors,)."""
+        """Positions of the sensors across the rim, in half widths from its middle, (sensors,)."""
         count = int(self.sensors)
         return np.asarray((2.0 * np.arange(count) + 1.0) / count - 1.0)
 
     def chords(self, count: int) -> tuple[Floats, Floats]:
-        """Angles (rad) from the middle of a sensor and the shares of its area there, (count,)."""
+        """Angles (rad) from the centre of a sensor and area fractions there, (count,)."""
         turn = math.pi * np.arange(1, count + 1) / (count + 1)
         share = np.sin(turn) ** 2
         return 0.5 * self.diameter / self.radius * np.cos(turn), share / share.sum()
@@ -74,8 +74,8 @@ class SensingWheel:
 
 @final
 @dataclass(frozen=True)
-class Readings:
-    """What the sensors read over some turns.
+class SensorReadings:
+    """Readings of the sensors over one or more turns.
 
     `angle` (turns, samples) in rad from straight down, positive forward; `force` (turns, samples,
     sensors) in N.
@@ -93,7 +93,7 @@ class Readings:
                 f"{self.force.shape}; needed are (turns, samples) and (turns, samples, sensors)"
             )
         if not (np.isfinite(self.angle).all() and np.isfinite(self.force).all()):
-            raise InputError("readings hold numbers that are not finite; leave such samples out")
+            raise InputError("readings contain values that are not finite; leave such samples out")
         if float(np.abs(self.angle).max(initial=0.0)) > math.pi + 1e-6:
             raise InputError(
                 f"readings reach to {float(np.abs(self.angle).max()):g} rad, more than half a "
@@ -102,7 +102,7 @@ class Readings:
             )
 
 
-def sensed(
+def simulate_readings(
     profile: StressProfile,
     wheel: SensingWheel,
     *,
@@ -110,19 +110,42 @@ def sensed(
     crown: float = 0.0,
     lugs: tuple[float, float] = (0.0, 0.0),
     seed: int = 0,
-) -> Readings:
-    r"""What the sensors read of a true stress, at random phases of `turns` turns.
+) -> SensorReadings:
+    r"""Simulate the readings of a true stress profile, each turn at a random phase.
 
-    A sensor feels the mean over its disc, less what the lugs carry, then noise, deadband and
-    saturation. Across the rim, at y half widths from its middle, the stress is
-    (1 + crown (1 - 3 y^2)) times the profile's, whose mean it keeps: more in the middle.
-    `lugs` are the shares that the lugs carry at the entry and at the exit of the arc. References:
-    Nagatani et al. 2009, sections III to V; the laws across the rim and along the lugs are ours.
+    A sensor averages the stress over its disc, less the part carried by the lugs; noise, deadband
+    and saturation follow. At y half widths from the middle of the rim the stress is
+    (1 + crown (1 - 3 y^2)) times the profile's, so that its mean over the width is unchanged.
+
+    Parameters
+    ----------
+    profile
+        True normal stress.
+    wheel
+        The sensors.
+    turns
+        Number of turns recorded.
+    crown
+        Excess of the stress in the middle of the rim, as a fraction.
+    lugs
+        Fractions of the stress carried by the lugs at the entry and at the exit of the arc.
+    seed
+        Seed of phases and noise.
+
+    Raises
+    ------
+    InputError
+        For fewer than one turn, or fractions outside [0, 1).
+
+    References
+    ----------
+    Nagatani et al. 2009, sections III to V; the distributions across the rim and along the lugs
+    are our own.
     """
     if turns < 1:
         raise InputError(f"{turns} turns; needed is one or more")
     if not all(0.0 <= share < 1.0 for share in lugs):
-        raise InputError(f"lugs carry the shares {lugs}; each must lie from 0 to below 1")
+        raise InputError(f"lugs carry the fractions {lugs}; each must be at least 0 and below 1")
     rng = np.random.default_rng(seed)
     samples = int(2.0 * math.pi / wheel.step)
     phase = rng.uniform(0.0, 1.0, (turns, 1))
@@ -131,11 +154,11 @@ def sensed(
     forward = np.clip(
         (at - profile.exit_angle) / (profile.entry_angle - profile.exit_angle), 0.0, 1.0
     )
-    felt = normal * (1.0 - (lugs[1] + (lugs[0] - lugs[1]) * forward))
+    sensed = normal * (1.0 - (lugs[1] + (lugs[0] - lugs[1]) * forward))
     offset, share = wheel.chords(CHORDS)
-    mean = np.interp(angle[..., None] + offset, at, felt, left=0.0, right=0.0) @ share
+    mean = np.interp(angle[..., None] + offset, at, sensed, left=0.0, right=0.0) @ share
     over = 1.0 + crown * (1.0 - 3.0 * wheel.across**2)
     force = wheel.area * mean[..., None] * over
     force = force + rng.normal(0.0, 1.0, force.shape) * wheel.noise
     force = np.where(force < wheel.deadband, 0.0, np.minimum(force, wheel.saturation))
-    return Readings(angle=angle, force=force)
+    return SensorReadings(angle=angle, force=force)

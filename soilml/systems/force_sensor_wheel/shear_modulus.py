@@ -1,4 +1,4 @@
-"""The soil's shear modulus from what the sensors of a wheel read on one run."""
+"""The soil's shear modulus from the sensor readings of one run."""
 
 from __future__ import annotations
 
@@ -7,29 +7,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.systems.force_sensor_wheel.bin_average import averaged
-from soilml.systems.force_sensor_wheel.deconvolution import fitted, sharpened
-from soilml.systems.force_sensor_wheel.force_balance import solve
-from soilml.systems.force_sensor_wheel.sensor_model import Readings, SensingWheel
-from soilml.systems.force_sensor_wheel.steady_run import Run, Strength
+from soilml.systems.force_sensor_wheel.bin_average import bin_stress
+from soilml.systems.force_sensor_wheel.deconvolution import deconvolve, fit_stress_arc
+from soilml.systems.force_sensor_wheel.force_balance import solve_force_balance
+from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel, SensorReadings
+from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
-from soilml.systems.force_sensor_wheel.uncertainty import between_turns, freedom, from_run, student
+from soilml.systems.force_sensor_wheel.uncertainty import (
+    delta_method_covariance,
+    effective_degrees_of_freedom,
+    jackknife_covariance,
+    student_t_quantile,
+)
 
-#: Standard deviation of ln k_x for shapes of stress that `sharpened` does not hold: parabolas that
-#: lean and Bekker's wedges came out within 3 %.
-SHAPE = 0.015
-#: Warned of from these on.
-MUCH_SATURATED, VAGUE = 0.01, 0.5
+#: Standard deviation of ln k_x for stress shapes that `deconvolve` does not represent: skewed
+#: parabolas and Bekker's wedges were recovered within 3 %.
+SHAPE_STD = 0.015
+#: Saturated fraction of the samples, and standard deviation of ln k_x, above which a warning is
+#: given.
+MAX_SATURATED, MAX_LOG_STD = 0.01, 0.5
 
 
 @dataclass(frozen=True)
-class Grip:
+class ShearModulusEstimate:
     """Shear modulus (m) and magnification with the covariance of their logarithms, (2, 2)."""
 
     shear_modulus: float
     magnification: float
     covariance: Floats
-    freedom: float  # of the variance of ln k_x
+    degrees_of_freedom: float  # of the variance of ln k_x
     profile: StressProfile
     warnings: tuple[str, ...]
 
@@ -39,59 +45,97 @@ class Grip:
         return float(self.shear_modulus * np.sqrt(self.covariance[0, 0]))
 
     @property
-    def magnification_std(self) -> float:
-        """Standard deviation of M."""
-        return float(self.magnification * np.sqrt(self.covariance[1, 1]))
-
-    @property
     def interval(self) -> tuple[float, float]:
-        """k_x (m) lies in here nine times in ten."""
-        reach = student(self.freedom) * float(np.sqrt(self.covariance[0, 0]))
-        return self.shear_modulus * math.exp(-reach), self.shear_modulus * math.exp(reach)
+        """90 % interval of k_x, m."""
+        half_width = student_t_quantile(self.degrees_of_freedom) * float(
+            np.sqrt(self.covariance[0, 0])
+        )
+        return self.shear_modulus * math.exp(-half_width), self.shear_modulus * math.exp(half_width)
 
 
-def estimate(readings: Readings, at: Run, wheel: SensingWheel, strength: Strength) -> Grip:
-    """k_x and M with their uncertainty: jackknife over turns, delta method for the run's errors.
+def estimate_shear_modulus(
+    readings: SensorReadings, at: SteadyRun, wheel: SensingWheel, strength: ShearStrength
+) -> ShearModulusEstimate:
+    """Estimate k_x and M with their uncertainty.
 
-    References: Nagatani et al. 2009, section V; the uncertainty is ours. It leaves out errors of
-    c and phi, and lugs whose share of the load changes along the arc. Raises `FitError` as `solve`,
-    `sharpened` and `between_turns` do.
+    The uncertainty combines a jackknife over turns with the delta method for the errors of slip,
+    weight and slope. It excludes errors of c and phi, and lugs whose share of the load changes
+    along the arc.
+
+    Parameters
+    ----------
+    readings
+        Readings of three turns or more.
+    at
+        Slip, weight (N) and slope (rad) of the run, with their standard deviations.
+    wheel, strength
+        The sensors, and the soil's cohesion and friction angle.
+
+    Raises
+    ------
+    FitError
+        As `solve_force_balance`, `deconvolve` and `jackknife_covariance`.
+
+    References
+    ----------
+    Nagatani et al. 2009, section V; the uncertainty is our own.
+
+    Examples
+    --------
+    >>> import math
+    >>> from soilml.systems.force_sensor_wheel import balanced_arc, simulate_readings
+    >>> wheel, sand = SensingWheel(), ShearStrength(friction_angle=math.radians(38.0))
+    >>> run = SteadyRun(slip=0.11, weight=28.92)
+    >>> arc = balanced_arc(math.radians(30.0), run, wheel, sand, shear_modulus=0.0072)
+    >>> found = estimate_shear_modulus(simulate_readings(arc, wheel), run, wheel, sand)
+    >>> round(1e3 * found.shear_modulus, 1), round(1e3 * found.shear_modulus_std, 1)  # mm
+    (7.2, 0.1)
     """
-    felt = averaged(readings, wheel)
-    start = fitted(felt, wheel)
-    profile = sharpened(felt, wheel, start)
+    binned = bin_stress(readings, wheel)
+    start = fit_stress_arc(binned, wheel)
+    profile = deconvolve(binned, wheel, start)
 
-    def figures(profile: StressProfile, at: Run) -> Floats:
-        found = solve(profile, at, wheel, strength)
-        return np.log([found.shear_modulus, found.magnification])
+    def log_solution(profile: StressProfile, at: SteadyRun) -> Floats:
+        """(ln k_x, ln M)."""
+        solution = solve_force_balance(profile, at, wheel, strength)
+        return np.log([solution.shear_modulus, solution.magnification])
 
-    value = figures(profile, at)
-    scatter = between_turns(readings, lambda r: figures(profiled(r, wheel, start), at))
-    covariance = scatter + from_run(at, lambda a: figures(profile, a))
-    covariance = covariance + np.diag([SHAPE**2, 0.0])
-    return Grip(
+    value = log_solution(profile, at)
+    between_turns = jackknife_covariance(
+        readings, lambda r: log_solution(profile_from_readings(r, wheel, start), at)
+    )
+    covariance = between_turns + delta_method_covariance(at, lambda a: log_solution(profile, a))
+    covariance = covariance + np.diag([SHAPE_STD**2, 0.0])
+    return ShearModulusEstimate(
         shear_modulus=float(np.exp(value[0])),
         magnification=float(np.exp(value[1])),
         covariance=covariance,
-        freedom=freedom(covariance[0, 0], scatter[0, 0], len(readings.angle)),
+        degrees_of_freedom=effective_degrees_of_freedom(
+            covariance[0, 0], between_turns[0, 0], len(readings.angle)
+        ),
         profile=profile,
-        warnings=tuple(_said(felt.saturated, covariance)),
+        warnings=tuple(_warnings(binned.saturated_fraction, covariance)),
     )
 
 
-def profiled(readings: Readings, wheel: SensingWheel, start: Floats | None = None) -> StressProfile:
-    """The stress at points of the rim, from all readings; `start` as in `sharpened`."""
-    return sharpened(averaged(readings, wheel), wheel, start)
+def profile_from_readings(
+    readings: SensorReadings, wheel: SensingWheel, start: Floats | None = None
+) -> StressProfile:
+    """Bin and deconvolve all readings; `start` as in `deconvolve`."""
+    return deconvolve(bin_stress(readings, wheel), wheel, start)
 
 
-def _said(saturated: float, covariance: Floats) -> list[str]:
-    """What the user should know before believing the figures."""
-    said = []
-    if saturated > MUCH_SATURATED:
-        said.append(
-            f"{100 * saturated:.0f} % of the samples with contact are saturated: the top of the "
-            "stress is inferred from its flanks"
+def _warnings(saturated_fraction: float, covariance: Floats) -> list[str]:
+    """Limitations of the data that the user should know."""
+    warnings = []
+    if saturated_fraction > MAX_SATURATED:
+        warnings.append(
+            f"{100 * saturated_fraction:.0f} % of the samples with contact are saturated: the peak "
+            "of the stress is inferred from its flanks"
         )
-    if covariance[0, 0] > VAGUE**2:
-        said.append("this run hardly tells the shear modulus: its error exceeds half of it")
-    return said
+    if covariance[0, 0] > MAX_LOG_STD**2:
+        warnings.append(
+            "this run hardly determines the shear modulus: its standard deviation exceeds half of "
+            "its value"
+        )
+    return warnings

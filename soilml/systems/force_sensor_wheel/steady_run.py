@@ -1,4 +1,4 @@
-"""How the wheel was driven while its sensors read."""
+"""Operating conditions of a steady run, and the soil's known shear strength."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from soilml.physics.operating_point import MOST_SLIP
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Run:
-    """A steady run up a slope, with the standard deviations of what was measured.
+class SteadyRun:
+    """A steady run up a slope, with the standard deviations of the measured quantities.
 
     The wheel carries weight cos(slope) and pulls weight sin(slope): Nagatani et al. 2009, eqs. 14
-    and 15. Holds for a rover whose wheels share weight and pull alike.
+    and 15. Valid for a rover whose wheels share weight and pull equally.
     """
 
     slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
@@ -32,8 +32,8 @@ class Run:
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Strength:
-    """The soil's shear strength, which must be known beforehand."""
+class ShearStrength:
+    """Shear strength parameters of the soil, which must be known beforehand."""
 
     friction_angle: Annotated[Real, Parameter("rad", 0.0, 1.4, "phi")]
     cohesion: Annotated[Real, Parameter("Pa", 0.0, 1e6, "c")] = 0.0

@@ -1,4 +1,4 @@
-"""The normal stress that sensors found along the rim of a wheel."""
+"""Measured normal stress along the rim of a wheel."""
 
 from __future__ import annotations
 
@@ -15,19 +15,42 @@ from soilml.numerics.quadrature import gauss
 
 Floats = NDArray[np.float64]
 
-#: Gauss points between two samples: between these the stress is a straight line, but the shear
-#: curve bends.
+#: Gauss points between two samples: there the stress is linear in the angle, the shear
+#: displacement is not.
 BETWEEN = 3
 
 
 @final
 @dataclass(frozen=True)
 class StressProfile:
-    """Normal stress against the angle on the rim, a straight line between samples.
+    """Normal stress against the angle on the rim, linear between samples.
 
-    `angle` (p,) in rad from straight down, positive forward, rising; `normal` (p,) in Pa. Samples
-    may reach beyond the stressed arc, where they are zero. References: Nagatani et al. 2009,
-    section IV. Holds where the stress is the same over the width, or `normal` its mean.
+    Valid where the stress is uniform over the width, or `normal` is its mean. Samples may extend
+    beyond the stressed arc, where they are zero.
+
+    Parameters
+    ----------
+    angle
+        Contact angle (p,), rad from straight down, positive forward, increasing; p at least 3.
+    normal
+        Normal stress (p,), Pa, not negative.
+
+    Raises
+    ------
+    InputError
+        For other shapes, angles that do not increase, values that are not finite, negative stress,
+        no contact, or stress above the axle.
+
+    References
+    ----------
+    Nagatani et al. 2009, section IV.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> profile = StressProfile(np.linspace(-0.2, 0.4, 7), np.array([0, 0, 4e3, 9e3, 7e3, 2e3, 0]))
+    >>> round(profile.exit_angle, 2), round(profile.peak_angle, 2), round(profile.entry_angle, 2)
+    (-0.1, 0.1, 0.4)
     """
 
     angle: Floats
@@ -40,24 +63,24 @@ class StressProfile:
 
     @cached_property
     def exit_angle(self) -> float:
-        """Where the stress ends behind, rad."""
+        """Exit angle, at which the stress ends in the rear contact, rad."""
         first = int(np.flatnonzero(self.normal > 0)[0])
         return float(self.angle[max(first - 1, 0)])
 
     @cached_property
     def entry_angle(self) -> float:
-        """Where the stress begins in front, rad; the soil is sheared from here on."""
+        """Entry angle, at which stress and shear displacement begin in front, rad."""
         last = int(np.flatnonzero(self.normal > 0)[-1])
         return float(self.angle[min(last + 1, len(self.angle) - 1)])
 
     @cached_property
     def peak_angle(self) -> float:
-        """Where the stress is largest, rad."""
+        """Angle of the maximum stress, rad."""
         return float(self.angle[int(np.argmax(self.normal))])
 
     @cached_property
     def nodes(self) -> tuple[Floats, Floats, Floats]:
-        """Angles (q,), the arcs (rad) that they stand for, and the stress there, exit to entry."""
+        """Quadrature angles (q,), their weights (rad) and the stress there (Pa), exit to entry."""
         inside = (self.angle >= self.exit_angle) & (self.angle <= self.entry_angle)
         angle, normal = self.angle[inside], self.normal[inside]
         share, weight = gauss(BETWEEN)
@@ -67,17 +90,17 @@ class StressProfile:
 
 
 def _refuse(angle: Floats, normal: Floats) -> None:
-    """Raise `InputError` for what is no profile."""
+    """Raise `InputError` for an invalid profile."""
     if angle.ndim != 1 or angle.shape != normal.shape:
         raise InputError(
             f"a stress profile has angles of shape {angle.shape} and stresses of shape "
             f"{normal.shape}; both must be (points,)"
         )
     if len(angle) < 3:
-        raise InputError(f"a stress profile of {len(angle)} points; it needs three or more")
+        raise InputError(f"a stress profile of {len(angle)} points; three or more are needed")
     if not (np.isfinite(angle).all() and np.isfinite(normal).all()):
         raise InputError(
-            "a stress profile holds numbers that are not finite; leave such samples out"
+            "a stress profile contains values that are not finite; leave such samples out"
         )
     if (farthest := float(np.abs(angle).max())) > math.pi + 1e-9:
         raise InputError(
@@ -85,11 +108,11 @@ def _refuse(angle: Floats, normal: Floats) -> None:
             "radians from straight down (np.deg2rad turns degrees into them)"
         )
     if not (np.diff(angle) > 0).all():
-        raise InputError("the angles of a stress profile must rise from one sample to the next")
+        raise InputError("the angles of a stress profile must increase from one sample to the next")
     if (least := float(normal.min())) < 0:
         raise InputError(
-            f"a stress profile holds {least:g} Pa; soil does not pull at a rim, so take off the "
-            "sensor's zero and set what is left below it to 0"
+            f"a stress profile contains {least:g} Pa; soil does not pull at a rim, so subtract the "
+            "sensor's zero and set remaining negative values to 0"
         )
     stressed = angle[normal > 0]
     if len(stressed) == 0:

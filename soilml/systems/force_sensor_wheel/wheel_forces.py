@@ -1,4 +1,4 @@
-"""What a wheel feels under a normal stress that was measured."""
+"""Forces on a wheel under a measured normal stress."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class WheelForces:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sheared:
-    """What turns a measured stress into forces; numbers, or arrays that broadcast."""
+class ShearInputs:
+    """Parameters of the integral from stress to forces; numbers, or arrays that broadcast."""
 
     magnification: Annotated[Real, Parameter("1", 0.0, 1e6, "M, true over measured stress")]
     shear_modulus: Annotated[Real, Parameter("m", 1e-6, 100.0, "k_x")]
@@ -38,7 +38,7 @@ class Sheared:
     width: Annotated[Real, Parameter("m", 0.002, 5.0, "b")]
 
 
-def forces(
+def forces_from_profile(
     profile: StressProfile,
     *,
     magnification: Real = 1.0,
@@ -49,7 +49,7 @@ def forces(
     radius: Real,
     width: Real,
 ) -> WheelForces:
-    r"""Load F_z, drawbar pull F_x (N) and torque (N m) that follow from a measured stress.
+    r"""Integrate a measured stress to load F_z, drawbar pull F_x (N) and torque (N m).
 
     .. math::
         \tau = (c + M \sigma_s \tan\varphi) (1 - e^{-|j| / k_x}), \quad
@@ -58,13 +58,51 @@ def forces(
         F_x = r b \int (\tau \cos\theta - M \sigma_s \sin\theta) d\theta, \quad
         F_z = r b \int (\tau \sin\theta + M \sigma_s \cos\theta) d\theta
 
-    with the sign of the slip carried to tau and theta_f the profile's entry angle. Numbers, or
-    arrays that broadcast; the answer has their common shape. All three forces are straight lines
-    in M. References: Nagatani et al. 2009, eqs. 10-13. Not for wheels whose lugs carry the load
-    elsewhere on the rim than the sensors feel it: M is one number for the whole arc. Raises
-    `InputError` for a value out of its bounds.
+    where tau takes the sign of the slip and theta_f is the entry angle of the profile. All three
+    forces are linear in M. Not valid for wheels whose lugs carry the load elsewhere on the rim than
+    the sensors measure it: M is one number for the whole arc.
+
+    Parameters
+    ----------
+    profile
+        Measured normal stress sigma_s.
+    magnification
+        M, true over measured stress.
+    shear_modulus
+        k_x, m.
+    cohesion, friction_angle
+        c, Pa, and phi, rad.
+    slip
+        s; negative for a braking wheel.
+    radius, width
+        r and b, m.
+
+    Returns
+    -------
+    WheelForces
+        Arrays of the common shape of the parameters, which broadcast.
+
+    Raises
+    ------
+    InputError
+        For a value out of its bounds.
+
+    References
+    ----------
+    Nagatani et al. 2009, eqs. 10-13.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> profile = StressProfile(np.array([-0.1, 0.2, 0.5]), np.array([0.0, 2e4, 0.0]))
+    >>> found = forces_from_profile(
+    ...     profile, shear_modulus=0.0072, friction_angle=0.66,
+    ...     slip=[0.1, 0.3], radius=0.055, width=0.064,
+    ... )
+    >>> np.round(found.drawbar_pull, 2)
+    array([0.52, 4.22])
     """
-    given = Sheared(
+    inputs = ShearInputs(
         magnification=magnification,
         shear_modulus=shear_modulus,
         cohesion=cohesion,
@@ -73,13 +111,13 @@ def forces(
         radius=radius,
         width=width,
     )
-    check(given)
-    return integrated(profile, given)
+    check(inputs)
+    return integrate_profile(profile, inputs)
 
 
-def integrated(profile: StressProfile, given: Sheared) -> WheelForces:
-    """The same without a look at the bounds, for searches that go to the ends."""
-    parts = [np.asarray(value, dtype=np.float64) for value in vars(given).values()]
+def integrate_profile(profile: StressProfile, inputs: ShearInputs) -> WheelForces:
+    """As `forces_from_profile` without the check of bounds, for searches over a wide range."""
+    parts = [np.asarray(value, dtype=np.float64) for value in vars(inputs).values()]
     batch = np.broadcast_shapes(*(part.shape for part in parts))
     magnification, modulus, cohesion, friction, slip, radius, width = parts
     angle, arc, normal = (part.reshape(-1, *(1 for _ in batch)) for part in profile.nodes)

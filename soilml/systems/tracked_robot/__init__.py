@@ -1,1 +1,47 @@
-"""A tracked robot: its tests, and the soil from its drawbar pull."""
+"""A robot on two tracks: pull, belt tension, evaluation of sensor signals and soil parameters.
+
+`TrackedRobot` predicts the drawbar pull, `track_balance` the distribution of the load along a belt,
+and `identify_groups` the soil parameters from groups of pulls. `low_pass`, `stationary_mean`,
+`slip_from_displacements` and `rear_sinkage` turn logged signals into the columns of a table.
+Source: Wang, Yan and Du, J. Terramechanics 77, 2018.
+"""
+
+from soilml.systems.tracked_robot.group_identification import GroupFits, identify_groups
+from soilml.systems.tracked_robot.pull_regression import Regression, linear_regression
+from soilml.systems.tracked_robot.robot import (
+    BEYOND_PEAK,
+    GROUSERS,
+    WANG2018,
+    TrackBalance,
+    TrackedRobot,
+    settling_from_moments,
+    track_balance,
+)
+from soilml.systems.tracked_robot.signals import (
+    StationaryMean,
+    low_pass,
+    rear_sinkage,
+    rut_mean,
+    slip_from_displacements,
+    stationary_mean,
+)
+
+__all__ = [
+    "BEYOND_PEAK",
+    "GROUSERS",
+    "WANG2018",
+    "GroupFits",
+    "Regression",
+    "StationaryMean",
+    "TrackBalance",
+    "TrackedRobot",
+    "identify_groups",
+    "linear_regression",
+    "low_pass",
+    "rear_sinkage",
+    "rut_mean",
+    "settling_from_moments",
+    "slip_from_displacements",
+    "stationary_mean",
+    "track_balance",
+]

@@ -1,4 +1,4 @@
-"""Soil from the pull of a tracked robot, group of data by group, and what the average is worth."""
+"""Soil parameters from groups of pulls of a tracked robot, and the uncertainty of their average."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: What the source identifies from the pull alone, in its order.
-FIVE = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")
+#: Parameters that the source identifies from the pull alone, in its order.
+PARAMETERS = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")
 
 
 @dataclass(frozen=True)
-class Groups:
-    """One fit for each group of data, their average, and one fit of all rows together."""
+class GroupFits:
+    """One fit for each group of data, their average, and one fit of all rows pooled."""
 
     fits: tuple[Fit, ...]
-    joint: Fit
+    pooled: Fit
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters that were free."""
-        return self.joint.names
+        return self.pooled.names
 
     @property
     def values(self) -> Floats:
-        """What each group says, (groups, parameters)."""
+        """Fitted values of each group, (groups, parameters)."""
         return np.stack([fit.values for fit in self.fits])
 
     @property
@@ -46,48 +46,48 @@ class Groups:
 
     @property
     def std(self) -> Floats:
-        r"""Expected distance between the average and the truth, (parameters,).
+        r"""Standard deviation of the average, (parameters,).
 
         .. math:: s^2 = \frac{v}{N} + \max(0, \bar{u} - v)
 
-        with v the scatter between the groups and u the squared standard deviation that each fit
-        claims: what the fits do not know beyond what they differ by is common to them all, and
-        averages out of none.
+        with v the variance between the groups and u the variance that each fit reports: the part
+        of u that does not appear as scatter is common to all groups and is not reduced by
+        averaging.
         """
         between = self.values.var(axis=0, ddof=1)
-        claimed = np.mean([fit.std**2 for fit in self.fits], axis=0)
-        return np.asarray(np.sqrt(between / len(self.fits) + np.maximum(claimed - between, 0.0)))
+        reported = np.mean([fit.std**2 for fit in self.fits], axis=0)
+        return np.asarray(np.sqrt(between / len(self.fits) + np.maximum(reported - between, 0.0)))
 
     @property
-    def left(self) -> dict[str, float]:
-        """Share of each prior that a group leaves open, in the mean; 1 where it tells nothing."""
+    def remaining_fraction(self) -> dict[str, float]:
+        """Remaining fraction of each prior's width, averaged over the groups."""
         return {n: float(np.mean([fit.left[n] for fit in self.fits])) for n in self.names}
 
     @property
-    def open(self) -> tuple[str, ...]:
-        """Parameters of which the groups tell hardly anything: the average is mostly prior."""
-        return tuple(name for name, share in self.left.items() if share > HARDLY)
+    def unidentified(self) -> tuple[str, ...]:
+        """Parameters whose average is determined mostly by the prior."""
+        return tuple(name for name, share in self.remaining_fraction.items() if share > HARDLY)
 
 
-def identified(
-    case: Case, tables: Sequence[Table], free: Sequence[str] = FIVE, method: str = "nonlinear"
-) -> Groups:
-    """A fit of each table (`slip`, `load_N`, `drawbar_pull_N`), and one of all rows at once.
+def identify_groups(
+    case: Case, tables: Sequence[Table], free: Sequence[str] = PARAMETERS, method: str = "nonlinear"
+) -> GroupFits:
+    """Fit each table (`slip`, `load_N`, `drawbar_pull_N`), and all rows pooled.
 
-    `method` is `nonlinear`, least squares as the source has it, or `posterior`. References: Wang
-    et al. 2018, section 4.2. Raises `InputError` for fewer than two groups, `FitError` where rows
-    cannot be fitted.
+    `method` is `nonlinear`, least squares as in the source, or `posterior`. Raises `InputError` for
+    fewer than two groups, `FitError` for rows that cannot be fitted. References: Wang et al. 2018,
+    section 4.2.
     """
     if len(tables) < 2:
         raise InputError(f"{len(tables)} groups of data are given; an average needs two or more")
     fits = tuple(identify(case, table, free, method) for table in tables)
     names = [name for name in tables[0].columns if all(name in table for table in tables)]
     rows = {name: np.concatenate([table[name] for table in tables]) for name in names}
-    return Groups(fits, identify(case, Table(rows), free, method))
+    return GroupFits(fits, identify(case, Table(rows), free, method))
 
 
-def driven(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> Table:
-    """A group of data: the pull (N) at these slips (n,) with the case's declared noise."""
+def simulate_group(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> Table:
+    """Simulate a group of data: pull (N) at slips (n,) with the noise declared in the case."""
     force = case.model(case.soil, Operating(slip=slips, load=load))
     key = column("drawbar_pull")
     pull = np.asarray(force.drawbar_pull)
@@ -99,8 +99,8 @@ def driven(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> 
     return Table({"slip": slips, "load_N": np.full(len(slips), load), key: noisy})
 
 
-def predicted(case: Case, fit: Fit, table: Table) -> Floats:
-    """Pull (N) that a case with the fitted values predicts for the rows of a table, (n,)."""
-    found = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
+def predicted_pull(case: Case, fit: Fit, table: Table) -> Floats:
+    """Pull (N) predicted with the fitted values for the rows of a table, (n,)."""
+    fitted = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
     at = Operating(slip=table["slip"], load=table["load_N"])
-    return np.asarray(found.model(found.soil, at).drawbar_pull)
+    return np.asarray(fitted.model(fitted.soil, at).drawbar_pull)

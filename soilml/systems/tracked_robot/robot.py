@@ -1,4 +1,4 @@
-"""A robot on two tracks: its pull, and what holds each track in balance."""
+"""A robot on two tracks: drawbar pull, and the equilibrium of each track."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ from soilml.physics.soils import Soil
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.81
+#: Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5.
+BISECTIONS = 16
 
 
 @dataclass(frozen=True)
-class Robot:
+class TrackedRobot:
     """Two equal track units that carry a mass (kg) together."""
 
     track: Track
@@ -29,23 +31,23 @@ class Robot:
 
     @property
     def load(self) -> float:
-        """What one track carries, N."""
+        """Load on one track, N."""
         return 0.5 * self.mass * GRAVITY
 
     def pull(self, soil: Soil, slip: ArrayLike, effects: tuple[Effect, ...] = ()) -> Floats:
-        """Drawbar pull (N) of both tracks at these slips; NaN where the soil does not carry."""
+        """Drawbar pull (N) of both tracks at slips; NaN where the soil does not carry the load."""
         at = Operating(slip=np.asarray(slip, dtype=np.float64), load=self.load)
         return np.asarray(2.0 * Model(self.track, effects)(soil, at).drawbar_pull)
 
 
-#: The robot of Wang, Yan and Du 2018: mass as printed. Its tracks are not printed, nor what the
-#: belt and soil do when unloaded; with round numbers that fit into 0.820 m x 0.589 m they are: end
-#: wheels of 0.1 m radius 0.6 m apart, belts 0.08 m wide, and the defaults of `Track`.
-WANG2018 = Robot(Track(radius=0.1, width=0.08, base=0.6), mass=130.0)
+#: The robot of Wang, Yan and Du 2018: mass as printed. The dimensions of its tracks and the
+#: unloading of belt and soil are not printed; assumed are round numbers that fit into 0.820 m x
+#: 0.589 m: end wheels of 0.1 m radius 0.6 m apart, belts 0.08 m wide, and the defaults of `Track`.
+WANG2018 = TrackedRobot(Track(radius=0.1, width=0.08, base=0.6), mass=130.0)
 #: Its grousers: 12 mm high as printed, tips on a fifth of the pitch as assumed.
 GROUSERS = TrackGrousers(spacing=0.8, height=0.012)
-#: How the paper's soils shear beyond the peak: eq. 6 has its peak at the printed modulus; loose
-#: sand has no peak, firm clay falls to the usual residual. The ratio is not printed.
+#: Shear of the paper's soils beyond the peak: eq. 6 has its peak at the printed modulus; loose
+#: sand has no peak, firm clay drops to the usual residual. The ratio is not printed.
 BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
     "sand": (),
     "clay": (ShearSoftening(share=1.0, residual=0.7, peak=1.0),),
@@ -53,31 +55,56 @@ BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
 
 
 @dataclass(frozen=True)
-class Balance:
-    """How one track stands; arrays of the operating points' shape."""
+class TrackBalance:
+    """Equilibrium of one track; arrays of the operating points' shape."""
 
     front: Any  # share of the load under the front wheel
     middle: Any  # share under the belt between the wheels
     rear: Any  # share under the rear wheel
     trim: Any  # rad, psi, tail down
     arc_radius: Any  # m, R_t
-    tension: Any  # N, mean tension that the middle arc's pressure and radius ask for
-    gained: Any  # N, what shear adds to the tension from one end of the middle arc to the other
+    tension: Any  # N, mean tension from pressure and radius of the middle arc
+    tension_gain: Any  # N, increase of the tension by shear along the middle arc
     centre: Any  # m, centre of pressure behind the middle of the base
 
 
-def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Balance:
-    r"""Shares of the load, tension and centre of pressure of a track at rest.
+def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> TrackBalance:
+    r"""Distribution of the load, belt tension and centre of pressure of a track in equilibrium.
 
     .. math::
         T = b R_t \bar\sigma, \quad \Delta T = b \int \tau \, ds, \quad
         x = \frac{1}{W} \int (X - x) \, dW
 
-    A belt without stiffness that takes a circular arc has the tension b R_t sigma at every point:
-    with a pressure that changes along the arc no one tension fits, and the mean is given. The trim
-    comes from the balance of displacements; a robot whose centre of mass stands behind the middle
-    of its base by `centre` less (hitch height) DP / W has it. References: Wang et al. 2018,
-    eqs. 3, 8 and 9, in which the tensions at the joints cancel. Raises `InputError` as a model.
+    A belt without bending stiffness on a circular arc has the tension b R_t sigma at every point;
+    since the pressure varies along the arc, the mean tension is returned. The trim angle follows
+    from the displacements of both wheels; it is that of a robot whose centre of mass is behind the
+    middle of its base by `centre` less (hitch height) DP / W.
+
+    Parameters
+    ----------
+    model
+        A model with a track.
+    soil, at
+        Soil parameters, and slip and load of one track.
+    points
+        Points along the belt for the integrals, 3 or more.
+
+    Raises
+    ------
+    InputError
+        If the model has no track, and as the model itself.
+
+    References
+    ----------
+    Wang et al. 2018, eqs. 3, 8 and 9, in which the tensions at the joints cancel.
+
+    Examples
+    --------
+    >>> from soilml import Model, Operating, soil
+    >>> at = Operating(slip=0.2, load=WANG2018.load)
+    >>> balance = track_balance(Model(WANG2018.track), soil("wang2018/sand"), at)
+    >>> [round(float(share), 2) for share in (balance.front, balance.middle, balance.rear)]
+    [0.14, 0.8, 0.05]
     """
     track, force = _track(model), model(soil, at)
     if points < 3:
@@ -98,7 +125,7 @@ def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Bala
     below_front = track.radius * np.sin(belt.entry)
     centre = np.sum(ahead * lift * weight, axis=0) / load - below_front
     length = belt.arc_radius * (belt.leave + belt.meet)
-    return Balance(
+    return TrackBalance(
         front=np.sum(lift * weight * front, axis=0) / load,
         middle=np.sum(lift * weight * middle, axis=0) / load,
         rear=np.sum(lift * weight * rear, axis=0) / load,
@@ -108,46 +135,49 @@ def balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -> Bala
         * belt.arc_radius
         * np.sum(profile.normal * weight * middle, axis=0)
         / length,
-        gained=track.width * np.sum(profile.shear * weight * middle, axis=0),
+        tension_gain=track.width * np.sum(profile.shear * weight * middle, axis=0),
         centre=centre - 0.5 * track.base * np.cos(belt.trim),
     )
 
 
-def settled_by_moments(
+def settling_from_moments(
     model: Model, soil: Soil, at: Operating, *, behind: float = 0.0, hitch: float = 0.0
 ) -> Floats:
-    r"""Settling R_1f at which moments balance about the belt below the middle of the base.
+    r"""Settling R_1f at which the moments about the middle of the belt's base balance.
 
     .. math:: W x(R_{1f}) = W x_m + h \, DP
 
-    with x the centre of pressure, x_m `behind` (m) that of mass behind the middle, h `hitch` (m)
-    the height above the belt at which the payload pulls back. By bisection, to a
-    hundred-thousandth; the shape is that of the operating point, NaN where no settling between 0
-    and 0.5 balances: a robot whose nose digs in. The trim then follows from the load instead of a
-    constant of the soil. Own derivation; Wang et al. 2018 print no balance of moments.
+    with x the centre of pressure, x_m `behind` (m) the distance of the centre of mass behind the
+    middle, and h `hitch` (m) the height above the belt at which the payload pulls back. Solved by
+    bisection to 1e-5; the result has the shape of the operating points and is NaN where no settling
+    between 0 and 0.5 balances (a robot whose front sinks). The trim angle then follows from the
+    load instead of a constant of the soil. Own derivation; Wang et al. 2018 print no balance of
+    moments.
     """
     if not np.isfinite([behind, hitch]).all():
         raise InputError(f"behind is {behind:g} m and hitch {hitch:g} m; both must be numbers")
     track = _track(model)
     shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
-    driven = replace(at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape))
+    conditions = replace(
+        at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape)
+    )
 
     def excess(settling: Floats) -> Floats:
-        there = replace(model, gear=replace(track, settling=settling))
-        need = behind + hitch * there(soil, driven).drawbar_pull / driven.load
-        return np.asarray(balance(there, soil, driven, points=801).centre - need)
+        trimmed = replace(model, gear=replace(track, settling=settling))
+        required = behind + hitch * trimmed(soil, conditions).drawbar_pull / conditions.load
+        return np.asarray(track_balance(trimmed, soil, conditions, points=801).centre - required)
 
     low, high = np.zeros(shape), np.full(shape, 0.5)
-    found = (excess(low) <= 0.0) & (excess(high) >= 0.0)
-    for _ in range(16):
+    solvable = (excess(low) <= 0.0) & (excess(high) >= 0.0)
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        short = excess(middle) < 0.0
-        low, high = np.where(short, middle, low), np.where(short, high, middle)
-    return np.where(found, 0.5 * (low + high), np.nan)
+        too_low = excess(middle) < 0.0
+        low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
+    return np.where(solvable, 0.5 * (low + high), np.nan)
 
 
 def _track(model: Model) -> Track:
-    """The gear; raises `InputError` where it is no track."""
+    """The model's track; raises `InputError` for another gear."""
     if not isinstance(model.gear, Track):
         raise InputError(f"the gear is a {model.gear.name}; this needs a track")
     return model.gear

@@ -1,7 +1,8 @@
-"""What a tracked robot's sensors wrote, made into the columns of a table.
+"""Evaluation of a tracked robot's sensor signals: slip, sinkage and mean pull.
 
-Distances, currents and pulls at one rate are filtered, averaged where they stand still, and joined
-into slip and sinkage. Source: Wang, Yan and Du, J. Terramechanics 77, 2018, sections 3 and 4.1.
+Displacements, pulls and laser distances sampled at one rate are filtered, averaged over their
+stationary part, and converted to slip and sinkage. Source: Wang, Yan and Du, J. Terramechanics 77,
+2018, sections 3 and 4.1.
 """
 
 from __future__ import annotations
@@ -12,25 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soilml.errors import FitError, InputError
+from soilml.errors import FitError, InputError, MissingLibraryError
 
 Floats = NDArray[np.float64]
 
-#: Samples by which a signal is mirrored at its ends before it is filtered.
-MIRRORED = 9
-#: Lowest cutoff as a share of the rate; below it the filter's coefficients cancel.
-SLOWEST = 1e-5
-#: Blocks into which a signal is cut, and the fewest of them that count as standing still.
-BLOCKS, FEWEST = 40, 8
-#: A block mean this many robust standard deviations from the segment's median is none of it.
-FAR = 4.0
-#: Standard deviations by which von Neumann's ratio may fall short of 1.
-SHORT = 2.0
+#: Samples by which a signal is extended at its ends before it is filtered.
+PADDING = 9
+#: Lowest cutoff as a fraction of the sampling rate; below it the coefficients lose their digits.
+MIN_CUTOFF = 1e-5
+#: Blocks into which a signal is divided, and the fewest consecutive ones of a stationary part.
+BLOCKS, MIN_BLOCKS = 40, 8
+#: Robust standard deviations from the median at which a block mean is an outlier.
+MAX_DEVIATION = 4.0
+#: Standard deviations by which von Neumann's ratio may fall below 1.
+RATIO_SIGMAS = 2.0
 
 
 @dataclass(frozen=True)
-class Stationary:
-    """The mean over samples `start` to `stop` (excluded), and its standard error; unit as given."""
+class StationaryMean:
+    """Mean over samples `start` to `stop` (excluded), and its standard error."""
 
     mean: float
     std_error: float
@@ -39,89 +40,94 @@ class Stationary:
 
 
 def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
-    r"""The signal without what is faster than `cutoff` (Hz), not delayed; (n,), sampled at `rate`.
+    r"""Filter a signal (n,) sampled at `rate` (Hz) by a low-pass without delay.
 
     .. math:: |H(f)|^2 = \frac{1}{1 + \Omega^4}, \quad
         \Omega = \frac{\tan(\pi f / f_s)}{\tan(\pi f_c / f_s)}
 
-    A Butterworth filter of second order, run forwards and backwards, so that half of the amplitude
-    is left at the cutoff. Ends are mirrored about their last sample. The source says low-pass only;
-    order and cutoff are ours. References: Butterworth 1930; Gustafsson, IEEE Trans. Signal Proc.
-    44(4), 1996, forward-backward filtering.
+    A second-order Butterworth filter with `cutoff` (Hz), applied forwards and backwards, so that
+    the amplitude at the cutoff is halved. The source states a low-pass only; order and cutoff are
+    our choice. Raises `InputError` for a signal with gaps, or a cutoff out of range. References:
+    Butterworth 1930; Gustafsson, IEEE Trans. Signal Proc. 44(4), 1996.
     """
-    x = _clean(signal, "signal", MIRRORED + 1)
+    x = _check_signal(signal, "signal", PADDING + 1)
     if not (0.0 < rate < math.inf and 0.0 < cutoff < 0.5 * rate):
         raise InputError(
             f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; it must lie between 0 and half that"
         )
-    if cutoff < SLOWEST * rate:
+    if cutoff < MIN_CUTOFF * rate:
         raise InputError(
-            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; below {SLOWEST * rate:g} Hz the "
-            "filter loses its digits: take fewer samples first"
+            f"cutoff is {cutoff:g} Hz at a rate of {rate:g} Hz; below {MIN_CUTOFF * rate:g} Hz the "
+            "filter is inaccurate: reduce the sampling rate first"
         )
-    before = 2.0 * x[0] - x[MIRRORED:0:-1]
-    after = 2.0 * x[-1] - x[-2 : -MIRRORED - 2 : -1]
-    there = _filtered(np.concatenate([before, x, after]), math.tan(math.pi * cutoff / rate))
-    back = _filtered(there[::-1], math.tan(math.pi * cutoff / rate))[::-1]
-    return back[MIRRORED:-MIRRORED].copy()
+    try:
+        from scipy.signal import butter, filtfilt
+    except ImportError:
+        raise MissingLibraryError("low_pass needs scipy: pip install 'soilml[ground]'") from None
+    b, a = butter(2, cutoff, fs=rate)
+    return np.asarray(filtfilt(b, a, x, padlen=PADDING), dtype=np.float64)
 
 
-def stationary(signal: ArrayLike, above: float = -math.inf) -> Stationary:
-    r"""The longest part of a signal (n,) that stands still, its mean and the mean's standard error.
+def stationary_mean(signal: ArrayLike, above: float = -math.inf) -> StationaryMean:
+    r"""Mean and standard error over the longest stationary part of a signal (n,).
 
     .. math::
         \eta = \frac{\sum (m_{i+1} - m_i)^2}{2 \sum (m_i - \bar m)^2}, \quad
         \eta \ge 1 - 2 \sqrt{\frac{k - 2}{k^2 - 1}}, \quad
         s_{\bar m}^2 = \frac{\sum (m_i - \bar m)^2}{k (k - 1)}
 
-    over the means m of k blocks, a fortieth of the signal each: they drift, or remember each other,
-    where the ratio is small. Their scatter holds what samples within a block have in common, which
-    the scatter of samples does not. Parts in which a block stands out are none, nor are blocks
-    whose mean is not above `above` (unit of the signal): waiting before the pull stands still too.
-    Raises `FitError` where no eight blocks together stand still. References: von Neumann, Ann.
-    Math. Stat. 12(4), 1941; Fishman, Oper. Res. 26(5), 1978, batch means. Memory longer than a
-    block is taken for drift, and the part found is then too short.
+    over the means m of k consecutive blocks, a fortieth of the signal each: the ratio is small if
+    they drift or are correlated. Their scatter includes correlations within a block, which the
+    scatter of samples does not. Parts with an outlying block, or with a block mean not above
+    `above` (unit of the signal), are excluded: the pause before a pull is stationary too.
+    Correlations over more than a block are interpreted as drift, and the part found is then too
+    short. Raises `FitError` if no eight blocks are stationary. References: von Neumann, Ann. Math.
+    Stat. 12(4), 1941; Fishman, Oper. Res. 26(5), 1978, batch means.
     """
-    x = _clean(signal, "signal", 4 * BLOCKS)
+    x = _check_signal(signal, "signal", 4 * BLOCKS)
     size = len(x) // BLOCKS
     means = x[: size * BLOCKS].reshape(BLOCKS, size).mean(axis=1)
-    for count in range(BLOCKS, FEWEST - 1, -1):
+    for count in range(BLOCKS, MIN_BLOCKS - 1, -1):
         parts = np.lib.stride_tricks.sliding_window_view(means, count)
-        still = _still(parts) & (parts > above).all(axis=1)
-        if still.any():
-            scatter = np.where(still, parts.var(axis=1, ddof=1), np.inf)
-            first = int(np.argmin(scatter))
-            error = math.sqrt(float(scatter[first]) / count)
-            return Stationary(
-                float(parts[first].mean()), error, first * size, (first + count) * size
-            )
+        accepted = _is_stationary(parts) & (parts > above).all(axis=1)
+        if accepted.any():
+            variance = np.where(accepted, parts.var(axis=1, ddof=1), np.inf)
+            first = int(np.argmin(variance))
+            error = math.sqrt(float(variance[first]) / count)
+            mean = float(parts[first].mean())
+            return StationaryMean(mean, error, first * size, (first + count) * size)
     raise FitError(
-        f"no {FEWEST} of {BLOCKS} blocks of the signal stand still together: record for longer at "
-        "one pull, or filter what swings more slowly than a block"
+        f"no {MIN_BLOCKS} consecutive blocks of {BLOCKS} are stationary: record for longer at one "
+        "pull, or filter oscillations slower than a block"
     )
 
 
-def slip_of_displacements(track: ArrayLike, robot: ArrayLike, span: int) -> Floats:
-    r"""Slip ratio over each window of `span` samples, (n - span,), from two ways gone (m), (n,).
+def slip_from_displacements(track: ArrayLike, robot: ArrayLike, span: int) -> Floats:
+    r"""Slip ratio over windows of `span` samples, (n - span,), from displacements (m), (n,).
 
     .. math:: i = \frac{\Delta L_t - \Delta L}{\Delta L_t}
 
-    of the belt and of the robot. References: Wang et al. 2018, section 4.1.1. For driving: where
-    the belt does not move forward within a window there is no slip ratio, and `InputError` is
-    raised.
+    of the belt and of the robot. For driving only: `InputError` is raised if the belt does not move
+    forward within a window. References: Wang et al. 2018, section 4.1.1.
+
+    Examples
+    --------
+    >>> belt = np.linspace(0.0, 2.0, 201)
+    >>> slip_from_displacements(belt, 0.7 * belt, span=100)[:2].round(3)
+    array([0.3, 0.3])
     """
-    belt, ground = _clean(track, "track", 2), _clean(robot, "robot", 2)
-    _alike(track=belt, robot=ground)
+    belt, ground = _check_signal(track, "track", 2), _check_signal(robot, "robot", 2)
+    _check_lengths(track=belt, robot=ground)
     if not 1 <= span < len(belt):
         raise InputError(f"span is {span} samples; it must lie between 1 and {len(belt) - 1}")
-    gone = belt[span:] - belt[:-span]
-    if np.any(gone <= 0.0):
-        place = int(np.argmin(gone))
+    advance = belt[span:] - belt[:-span]
+    if np.any(advance <= 0.0):
+        worst = int(np.argmin(advance))
         raise InputError(
-            f"the track moves by {gone[place]:.3g} m from sample {place} on; it must move forward "
-            "within each span: cut the signals, or widen span"
+            f"the track moves by {advance[worst]:.3g} m from sample {worst} on; it must move "
+            "forward within each span: cut the signals, or widen span"
         )
-    return np.asarray((gone - (ground[span:] - ground[:-span])) / gone)
+    return np.asarray((advance - (ground[span:] - ground[:-span])) / advance)
 
 
 def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: float) -> Floats:
@@ -129,35 +135,36 @@ def rear_sinkage(rear: ArrayLike, front: ArrayLike, angle: ArrayLike, spacing: f
 
     .. math:: z_r = l_r + L \sin\delta - l_f
 
-    `angle` is positive with the tail down, `spacing` L (m) that of the sensors; arrays (n,).
-    References: Wang et al. 2018, eq. 15, which prints l_r twice; the second is the front reading,
-    without which a level robot on unmarked ground would have a sinkage. For angles so small that
-    the beams stand upright.
+    `angle` is positive with the tail down, `spacing` L (m) that of the sensors; arrays (n,). Valid
+    for small angles, at which the beams are nearly vertical. References: Wang et al. 2018, eq. 15,
+    which prints l_r twice; the second must be the front reading, or a level robot on undisturbed
+    ground would have a sinkage.
     """
     l_r, l_f, delta = (
-        _clean(x, name, 1) for x, name in ((rear, "rear"), (front, "front"), (angle, "angle"))
+        _check_signal(x, name, 1)
+        for x, name in ((rear, "rear"), (front, "front"), (angle, "angle"))
     )
-    _alike(rear=l_r, front=l_f, angle=delta)
+    _check_lengths(rear=l_r, front=l_f, angle=delta)
     if not 0.0 < spacing < math.inf:
         raise InputError(f"spacing is {spacing:g} m; it must be above 0")
     if np.abs(delta).max() >= 0.5 * math.pi:
-        place = int(np.abs(delta).argmax())
+        worst = int(np.abs(delta).argmax())
         raise InputError(
-            f"angle is {delta[place]:g} at sample {place}; needed is an inclination in rad"
+            f"angle is {delta[worst]:g} at sample {worst}; needed is an inclination in rad"
         )
     return np.asarray(l_r + spacing * np.sin(delta) - l_f)
 
 
 def rut_mean(crest: ArrayLike, bottom: ArrayLike, crest_length: float, pitch: float) -> Floats:
-    r"""Nominal sinkage (m) of a rut with the marks of grousers, that keeps the soil's volume.
+    r"""Nominal sinkage (m) of a rut with grouser marks that has the same volume of soil.
 
     .. math:: z = \frac{L_1}{L} z_2 + \frac{L - L_1}{L} z_1
 
-    z_2 is `crest` (m), read over the length L_1, z_1 `bottom` (m) over the rest of the pitch L;
+    z_2 is `crest` (m), over the length L_1, z_1 `bottom` (m) over the rest of the pitch L;
     arrays (n,). References: Wang et al. 2018, eqs. 16-17.
     """
-    upper, lower = _clean(crest, "crest", 1), _clean(bottom, "bottom", 1)
-    _alike(crest=upper, bottom=lower)
+    upper, lower = _check_signal(crest, "crest", 1), _check_signal(bottom, "bottom", 1)
+    _check_lengths(crest=upper, bottom=lower)
     if not 0.0 <= crest_length <= pitch or pitch <= 0.0:
         raise InputError(
             f"crest_length is {crest_length:g} m with a pitch of {pitch:g} m; it must lie between "
@@ -167,53 +174,35 @@ def rut_mean(crest: ArrayLike, bottom: ArrayLike, crest_length: float, pitch: fl
     return np.asarray(share * upper + (1.0 - share) * lower)
 
 
-def _filtered(x: Floats, k: float) -> Floats:
-    """One run of the filter; k is the tangent of half the cutoff. It starts at rest at x[0]."""
-    scale = 1.0 / (1.0 + math.sqrt(2.0) * k + k * k)
-    b, a1, a2 = (
-        k * k * scale,
-        2.0 * (k * k - 1.0) * scale,
-        (1.0 - math.sqrt(2.0) * k + k * k) * scale,
-    )
-    first, second = float(x[0]) * (1.0 - b), float(x[0]) * (b - a2)
-    out = []
-    for value in x.tolist():
-        y = b * value + first
-        first = 2.0 * b * value - a1 * y + second
-        second = b * value - a2 * y
-        out.append(y)
-    return np.asarray(out)
-
-
-def _still(parts: Floats) -> NDArray[np.bool_]:
-    """Which rows of block means (parts, k) neither drift nor hold a block that stands out."""
+def _is_stationary(parts: Floats) -> NDArray[np.bool_]:
+    """Which rows of block means (parts, k) neither drift nor contain an outlier."""
     k = parts.shape[1]
-    off = parts - parts.mean(axis=1, keepdims=True)
-    square = np.sum(off**2, axis=1)
-    change = np.sum(np.diff(parts, axis=1) ** 2, axis=1)
-    even = change >= 2.0 * square * (1.0 - SHORT * math.sqrt((k - 2) / (k * k - 1)))
-    away = np.abs(parts - np.median(parts, axis=1, keepdims=True))
-    spread = 1.4826 * np.median(away, axis=1)
-    return np.asarray(even & (away.max(axis=1) <= FAR * spread + 1e-12 * np.abs(parts).max(axis=1)))
+    squares = np.sum((parts - parts.mean(axis=1, keepdims=True)) ** 2, axis=1)
+    changes = np.sum(np.diff(parts, axis=1) ** 2, axis=1)
+    limit = 1.0 - RATIO_SIGMAS * math.sqrt((k - 2) / (k * k - 1))
+    no_drift = changes >= 2.0 * squares * limit
+    deviation = np.abs(parts - np.median(parts, axis=1, keepdims=True))
+    robust_std = 1.4826 * np.median(deviation, axis=1)
+    rounding = 1e-12 * np.abs(parts).max(axis=1)
+    no_outlier = deviation.max(axis=1) <= MAX_DEVIATION * robust_std + rounding
+    return np.asarray(no_drift & no_outlier)
 
 
-def _clean(signal: ArrayLike, name: str, fewest: int) -> Floats:
-    """A signal as an array (n,); raises `InputError` where it is short, or has a hole."""
+def _check_signal(signal: ArrayLike, name: str, fewest: int) -> Floats:
+    """A signal as an array (n,); raises `InputError` if it is too short or has gaps."""
     x = np.asarray(signal, dtype=np.float64)
     if x.ndim != 1 or len(x) < fewest:
         raise InputError(
             f"{name} has the shape {x.shape}; needed is one row of {fewest} samples or more"
         )
     if not np.isfinite(x).all():
-        place = int(np.argmin(np.isfinite(x)))
-        raise InputError(
-            f"{name} is {x[place]} at sample {place}; fill or cut what was not measured"
-        )
+        first = int(np.argmin(np.isfinite(x)))
+        raise InputError(f"{name} is {x[first]} at sample {first}; fill or cut missing samples")
     return x
 
 
-def _alike(**signals: Floats) -> None:
-    """Raise `InputError` where signals that belong together differ in length."""
+def _check_lengths(**signals: Floats) -> None:
+    """Raise `InputError` if simultaneous signals differ in length."""
     if len({len(x) for x in signals.values()}) > 1:
-        told = ", ".join(f"{name} {len(x)}" for name, x in signals.items())
-        raise InputError(f"signals of one length are needed; given are samples: {told}")
+        lengths = ", ".join(f"{name} {len(x)}" for name, x in signals.items())
+        raise InputError(f"signals of one length are needed; samples: {lengths}")

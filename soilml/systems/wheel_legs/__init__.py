@@ -1,1 +1,55 @@
-"""Wheel-legs: their walk over time, their slip, and the soil from both."""
+"""Wheel-legs: walking by resistive-force theory, slip models, and soil parameters from both.
+
+`walk` simulates `WheelLeg`s on `LinearGround`s over time and `gait_metrics` summarises a turn; the
+slip models `TORQUE_SLIP` and `VIBRATION_SLIP`, `soil_from_torque`, `soil_from_vibration` and
+`fit_sinkage` estimate slip and soil from torque, vibration and sinkage. Source: Comin and Saaj,
+IEEE Transactions on Robotics 33(6), 2017.
+"""
+
+from soilml.systems.wheel_legs.sensing.sinkage_fit import SinkageFit, fit_sinkage
+from soilml.systems.wheel_legs.sensing.slip_models import (
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
+    TorqueSlip,
+    VibrationSlip,
+)
+from soilml.systems.wheel_legs.sensing.soil_from_slip import (
+    LegSoil,
+    soil_from_torque,
+    soil_from_vibration,
+)
+from soilml.systems.wheel_legs.sensing.stick_slip import (
+    SpringLeg,
+    simulate_stance,
+    vibration_amplitude,
+)
+from soilml.systems.wheel_legs.walking.gait_metrics import GaitMetrics, gait_metrics
+from soilml.systems.wheel_legs.walking.geometry import FEET, WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS, LinearGround
+from soilml.systems.wheel_legs.walking.trajectory import WalkStatus
+from soilml.systems.wheel_legs.walking.walk import Walk, walk
+
+__all__ = [
+    "FEET",
+    "GROUNDS",
+    "TORQUE_SLIP",
+    "VIBRATION_SLIP",
+    "GaitMetrics",
+    "LegSoil",
+    "LinearGround",
+    "SinkageFit",
+    "SpringLeg",
+    "TorqueSlip",
+    "VibrationSlip",
+    "Walk",
+    "WalkStatus",
+    "WheelLeg",
+    "fit_sinkage",
+    "gait_metrics",
+    "simulate_stance",
+    "soil_from_torque",
+    "soil_from_vibration",
+    "vibration_amplitude",
+    "walk",
+    "wheel_leg",
+]

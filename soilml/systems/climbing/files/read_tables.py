@@ -1,4 +1,4 @@
-"""Tables of climbs and of rim stresses, joined wheel by wheel."""
+"""Read the tables of climbs and of rim stresses, and combine them wheel by wheel."""
 
 from __future__ import annotations
 
@@ -17,44 +17,48 @@ from soilml.systems.force_sensor_wheel import StressProfile
 
 Floats = NDArray[np.float64]
 
-#: What the tables must hold; slip, or speed_m_s and rim_speed_m_s.
-CLIMBS = ("run", "wheel", "slope_rad")
-STRESSES = ("run", "wheel", "angle_rad", "normal_Pa")
-#: Slips of a run in both tables must agree so well.
-ALIKE = 1e-3
+#: Required columns; in addition slip, or speed_m_s and rim_speed_m_s.
+CLIMB_COLUMNS = ("run", "wheel", "slope_rad")
+STRESS_COLUMNS = ("run", "wheel", "angle_rad", "normal_Pa")
+#: Largest difference between the slips of a run in both tables.
+SLIP_TOLERANCE = 1e-3
 
 Key = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Driven:
-    """Climbs, and every stress that was measured at a slip, on climbs or not."""
+class ClimbData:
+    """Climbs, and all stresses measured at a known slip, on climbs or on level ground."""
 
     climbs: tuple[Climb, ...]
     front: tuple[WheelRun, ...]
     rear: tuple[WheelRun, ...]
 
 
-def read_driven(runs: str, stresses: str, noise: Noise, *, ignore_extra: bool = False) -> Driven:
-    """Join a table of climbs and one of stresses; raises `TableError` naming file and row.
+def read_climb_data(
+    runs: str, stress_path: str, noise: Noise, *, ignore_extra: bool = False
+) -> ClimbData:
+    """Read a table of climbs and one of stresses; raises `TableError` naming file and row.
 
-    A climb has a row for its front and one for its rear wheel, and both have stresses. Stresses
-    of other runs, such as artificial slip on the flat, need a slip of their own. `noise` is that
+    A climb has one row for its front and one for its rear wheel, and stresses of both. Stresses of
+    other runs, such as artificial slip on level ground, need a slip of their own. `noise` is that
     of the stress where the table has no normal_Pa_std.
     """
-    filled = (*CLIMBS, "slip", "speed_m_s", "rim_speed_m_s")
-    climbed = read_table(runs, CLIMBS, filled=filled, ignore_extra=ignore_extra)
-    felt = read_table(stresses, STRESSES, filled=STRESSES, ignore_extra=ignore_extra)
-    for table, known in ((climbed, ()), (felt, ("normal_Pa_std",))):
+    filled = (*CLIMB_COLUMNS, "slip", "speed_m_s", "rim_speed_m_s")
+    climbed = read_table(runs, CLIMB_COLUMNS, filled=filled, ignore_extra=ignore_extra)
+    stresses = read_table(
+        stress_path, STRESS_COLUMNS, filled=STRESS_COLUMNS, ignore_extra=ignore_extra
+    )
+    for table, known in ((climbed, ()), (stresses, ("normal_Pa_std",))):
         for name in table.columns:
             if name.endswith("_std") and name not in known:
-                raise TableError(f"{table.source}: column {name} is not read; say it in [noise]")
+                raise TableError(f"{table.source}: column {name} is not read; set it in [noise]")
         _check_wheels(table)
     slips = _slips(climbed)
-    wheels = _wheel_runs(felt, slips, noise, str(runs))
-    return Driven(
+    wheels = _wheel_runs(stresses, slips, noise, str(runs))
+    return ClimbData(
         climbs=tuple(
-            Climb(name, _slope(rows, name), *(_wheel(wheels, name, w, felt) for w in WHEELS))
+            Climb(name, _slope(rows, name), *(_wheel(wheels, name, w, stresses) for w in WHEELS))
             for name, rows in climbed.groups()
             if _has_both(rows, name)
         ),
@@ -109,14 +113,14 @@ def _slip_of_speeds(climbed: Table) -> Floats:
 
 
 def _wheel_runs(
-    felt: Table, slips: dict[Key, float], noise: Noise, runs: str
+    stresses: Table, slips: dict[Key, float], noise: Noise, runs: str
 ) -> dict[Key, WheelRun]:
     """The stress of each wheel in each run, at its slip."""
     found: dict[Key, WheelRun] = {}
-    for name, rows in felt.groups():
+    for name, rows in stresses.groups():
         for wheel in dict.fromkeys(rows["wheel"].tolist()):
             own = rows.rows(rows["wheel"] == wheel)
-            where = f"{felt.source} lines {own.line[0]} to {own.line[-1]}, run {name}, {wheel}"
+            where = f"{stresses.source} lines {own.line[0]} to {own.line[-1]}, run {name}, {wheel}"
             order = np.argsort(own["angle_rad"], kind="stable")
             try:
                 profile = StressProfile(own["angle_rad"][order], own["normal_Pa"][order])
@@ -132,18 +136,20 @@ def _wheel_runs(
 
 
 def _slip(rows: Table, climbed: float | None, where: str, runs: str) -> float:
-    """The slip of one wheel in one run, which the table of climbs or that of stresses gives."""
+    """Slip of one wheel in one run, from the table of climbs or from that of stresses."""
     read = rows["slip"] if "slip" in rows else np.full(len(rows), np.nan)
     read = read[~np.isnan(read)]
     if len(read) and np.ptp(read) > 0.0:
-        raise TableError(f"{where}: slip runs from {read.min():g} to {read.max():g}; needed is one")
+        raise TableError(
+            f"{where}: slip ranges from {read.min():g} to {read.max():g}; needed is one value"
+        )
     if climbed is None and len(read) == 0:
         raise TableError(
             f"{where}: no slip; needed is column slip here, or this run and wheel in {runs}"
         )
     if climbed is None:
         return float(read[0])
-    if len(read) and abs(read[0] - climbed) > ALIKE:
+    if len(read) and abs(read[0] - climbed) > SLIP_TOLERANCE:
         raise TableError(f"{where}: slip is {read[0]:.4g} here and {climbed:.4g} in {runs}")
     return climbed
 
@@ -152,8 +158,8 @@ def _slope(rows: Table, name: str) -> float:
     slope = rows["slope_rad"]
     if np.ptp(slope) > 0.0:
         raise TableError(
-            f"{rows.place(1)}, column slope_rad: run {name} stands on {slope[0]:g} and on "
-            f"{slope[1]:g} rad; needed is one slope for a run"
+            f"{rows.place(1)}, column slope_rad: run {name} has slopes of {slope[0]:g} and "
+            f"{slope[1]:g} rad; needed is one slope per run"
         )
     return float(slope[0])
 
@@ -162,15 +168,15 @@ def _has_both(rows: Table, name: str) -> bool:
     missing = [wheel for wheel in WHEELS if wheel not in rows["wheel"]]
     if missing:
         raise TableError(
-            f"{rows.place(0)}: run {name} has no row for its {missing[0]} wheel; both carry the "
-            "rover"
+            f"{rows.place(0)}: run {name} has no row for its {missing[0]} wheel; both wheels are "
+            "needed"
         )
     return True
 
 
-def _wheel(wheels: dict[Key, WheelRun], name: str, wheel: str, felt: Table) -> WheelRun:
+def _wheel(wheels: dict[Key, WheelRun], name: str, wheel: str, stresses: Table) -> WheelRun:
     if (name, wheel) not in wheels:
         raise TableError(
-            f"{felt.source}: no stress of the {wheel} wheel in run {name}, which was a climb"
+            f"{stresses.source}: no stress of the {wheel} wheel in run {name}, which is a climb"
         )
     return wheels[name, wheel]

@@ -1,4 +1,4 @@
-"""The whole way from files to climbing ability, and what may be said of it."""
+"""From measured climbs to climbing ability: the report of `soilml climb`."""
 
 from __future__ import annotations
 
@@ -10,40 +10,44 @@ from numpy.typing import NDArray
 
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.ability import (
-    Ability,
     Band,
+    ClimbingAbility,
     band,
     check_slip,
     climbing_ability,
     shared_slips,
 )
-from soilml.systems.climbing.files.read_tables import Driven
+from soilml.systems.climbing.files.read_tables import ClimbData
 from soilml.systems.climbing.files.rover_file import RoverFile
-from soilml.systems.climbing.identify import Ground, identify_ground
-from soilml.systems.climbing.modulus_per_climb import modulus_of_each
+from soilml.systems.climbing.identify import GroundEstimate, identify_ground
+from soilml.systems.climbing.shear_modulus_per_climb import modulus_per_climb
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 
 Floats = NDArray[np.float64]
 
-#: Share of draws that still climb better at the highest slip, above which that is said.
-OPEN = 0.05
-#: Share by which speeds are taken to be off for the table of k_x by run, as in Fig. 9.
+#: Fraction of samples whose slope still rises at the highest slip, above which a warning is given.
+MAX_STILL_RISING = 0.05
+#: Slips within this many standard deviations of zero have no certain sign.
+ZERO_SLIP_SIGMAS = 2.0
+#: Distance from the curve's range at which the slip of a climb counts as outside.
+SLIP_MARGIN = 0.02
+#: Relative error of the speeds assumed for the table of k_x by run, as in Fig. 9.
 SPEED_ERROR = 0.015
 
 
 @dataclass(frozen=True)
 class ClimbingReport:
-    """Ground, climbing ability, each climb on its own, and warnings."""
+    """Soil, climbing ability, the shear modulus of each climb alone, and warnings."""
 
-    ground: Ground
-    ability: Ability
-    driven: Driven
-    each: dict[float, Floats]  # speed error -> k_x of each climb, m
+    ground: GroundEstimate
+    ability: ClimbingAbility
+    data: ClimbData
+    modulus_per_climb: dict[float, Floats]  # speed error -> k_x of each climb, m
     slip_limit: float | None
 
     @property
     def pull(self) -> Band:
-        """Drawbar pull on the flat over the slips of `ability`, N."""
+        """Drawbar pull on level ground over the slips of `ability`, N."""
         return band(self.ability.pull)
 
     @property
@@ -53,48 +57,51 @@ class ClimbingReport:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before believing it."""
-        said = list(self.ground.fit.warnings)
+        """Limitations of the data and of the estimate."""
+        warnings = list(self.ground.fit.warnings)
         highest, lowest = self.ability.slip[-1], self.ability.slip[0]
-        if self.ability.open_end > OPEN:
-            said.append(
-                f"in {self.ability.open_end:.0%} of the draws slopes still rise with slip at "
-                f"{highest:.2f}, where the stresses end: measure stress at higher slips"
+        if self.ability.fraction_still_rising > MAX_STILL_RISING:
+            warnings.append(
+                f"in {self.ability.fraction_still_rising:.0%} of the samples the slope still rises "
+                f"with slip at {highest:.2f}, the end of the curve: measure stress at higher slips"
             )
         noise = self.ground.noise
-        still = [
+        zero_slip = [
             climb.name
-            for climb in self.driven.climbs
+            for climb in self.data.climbs
             if any(
-                abs(w.slip) < 2.0 * np.hypot(noise.speed, noise.speed_scale) for w in climb.wheels
+                abs(w.slip) < ZERO_SLIP_SIGMAS * np.hypot(noise.speed, noise.speed_scale)
+                for w in climb.wheels
             )
         ]
-        if still:
-            said.append(
-                f"slip is nil within its noise in run {', '.join(still)}: which way the soil is "
-                "sheared there is not known"
+        if zero_slip:
+            warnings.append(
+                f"slip is zero within its noise in run {', '.join(zero_slip)}: the direction of "
+                "the shear displacement there is not known"
             )
         outside = [
             c.name
-            for c in self.driven.climbs
-            if not all(lowest - 0.02 <= wheel.slip <= highest + 0.02 for wheel in c.wheels)
+            for c in self.data.climbs
+            if not all(
+                lowest - SLIP_MARGIN <= wheel.slip <= highest + SLIP_MARGIN for wheel in c.wheels
+            )
         ]
         if outside:
-            said.append(f"the curve does not reach the slip of run {', '.join(outside)}")
+            warnings.append(f"the slip of run {', '.join(outside)} lies outside the curve")
         most = float(band(self.ability.steepest).upper)
-        said += [
-            f"run {climb.name} climbed {climb.slope:.3g} rad, more than is predicted ({most:.3g} "
-            "at most): it disagrees with the others"
-            for climb in self.driven.climbs
+        warnings += [
+            f"run {climb.name} climbed {climb.slope:.3g} rad, more than predicted (at most "
+            f"{most:.3g}): it is inconsistent with the others"
+            for climb in self.data.climbs
             if climb.slope > most
         ]
-        return tuple(said)
+        return tuple(warnings)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml climb` writes."""
         fit = self.ground.fit.as_json()
         fit["given"] = {
-            name: float(self.ground.draws[0, i])
+            name: float(self.ground.samples[0, i])
             for i, name in enumerate(SHEAR)
             if name not in self.ground.fit.names
         }
@@ -108,11 +115,11 @@ class ClimbingReport:
                     "slope_rad": climb.slope,
                     "slip_front": climb.front.slip,
                     "slip_rear": climb.rear.slip,
-                    "off_N": float(off),
+                    "off_N": float(residual),
                     "off_N_std": float(std),
                 }
-                for climb, off, std in zip(
-                    self.driven.climbs, self.ground.off, self.ground.off_std, strict=True
+                for climb, residual, std in zip(
+                    self.data.climbs, self.ground.residual, self.ground.residual_std, strict=True
                 )
             ],
             "curve": {
@@ -132,32 +139,32 @@ class ClimbingReport:
         return content
 
 
-def _listed(found: Band) -> dict[str, Any]:
+def _listed(interval: Band) -> dict[str, Any]:
     names = ("median", "p05", "p95")
-    values = (found.middle, found.lower, found.upper)
+    values = (interval.middle, interval.lower, interval.upper)
     return {n: np.asarray(v).tolist() for n, v in zip(names, values, strict=True)}
 
 
 def climbing_report(
-    file: RoverFile, driven: Driven, *, slip_limit: float | None = None, seed: int = 0
+    file: RoverFile, data: ClimbData, *, slip_limit: float | None = None, seed: int = 0
 ) -> ClimbingReport:
-    """Identify the ground, take stress against slip, and predict the climbs."""
-    front, rear = StressBySlip.of(driven.front), StressBySlip.of(driven.rear)
+    """Identify the soil, fit stress against slip, and predict the climbing ability."""
+    front, rear = StressBySlip.fit(data.front), StressBySlip.fit(data.rear)
     if slip_limit is not None:
         check_slip(slip_limit, shared_slips(front, rear))
     ground = identify_ground(
-        file.rover, driven.climbs, given=file.given, prior=file.prior, noise=file.noise, seed=seed
+        file.rover, data.climbs, fixed=file.fixed, prior=file.prior, noise=file.noise, seed=seed
     )
     ability = climbing_ability(ground, front, rear, seed=seed)
     cohesion, friction, _ = ground.shear
-    each = {
-        error: modulus_of_each(
+    by_speed_error = {
+        error: modulus_per_climb(
             file.rover,
-            driven.climbs,
+            data.climbs,
             cohesion=cohesion,
             friction_angle=friction,
             speed_error=error,
         )
         for error in (-SPEED_ERROR, 0.0, SPEED_ERROR)
     }
-    return ClimbingReport(ground, ability, driven, each, slip_limit)
+    return ClimbingReport(ground, ability, data, by_speed_error, slip_limit)

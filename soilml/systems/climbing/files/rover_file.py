@@ -1,4 +1,4 @@
-"""A rover's file: its size, what is known of the ground, and its sensors."""
+"""The rover file: dimensions, known soil parameters, priors and sensor noise."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from soilml.parameters import Parameter, check, declared
 from soilml.systems.climbing.climb import Uncertainty
 from soilml.systems.climbing.rover import Rover
 
-#: Share by which a stress reading errs, where [noise] does not say.
-STRESS = Noise(share=0.05)
+#: Noise of the stress where [noise] has no normal_Pa.
+DEFAULT_STRESS_NOISE = Noise(share=0.05)
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Held:
-    """Shear parameters of the ground that are known."""
+class FixedShearParameters:
+    """Shear parameters of the soil with known values."""
 
     cohesion: Annotated[float | None, Parameter("Pa", 0.0, 1e6, "c")] = None
     friction_angle: Annotated[float | None, Parameter("rad", 0.02, 1.4, "phi")] = None
@@ -31,10 +31,10 @@ class Held:
 
 @dataclass(frozen=True)
 class RoverFile:
-    """What a rover's file says."""
+    """Content of a rover file."""
 
     rover: Rover
-    given: dict[str, float]
+    fixed: dict[str, float]
     prior: dict[str, Prior]
     noise: Uncertainty
     stress: Noise
@@ -54,25 +54,27 @@ def read_rover(path: str | os.PathLike[str]) -> RoverFile:
         check(rover)
     except InputError as error:
         own.fail(str(error))
-    given, prior = _take_ground(settings.table("soil"))
+    fixed, prior = _take_ground(settings.table("soil"))
     noise, stress = _take_noise(settings.table("noise"))
     settings.finish()
-    return RoverFile(rover, given, prior, noise, stress)
+    return RoverFile(rover, fixed, prior, noise, stress)
 
 
 def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]]:
-    """Numbers are held; ranges in [soil.prior] are searched."""
+    """Numbers in [soil] are fixed; ranges in [soil.prior] are priors."""
     ranges, prior = settings.table("prior"), {}
-    given = {name: settings.number(name) for name in declared(Held) if name in settings}
-    settings.knows(declared(Held))
+    fixed = {
+        name: settings.number(name) for name in declared(FixedShearParameters) if name in settings
+    }
+    settings.knows(declared(FixedShearParameters))
     settings.finish()
-    check(Held(**given), f"{settings.where} ")
-    ranges.knows(declared(Held))
-    for name, parameter in declared(Held).items():
+    check(FixedShearParameters(**fixed), f"{settings.where} ")
+    ranges.knows(declared(FixedShearParameters))
+    for name, parameter in declared(FixedShearParameters).items():
         if name not in ranges:
             continue
-        if name in given:
-            ranges.fail(f"{name} is a number in [soil] and has a range here; one of both must go")
+        if name in fixed:
+            ranges.fail(f"{name} is a number in [soil] and has a range here; remove one of them")
         taken = take_prior(ranges, name)
         if not parameter.lower <= taken.lower < taken.upper <= parameter.upper:
             ranges.fail(
@@ -83,21 +85,23 @@ def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]
             taken = Prior(taken.lower, taken.upper, log=True)
         prior[name] = taken
     ranges.finish()
-    return given, prior
+    return fixed, prior
 
 
 def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
-    """Standard deviations by column, and two that no column has."""
-    usual = Uncertainty()
-    stress = take_noise(settings, "normal_Pa") if "normal_Pa" in settings else STRESS
-    speed = usual.speed
+    """Standard deviations by column, and those of speed scale and front load."""
+    defaults = Uncertainty()
+    stress = take_noise(settings, "normal_Pa") if "normal_Pa" in settings else DEFAULT_STRESS_NOISE
+    speed = defaults.speed
     if "speed_m_s" in settings:
         taken = take_noise(settings, "speed_m_s")
         if taken.constant:
-            settings.fail("speed_m_s must be a share, such as '0.9 %': slip needs no more")
+            settings.fail(
+                "speed_m_s must be a percentage, such as '0.9 %': slip is a ratio of speeds"
+            )
         speed = taken.share
     numbers = {
-        name: settings.number(key, getattr(usual, name))
+        name: settings.number(key, getattr(defaults, name))
         for name, key in (
             ("slope", "slope_rad"),
             ("entry_angle", "entry_angle_rad"),
@@ -111,5 +115,5 @@ def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
     settings.finish()
     for name, value in numbers.items():
         if not 0.0 <= value < 1.0:
-            settings.fail(f"{name} is {value:g}; a standard deviation lies between 0 and 1")
+            settings.fail(f"{name} is {value:g}; a standard deviation must lie in [0, 1)")
     return Uncertainty(speed=speed, **numbers), stress

@@ -1,1 +1,1 @@
-"""Slip and soil from the torque, vibration and sinkage of a wheel-leg."""
+"""Slip and soil parameters from torque, vibration and sinkage of a wheel-leg."""

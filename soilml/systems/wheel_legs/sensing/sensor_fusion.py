@@ -1,4 +1,4 @@
-"""Torque, vibration and sinkage each say something of the soil: which rule joins them best."""
+"""Fusion of soil estimates from torque, vibration and sinkage, compared over several rules."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import FitError
 from soilml.numerics.estimate_fusion import FusedEstimate, best_linear, inverse_variance, pairwise
-from soilml.systems.wheel_legs.sensing.simulated_stances import Felt
+from soilml.systems.wheel_legs.sensing.simulated_stances import StanceReadings
 from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, PRESSURE
 
 Floats = NDArray[np.float64]
@@ -22,18 +22,19 @@ RULES: dict[str, Rule] = {
     "inverse variance": inverse_variance,
     "best linear": best_linear,
 }
-SENSES = ("torque", "vibration", "sinkage")
+SENSORS = ("torque", "vibration", "sinkage")
 PROPERTIES = ("friction_angle", "normal_stiffness")
-#: Stances needed to learn three lines and their errors from.
-FEWEST = 20
+#: Fewest stances from which three linear estimators and their error covariance are fitted.
+MIN_STANCES = 20
 
 
 @dataclass(frozen=True)
-class Senses:
-    """Three linear estimators of one property of the soil, and the errors that they make.
+class SensorEstimators:
+    """Three linear estimators of one soil property, one for each sensor, and their errors.
 
-    `coefficients` by sense act on `_features`; `std` (3,) and `correlation` (3, 3) of their errors
-    come from the stances learned from. Units: rad for the friction angle, Pa for the stiffness.
+    `coefficients` by sensor multiply the features of that sensor; `std` (3,) and `correlation`
+    (3, 3) of the errors are those of the training stances. Units: rad for the friction angle, Pa
+    for the stiffness.
     """
 
     name: str
@@ -41,73 +42,78 @@ class Senses:
     std: Floats
     correlation: Floats
 
-    def estimates(self, stances: Felt) -> Floats:
-        """What each sense says of every stance, (3, stances)."""
+    def estimates(self, stances: StanceReadings) -> Floats:
+        """The estimate of each sensor for every stance, (3, stances)."""
         features = _features(stances, self.name)
-        return np.stack([features[sense] @ self.coefficients[sense] for sense in SENSES])
+        return np.stack([features[sensor] @ self.coefficients[sensor] for sensor in SENSORS])
 
-    def joined(self, stances: Felt, rule: str) -> FusedEstimate:
-        """One estimate for every stance by a rule of `RULES`."""
-        found = self.estimates(stances)
-        std = np.repeat(self.std[:, None], found.shape[1], axis=1)
-        return RULES[rule](found, std, self.correlation)
+    def fused(self, stances: StanceReadings, rule: str) -> FusedEstimate:
+        """Fused estimate for every stance by a rule of `RULES`."""
+        estimates = self.estimates(stances)
+        std = np.repeat(self.std[:, None], estimates.shape[1], axis=1)
+        return RULES[rule](estimates, std, self.correlation)
 
 
 @dataclass(frozen=True)
-class FusedSensors:
-    """Error of an estimate on stances not learned from, and how often its claim held."""
+class EstimatorScore:
+    """Error of an estimate on test stances, and the coverage of its intervals."""
 
     rmse: float
-    claimed: float  # std that the rule claims
-    within_one: float  # share of truths within one std claimed, 0.68 if true
-    within_two: float  # ... two, 0.95
+    predicted_std: float  # mean over the stances
+    coverage_68: float  # fraction of true values within one predicted std, 0.68 if calibrated
+    coverage_95: float  # ... within 1.96, 0.95
 
 
-def learned(stances: Felt, name: str) -> Senses:
-    """Linear estimators of a property from stances on known soils, by least squares.
+def fit_estimators(stances: StanceReadings, name: str) -> SensorEstimators:
+    """Fit linear estimators of a property to stances on known soils by least squares.
 
-    Of the forms of the source: the slope (i + 0.33) / T of the simplified torque model, vibration
-    and slip, and sinkage or its inverse. References: Comin and Saaj 2017, eqs. 27 to 29.
+    The features are those of the source: the slope (i + 0.33) / T of the simplified torque model,
+    vibration and slip, and sinkage or its inverse. Raises `FitError` for fewer than `MIN_STANCES`.
+    References: Comin and Saaj 2017, eqs. 27 to 29.
     """
-    truth = _truth(stances, name)
-    if len(truth) < FEWEST:
-        raise FitError(f"{len(truth)} stances are given; {FEWEST} or more are needed to learn from")
+    truth = _true_values(stances, name)
+    if len(truth) < MIN_STANCES:
+        raise FitError(
+            f"{len(truth)} stances are given; {MIN_STANCES} or more are needed for the fit"
+        )
     coefficients: dict[str, Floats] = {}
     errors = []
-    for sense, features in _features(stances, name).items():
-        coefficients[sense] = np.asarray(np.linalg.lstsq(features, truth, rcond=None)[0])
-        errors.append(features @ coefficients[sense] - truth)
-    return Senses(name, coefficients, np.std(errors, axis=1, ddof=3), np.corrcoef(errors))
+    for sensor, features in _features(stances, name).items():
+        coefficients[sensor] = np.asarray(np.linalg.lstsq(features, truth, rcond=None)[0])
+        errors.append(features @ coefficients[sensor] - truth)
+    return SensorEstimators(name, coefficients, np.std(errors, axis=1, ddof=3), np.corrcoef(errors))
 
 
-def judged(senses: Senses, stances: Felt) -> dict[str, FusedSensors]:
-    """Each sense alone, and each rule, on stances not learned from."""
-    truth = _truth(stances, senses.name)
-    alone = zip(SENSES, senses.estimates(stances), senses.std, strict=True)
-    found = {sense: _judged(mean, std + 0.0 * truth, truth) for sense, mean, std in alone}
+def score_estimators(
+    estimators: SensorEstimators, stances: StanceReadings
+) -> dict[str, EstimatorScore]:
+    """Score each sensor alone, and each fusion rule, on test stances."""
+    truth = _true_values(stances, estimators.name)
+    alone = zip(SENSORS, estimators.estimates(stances), estimators.std, strict=True)
+    scores = {sensor: _score(mean, std + 0.0 * truth, truth) for sensor, mean, std in alone}
     for rule in RULES:
-        fused = senses.joined(stances, rule)
-        found[rule] = _judged(fused.mean, fused.std, truth)
-    return found
+        fused = estimators.fused(stances, rule)
+        scores[rule] = _score(fused.mean, fused.std, truth)
+    return scores
 
 
-def _judged(mean: Floats, std: Floats, truth: Floats) -> FusedSensors:
+def _score(mean: Floats, std: Floats, truth: Floats) -> EstimatorScore:
     error = np.abs(mean - truth)
-    return FusedSensors(
+    return EstimatorScore(
         rmse=float(np.sqrt(np.mean(error**2))),
-        claimed=float(np.mean(std)),
-        within_one=float(np.mean(error < std)),
-        within_two=float(np.mean(error < 1.96 * std)),
+        predicted_std=float(np.mean(std)),
+        coverage_68=float(np.mean(error < std)),
+        coverage_95=float(np.mean(error < 1.96 * std)),
     )
 
 
-def _truth(stances: Felt, name: str) -> Floats:
+def _true_values(stances: StanceReadings, name: str) -> Floats:
     ground = stances.ground
     return ground.normal_stiffness if name == PROPERTIES[1] else ground.soil.friction_angle
 
 
-def _features(stances: Felt, name: str) -> dict[str, Floats]:
-    """What each sense's line reads, (stances, terms), by sense."""
+def _features(stances: StanceReadings, name: str) -> dict[str, Floats]:
+    """Features of each sensor's linear estimator, (stances, terms), by sensor."""
     one, depth = np.ones_like(stances.slip), 100.0 * stances.sinkage
     scale = PRESSURE if name == PROPERTIES[1] else 1.0
     deep = 1.0 / depth if name == PROPERTIES[1] else depth

@@ -1,4 +1,4 @@
-"""What a wheel-leg feels in simulated stances on many soils: torque, sinkage and vibration."""
+"""Simulated stances of a wheel-leg on many soils: torque, sinkage and vibration."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from soilml.physics.gears.wheel_leg_foot import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil, soil
-from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, amplitude
+from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 
 #: The load testing foot of Comin and Saaj 2017, table III, all of it ahead of the leg.
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
-#: N. One foot does not carry the printed 3.75 kg on two of the four soils: a third of it.
+#: Load, N: a third of the printed 3.75 kg, which one foot does not carry on two of the four soils.
 LOAD = 12.0
 #: The commanded slips of the source's tests.
 SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])
@@ -34,7 +34,7 @@ PRINTED = (
 
 @dataclass(frozen=True)
 class KnownSoil:
-    """Soils of one array each, with their normal stiffness sigma_1 (Pa)."""
+    """Soils as arrays (soils,), with their normal stiffness sigma_1 (Pa)."""
 
     soil: Soil
     normal_stiffness: Floats
@@ -47,13 +47,13 @@ def four_soils() -> KnownSoil:
         soil(f"comin2017/{name}", shear_modulus=k * FOOT.area**0.5) for name, k, _, _ in PRINTED
     ]
     names = ("cohesion", "friction_angle", "shear_modulus", "kc", "kphi", "n")
-    joined = {name: np.asarray([getattr(s, name) for s in each]) for name in names}
+    columns = {name: np.asarray([getattr(s, name) for s in each]) for name in names}
     stiffness = np.asarray([offset + 0.01 * gain for _, _, offset, gain in PRINTED])
-    return KnownSoil(Soil(**joined), stiffness)
+    return KnownSoil(Soil(**columns), stiffness)
 
 
-def varied_soils(count: int, seed: int) -> KnownSoil:
-    """Soils drawn between the four: each property on its own, within the range of table I."""
+def sample_soils(count: int, seed: int) -> KnownSoil:
+    """Random soils, each property uniform and independent within the range of table I."""
     draw = np.random.default_rng(seed).uniform
 
     def within(low: float, high: float) -> Floats:
@@ -70,14 +70,14 @@ def varied_soils(count: int, seed: int) -> KnownSoil:
     )  # fmt: skip
 
 
-def torques(ground: KnownSoil, slip: Floats = SLIPS, load: float = LOAD) -> Floats:
-    """Torques (N m) in midstance, (slips, soils); NaN where the soil does not carry the foot."""
+def midstance_torques(ground: KnownSoil, slip: Floats = SLIPS, load: float = LOAD) -> Floats:
+    """Midstance torques (N m), (slips, soils); NaN where the soil does not carry the foot."""
     at = Operating(slip=np.asarray(slip)[:, None], load=load)
     return np.asarray(Model(FOOT)(ground.soil, at).torque)
 
 
 @dataclass(frozen=True)
-class Felt:
+class StanceReadings:
     """One stance on each of many soils, arrays (soils,), with sensor noise."""
 
     ground: KnownSoil
@@ -87,19 +87,20 @@ class Felt:
     vibration: Floats  # m/s^2
 
 
-def felt(count: int, seed: int, noise: float = 0.03) -> Felt:
-    """One stance at a slip between 0.1 and 0.5 on each of `count` varied soils.
+def simulate_stances(count: int, seed: int, noise: float = 0.03) -> StanceReadings:
+    """Simulate one stance at a slip between 0.1 and 0.5 on each of `count` random soils.
 
-    The drop of friction is drawn between 0.2 and 0.3 of the friction angle, on a leg of 4 kN/m:
-    the source prints neither. `noise` is a share of each reading; that of the slip is 0.01.
+    The friction angle drops by a fraction between 0.2 and 0.3, with a leg of 4 kN/m; the source
+    prints neither. `noise` is the relative standard deviation of each reading; the slip has a
+    standard deviation of 0.01.
     """
     rng = np.random.default_rng(seed + 1)
-    ground = varied_soils(count, seed)
+    ground = sample_soils(count, seed)
     slip = rng.uniform(0.1, 0.5, count)
     force = Model(FOOT)(ground.soil, Operating(slip=slip, load=LOAD))
     angle = ground.soil.friction_angle
     drop = angle * rng.uniform(0.2, 0.3, count)
-    shaken = amplitude(SpringLeg(stiffness=np.full(count, 4000.0)), slip, angle, drop)
-    readings = np.stack([force.torque, force.sinkage, shaken])
+    vibration = vibration_amplitude(SpringLeg(stiffness=np.full(count, 4000.0)), slip, angle, drop)
+    readings = np.stack([force.torque, force.sinkage, vibration])
     readings = readings * (1.0 + noise * rng.standard_normal(readings.shape))
-    return Felt(ground, slip + 0.01 * rng.standard_normal(count), *readings)
+    return StanceReadings(ground, slip + 0.01 * rng.standard_normal(count), *readings)

@@ -1,4 +1,4 @@
-"""The linear slip models fitted to simulated stances, and how well they fit."""
+"""Linear slip models fitted to simulated stances, and their goodness of fit."""
 
 from __future__ import annotations
 
@@ -22,52 +22,53 @@ Law = TypeVar("Law", TorqueSlip, VibrationSlip)
 
 
 @dataclass(frozen=True)
-class Fitted(Generic[Law]):
-    """A slip model, and the shares of variance that its parts explain (R^2), by part."""
+class SlipModelFit(Generic[Law]):
+    """A fitted slip model, and R^2 of its parts by name."""
 
     law: Law
     goodness: dict[str, float]
 
 
-def lines(felt: Floats, slip: Floats) -> tuple[Floats, Floats, Floats]:
-    """Intercepts, slopes and R^2 (soils,) of slip (slips,) on what is felt (slips, soils)."""
-    slips = np.broadcast_to(np.asarray(slip, float)[:, None], felt.shape)
-    x, y = felt - felt.mean(axis=0), slips - slips.mean(axis=0)
-    with np.errstate(invalid="ignore"):  # what is felt the same at every slip has no line: NaN
+def fit_lines(reading: Floats, slip: Floats) -> tuple[Floats, Floats, Floats]:
+    """Regress slip (slips,) on a reading (slips, soils): intercepts, slopes and R^2, (soils,)."""
+    slips = np.broadcast_to(np.asarray(slip, float)[:, None], reading.shape)
+    x, y = reading - reading.mean(axis=0), slips - slips.mean(axis=0)
+    with np.errstate(invalid="ignore"):  # a reading that is equal at all slips has no slope: NaN
         slope = (x * y).sum(axis=0) / (x * x).sum(axis=0)
-    left = ((y - slope * x) ** 2).sum(axis=0)
+    residual = ((y - slope * x) ** 2).sum(axis=0)
     return (
-        slips.mean(axis=0) - slope * felt.mean(axis=0),
+        slips.mean(axis=0) - slope * reading.mean(axis=0),
         slope,
-        1.0 - left / (y * y).sum(axis=0),
+        1.0 - residual / (y * y).sum(axis=0),
     )
 
 
 def fit_torque_slip(
     torque: Floats, slip: Floats, friction_angle: Floats, normal_stiffness: Floats, form: str
-) -> Fitted[TorqueSlip]:
-    """Eqs. 18 and 27 fitted to torques (N m), (slips, soils), on soils of known properties (SI).
+) -> SlipModelFit[TorqueSlip]:
+    """Fit eqs. 18 and 27 to torques (N m), (slips, soils), on soils of known properties (SI).
 
-    `form` says which coefficient is none: `terramechanics` a_sigma, `empirical` a_tau, as printed
-    in table IV of Comin and Saaj 2017; four soils leave one degree of freedom.
+    `form` determines which coefficient is zero: a_sigma for `terramechanics`, a_tau for
+    `empirical`, as printed in table IV of Comin and Saaj 2017; four soils leave one degree of
+    freedom.
     """
-    a, b, straight = lines(torque, slip)
-    _finite(a, b)
+    a, b, straight = fit_lines(torque, slip)
+    _check_finite(a, b)
     both = form == "terramechanics"
     friction, gof_friction = _plane(friction_angle, b, a if both else None)
     stiffness, gof_stiffness = _plane(normal_stiffness / PRESSURE, b, None if both else a)
     error = np.asarray(slip)[:, None] - a - b * torque
     law = TorqueSlip(friction=friction, stiffness=stiffness, slip_std=float(np.std(error)))
     goodness = {"slip": float(np.median(straight)), "friction": gof_friction}
-    return Fitted(law, goodness | {"stiffness": gof_stiffness})
+    return SlipModelFit(law, goodness | {"stiffness": gof_stiffness})
 
 
 def fit_vibration_slip(
     vibration: Floats, slip: Floats, increment: Floats, stiffness: Floats, planar: bool
-) -> Fitted[VibrationSlip]:
-    """Eqs. 24 and 25 fitted to vibrations (m/s^2), (slips, springs), of known springs (SI)."""
-    a, b, straight = lines(vibration, slip)
-    _finite(a, b)
+) -> SlipModelFit[VibrationSlip]:
+    """Fit eqs. 24 and 25 to vibrations (m/s^2), (slips, springs), of known springs (SI)."""
+    a, b, straight = fit_lines(vibration, slip)
+    _check_finite(a, b)
     drop, spring = np.rad2deg(increment), stiffness / STIFFNESS
     (c_i, c_mu, c_k), gof_a = _plane(a, drop, spring if planar else None)
     (a_mu, b_mu, _), gof_b = _plane(b * GRAVITY, drop, None)
@@ -76,7 +77,9 @@ def fit_vibration_slip(
         c_i=c_i, c_mu=c_mu, c_k=c_k, a_mu=a_mu, b_mu=b_mu, slip_std=float(np.std(error)),
         assumed=None if planar else float(np.mean(stiffness)),
     )  # fmt: skip
-    return Fitted(law, {"slip": float(np.median(straight)), "intercept": gof_a, "slope": gof_b})
+    return SlipModelFit(
+        law, {"slip": float(np.median(straight)), "intercept": gof_a, "slope": gof_b}
+    )
 
 
 def _plane(
@@ -84,16 +87,18 @@ def _plane(
 ) -> tuple[tuple[float, float, float], float]:
     """Coefficients of y = c + p first + q second (q = 0 without a second), and R^2."""
     columns = [np.ones_like(first), first] + ([] if second is None else [second])
-    found, *_ = np.linalg.lstsq(np.column_stack(columns), y, rcond=None)
-    left = y - np.column_stack(columns) @ found
-    c, p, q = (*found, 0.0)[:3]
-    return (float(c), float(p), float(q)), 1.0 - float(left @ left / np.sum((y - y.mean()) ** 2))
+    coefficients, *_ = np.linalg.lstsq(np.column_stack(columns), y, rcond=None)
+    residual = y - np.column_stack(columns) @ coefficients
+    c, p, q = (*coefficients, 0.0)[:3]
+    return (float(c), float(p), float(q)), 1.0 - float(
+        residual @ residual / np.sum((y - y.mean()) ** 2)
+    )
 
 
-def _finite(a: Floats, b: Floats) -> None:
-    bad = ~(np.isfinite(a) & np.isfinite(b))
-    if bad.any():
+def _check_finite(a: Floats, b: Floats) -> None:
+    invalid = ~(np.isfinite(a) & np.isfinite(b))
+    if invalid.any():
         raise FitError(
-            f"{bad.sum()} of {bad.size} soils have no line of slip: a stance without equilibrium, "
-            "or one that feels the same at every slip; leave those soils out"
+            f"{invalid.sum()} of {invalid.size} soils have no slip model: a stance without "
+            "equilibrium, or readings that are equal at all slips; leave those soils out"
         )

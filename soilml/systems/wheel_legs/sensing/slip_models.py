@@ -1,4 +1,4 @@
-"""Straight lines from what a wheel-leg feels to its slip, and from those lines to the soil."""
+"""Linear models from torque or vibration of a wheel-leg to slip, and from them to the soil."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from soilml.errors import InputError
 Floats = NDArray[np.float64]
 Real = float | Floats
 
-#: Pa in N/cm^2, N/m in kN/m, m/s^2 in g: the units of the printed coefficients.
+#: 1 N/cm^2 in Pa, 1 kN/m in N/m, 1 g in m/s^2: units of the printed coefficients.
 PRESSURE, STIFFNESS, GRAVITY = 1e4, 1e3, 9.81
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
 class TorqueSlip:
-    r"""Slip from the motor's torque in midstance, i_T = a + b T, and what a and b say of the soil.
+    r"""Slip from the motor torque at midstance, i_T = a + b T, and the soil from a and b.
 
     .. math::
         \varphi = c_\tau + b_\tau b + a_\tau a, \quad \sigma_1 = c_\sigma + b_\sigma b + a_\sigma a
 
-    Coefficients in rad, N/cm^2 and N m as printed; functions take and give SI. sigma_1 is the
-    linearised normal stress 1 cm deep, sigma_0 + alpha_z (1 cm). With `intercept` a is the same
-    on all soils, and sigma_1 follows from b as well. References: Comin and Saaj 2017, eqs. 18, 19
-    and 27, table IV. For a five-legged wheel-leg with load testing feet and a load like theirs.
+    Coefficients in rad, N/cm^2 and N m as printed; methods use SI units. sigma_1 is the
+    linearised normal stress at 1 cm depth, sigma_0 + alpha_z (1 cm). With `intercept` a is constant
+    over all soils, and sigma_1 follows from b. References: Comin and Saaj 2017, eqs. 18, 19
+    and 27, table IV. Valid for a five-legged wheel-leg with load testing feet under a similar load.
     """
 
     friction: tuple[float, float, float]  # c_tau, b_tau, a_tau
     stiffness: tuple[float, float, float]  # c_sigma, b_sigma, a_sigma
-    slip_std: float  # standard error of the slip it gives
+    slip_std: float  # standard error of the slip
     intercept: float | None = None
 
     @property
@@ -56,7 +56,7 @@ class TorqueSlip:
         return np.asarray(a + b * torque)
 
     def soil(self, intercept: Real, slope: Real) -> tuple[Floats, Floats]:
-        """(friction angle in rad, normal stiffness in Pa) of a soil with this line, eq. 27."""
+        """(friction angle in rad, normal stiffness in Pa) from intercept and slope, eq. 27."""
         rows = np.asarray([self.friction, self.stiffness]) * [[1.0], [PRESSURE]]
         angle, stiffness = (
             c + b * np.asarray(slope) + a * np.asarray(intercept) for c, b, a in rows
@@ -67,14 +67,14 @@ class TorqueSlip:
 @final
 @dataclass(frozen=True, kw_only=True)
 class VibrationSlip:
-    r"""Slip from the hub's vibration after midstance, i_V = a + b \Delta a.
+    r"""Slip from the vibration of the hub after midstance, i_V = a + b \Delta a.
 
     .. math:: a = c_I + c_\mu \Delta\varphi + c_K k_S, \quad b = a_\mu + b_\mu \Delta\varphi
 
-    with the drop of friction in degrees, k_S in kN/m and the vibration in g; functions take and
-    give SI. References: Comin and Saaj 2017, eqs. 24, 25 and 27, table V. It prints `rad^-1`; in
-    radians the drop of friction would not matter for the slip. With c_K = 0 the line tells
-    nothing of k_S, which is then `assumed`.
+    with the drop of friction in degrees, k_S in kN/m and the vibration in g; methods use SI
+    units. References: Comin and Saaj 2017, eqs. 24, 25 and 27, table V, which prints `rad^-1`; in
+    radians the drop of friction would have no effect on the slip. With c_K = 0 the model does not
+    determine k_S, which is then `assumed`.
     """
 
     c_i: float
@@ -101,20 +101,22 @@ class VibrationSlip:
         return np.asarray(a + b * vibration)
 
     def spring(self, intercept: Real, slope: Real) -> tuple[Floats, Floats]:
-        """(drop of friction in rad, k_S in N/m) that have this line, eq. 27."""
+        """(drop of friction in rad, k_S in N/m) from intercept and slope, eq. 27."""
         if self.assumed is not None:
-            raise InputError("a model without c_K cannot tell k_S from a line; take the planar one")
+            raise InputError("a model without c_K does not determine k_S; use the planar model")
         drop = (np.asarray(slope) * GRAVITY - self.a_mu) / self.b_mu
         stiffness = (np.asarray(intercept) - self.c_i - self.c_mu * drop) / self.c_k
         return np.deg2rad(drop), stiffness * STIFFNESS
 
     def drop(self, vibration: Real, slip: Real) -> Floats:
-        """Drop of friction (rad) from one vibration (m/s^2) and slip, where c_K = 0."""
+        """Drop of friction (rad) from one vibration (m/s^2) and slip, for c_K = 0."""
         if self.assumed is None:
-            raise InputError("one pair cannot tell both k_S and the drop; take the linear model")
-        shaken = np.asarray(vibration) / GRAVITY
-        over = np.asarray(slip) - self.c_i - self.a_mu * shaken
-        return np.asarray(np.deg2rad(over / (self.c_mu + self.b_mu * shaken)))
+            raise InputError(
+                "one pair does not determine both k_S and the drop; use the linear model"
+            )
+        in_g = np.asarray(vibration) / GRAVITY
+        remainder = np.asarray(slip) - self.c_i - self.a_mu * in_g
+        return np.asarray(np.deg2rad(remainder / (self.c_mu + self.b_mu * in_g)))
 
 
 def spring_soil(increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
@@ -125,9 +127,9 @@ def spring_soil(increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
         \sigma_{1,V} = -0.2 - 0.81 k_S' + 13.45 \Delta\varphi'
 
     with k_S in kN/m and the drop in degrees in the first, k_S' in N/cm and the drop in radians in
-    the second: t_K is printed in cm^-1 and t_tau in N/cm^2/rad. Only so do all four soils have a
-    spring (0.78 to 0.96 kN/m, 33 to 40 degrees), and one whose line of slip lies between 0 and 0.5
-    for vibrations of some tenths of g. References: Comin and Saaj 2017, eq. 28, table VII.
+    the second: t_K is printed in cm^-1 and t_tau in N/cm^2/rad. Only with these units do all four
+    soils have a spring (0.78 to 0.96 kN/m, 33 to 40 degrees) whose slip lies between 0 and 0.5 for
+    vibrations of some tenths of g. References: Comin and Saaj 2017, eq. 28, table VII.
     """
     k, drop = np.asarray(stiffness), np.asarray(increment)
     angle = -0.76 + 0.35 * k / 1e3 + 0.03 * np.rad2deg(drop)
@@ -135,7 +137,7 @@ def spring_soil(increment: Real, stiffness: Real) -> tuple[Floats, Floats]:
 
 
 def soil_spring(friction_angle: Real, normal_stiffness: Real) -> tuple[Floats, Floats]:
-    """(drop of friction in rad, k_S in N/m) of a soil: `spring_soil` the other way, exactly."""
+    """(drop of friction in rad, k_S in N/m) of a soil: the exact inverse of `spring_soil`."""
     rows = np.asarray([[0.03 * 180.0 / np.pi, 0.35 / 1e3], [13.45, -0.81 / 100.0]])
     inverse = np.linalg.inv(rows)
     angle = np.asarray(friction_angle) + 0.76

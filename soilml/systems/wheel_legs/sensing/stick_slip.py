@@ -1,4 +1,4 @@
-"""Stick-slip of a leg past midstance: a rotating spring whose foot sticks and slides."""
+"""Stick-slip of a leg after midstance: a rotating spring whose foot sticks and slides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Real = float | Floats
 
 GRAVITY = 9.81
-#: Steps in the period of the lighter of foot and hub on the spring: amplitudes to about 1 %.
+#: Steps per period of the lighter of foot and hub on the spring, for amplitudes accurate to 1 %.
 STEPS_PER_PERIOD = 60
 
 
@@ -26,8 +26,8 @@ STEPS_PER_PERIOD = 60
 class SpringLeg:
     """One leg of a wheel-leg as a spring between hub and foot; numbers, or arrays of one shape.
 
-    Length, mass, speed and number of legs are those of Comin and Saaj 2017, table III; they print
-    neither the foot's mass, nor the leg's stiffness across itself, nor its damping.
+    Length, mass, speed and number of legs are those of Comin and Saaj 2017, table III; the mass of
+    the foot, the lateral stiffness of the leg and its damping are not printed and are assumed.
     """
 
     stiffness: Annotated[Real, Parameter("N/m", 50.0, 1e6, "k_S, along the leg")]
@@ -41,17 +41,19 @@ class SpringLeg:
 
 
 @dataclass(frozen=True)
-class Stance:
-    """A leg from midstance until the next one takes over, arrays (times, ...)."""
+class StanceTrajectory:
+    """A leg from midstance until the next leg takes over, arrays (times, ...)."""
 
     time: Floats  # s
     acceleration: Floats  # m/s^2, of the hub, upward
-    slid: Floats  # m, how far the foot has slid back
+    foot_displacement: Floats  # m, rearward sliding of the foot
     normal: Floats  # N, on the ground
 
 
-def stance(leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real) -> Stance:
-    r"""One stance from midstance on, at a constant slip; inputs broadcast to shape (...).
+def simulate_stance(
+    leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real
+) -> StanceTrajectory:
+    r"""Simulate one stance from midstance at a constant slip; inputs broadcast to shape (...).
 
     .. math::
         F_S = k_S (l_S - L), \quad Q = \kappa k_S L (\omega t - \beta), \quad
@@ -61,37 +63,39 @@ def stance(leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real) ->
         m_F \ddot x_C = \mu_D N - (F_S \sin\beta + Q \cos\beta)
 
     The foot sticks while F_E = F_S sin(beta) + Q cos(beta) <= N tan(phi_S) and slides against
-    N tan(phi_D), phi_D = phi_S - `increment`, until it stands still again (rad). References: Comin
-    and Saaj 2017, eqs. 20-23, in which Q is missing: they do not print how slip enters. Here the
+    N tan(phi_D), phi_D = phi_S - `increment`, until it is at rest again (rad). References: Comin
+    and Saaj 2017, eqs. 20-23, in which Q is missing and the effect of slip is not printed. Here the
     hub advances by x_H = (1 - i) l sin(omega t), l the length under load (their eq. 11), while the
-    motor turns the leg at omega: a foot that sticks makes the leg lag, and bends it by Q. Without
-    Q no leg of a five-legged wheel-leg slips where phi_S > 36 degrees. Not for the blow of the
-    next leg.
+    motor turns the leg at omega: a sticking foot makes the leg lag and bends it by Q. Without
+    Q no leg of a five-legged wheel-leg slips if phi_S > 36 degrees. The impact of the next leg is
+    not included.
     """
-    rows = list(_marched(leg, slip, friction_angle, increment))
-    return Stance(*(np.stack(values) for values in zip(*rows, strict=True)))
+    rows = list(_integrate(leg, slip, friction_angle, increment))
+    return StanceTrajectory(*(np.stack(values) for values in zip(*rows, strict=True)))
 
 
-def amplitude(leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real) -> Floats:
-    r"""Delta a (m/s^2): the largest acceleration of the hub, up or down, during one stance.
+def vibration_amplitude(
+    leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real
+) -> Floats:
+    r"""Delta a (m/s^2): the largest vertical acceleration of the hub during one stance.
 
     .. math:: \Delta a = \max_t |\ddot z_H + l_S \omega^2 \cos\omega t|
 
-    what the hub of a leg that neither slips nor bends would feel taken off. Inputs as `stance`.
+    without the acceleration of a rigid leg that does not slip. Inputs as `simulate_stance`.
     """
     largest = np.zeros(())
-    for time, acceleration, _, _ in _marched(leg, slip, friction_angle, increment):
+    for time, acceleration, _, _ in _integrate(leg, slip, friction_angle, increment):
         slow = leg.length * leg.turning**2 * np.cos(leg.turning * time)
         largest = np.maximum(largest, np.abs(acceleration + slow))
     return largest
 
 
-def _marched(
+def _integrate(
     leg: SpringLeg, slip: Real, friction_angle: Real, increment: Real
 ) -> Iterator[tuple[Floats, Floats, Floats, Floats]]:
-    """(time, acceleration, slid, normal) of a stance step by step: midpoint rule, events within.
+    """(time, acceleration, foot displacement, normal force) per step: midpoint rule with events.
 
-    A foot that comes to a stand within a step stops there, and sticks or turns at the next one.
+    A foot that comes to rest within a step stops there, and sticks or reverses at the next one.
     """
     check(leg)
     slip, static, gap, k, length, M, m, kappa, zeta, omega, legs = (
@@ -101,17 +105,17 @@ def _marched(
             leg.foot_mass, leg.bending, leg.damping, leg.turning, leg.legs,
         )
     )  # fmt: skip
-    _believable(slip, static, gap)
+    _check_ranges(slip, static, gap)
     mu_s, mu_d = np.tan(static), np.tan(static - gap)
     standing, dashpot = length - M * GRAVITY / k, 2.0 * zeta * np.sqrt(k * M)
     if not (standing > 0.5 * length).all():
         raise InputError(
-            f"stiffness is {k.min():g} N/m: the leg gives way by more than half its length; it "
+            f"stiffness is {k.min():g} N/m: the leg is compressed by more than half its length; it "
             f"must be above {2.0 * (M * GRAVITY / length).max():g} N/m"
         )
 
     def forces(t: Floats, z: Floats, w: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Normal force, and the force that pushes the foot back."""
+        """Normal force, and the horizontal force on the foot."""
         angle = omega * t
         reach = (1.0 - slip) * standing * np.sin(angle) - x
         rate = (1.0 - slip) * standing * omega * np.cos(angle) - v
@@ -126,7 +130,7 @@ def _marched(
     dt = lasts / count
     half = 0.5 * dt
     z, w, x, v = standing, np.zeros_like(k), np.zeros_like(k), np.zeros_like(k)
-    heading = np.zeros_like(k)  # of the foot that slides, 0 where it sticks
+    heading = np.zeros_like(k)  # direction of sliding of the foot, 0 where it sticks
     for step in range(count + 1):
         t = step * dt
         normal, push = forces(t, z, w, x, v)
@@ -148,15 +152,15 @@ def _marched(
         heading = np.where(stops, 0.0, heading)
 
 
-def _believable(slip: Floats, static: Floats, gap: Floats) -> None:
-    """Raise `InputError` for slip or angles that the spring is not for."""
+def _check_ranges(slip: Floats, static: Floats, gap: Floats) -> None:
+    """Raise `InputError` for slip or angles outside the range of the model."""
     for name, value, low, high in (
         ("slip", slip, 0.0, 1.0),
         ("friction_angle", static, 0.0, 1.4),
         ("increment", gap, 0.0, 1.4),
         ("friction_angle - increment", static - gap, 0.0, 1.4),
     ):
-        bad = ~((value >= low) & (value <= high))
-        if bad.any():
-            wrong = value[bad].flat[0]
+        invalid = ~((value >= low) & (value <= high))
+        if invalid.any():
+            wrong = value[invalid].flat[0]
             raise InputError(f"{name} is {wrong:g}; it must lie between {low:g} and {high:g}")

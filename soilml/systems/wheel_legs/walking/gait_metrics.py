@@ -1,4 +1,4 @@
-"""How a walk depends on the number of legs, on the feet and on the ground's stiffness."""
+"""Metrics of a gait, compared over numbers of legs, feet and stiffness of the ground."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.errors import InputError
-from soilml.systems.wheel_legs.walking.geometry import FEET, MOST_LEGS, wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.geometry import FEET, MAX_LEGS, wheel_leg
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.walk import Walk, walk
 
 #: Stiffnesses over which the paper compares feet, N/m^3: alpha_z from 0.4 to 1.0 N/cm^3.
@@ -20,31 +20,31 @@ TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True)
-class Gait:
-    """Figures of the last full turn of every case, (cases,); NaN for a case that has stopped."""
+class GaitMetrics:
+    """Metrics of the last full turn of every case, (cases,); NaN for a case that has stopped."""
 
-    most_sinkage: Array  # m
+    max_sinkage: Array  # m
     rms_sinkage: Array  # m
     mean_sinkage: Array  # m
     rms_slip: Array
-    rms_slip_propelled: Array  # without the instants at which nothing propels, slip 1
+    rms_slip_propelled: Array  # over the instants with propulsion, slip below 1
     mean_slip: Array
     mean_torque: Array  # N m
     midstance_sinkage: Array  # m
     status: Array
 
 
-def gait(walked: Walk) -> Gait:
-    """Figures of the last full turn of a walk; `InputError` where it is shorter than a turn."""
-    if walked.angle[-1] < TURN - 1e-9:
+def gait_metrics(walk_result: Walk) -> GaitMetrics:
+    """Metrics of the last full turn of a walk; raises `InputError` if it is shorter than a turn."""
+    if walk_result.angle[-1] < TURN - 1e-9:
         raise InputError(
-            f"a walk of {walked.angle[-1] / TURN:.2g} turns; a gait needs one full turn or more"
+            f"a walk of {walk_result.angle[-1] / TURN:.2g} turns; one full turn or more is needed"
         )
-    last = walked.after(float(walked.angle[-1]) - TURN)
+    last = walk_result.after(float(walk_result.angle[-1]) - TURN)
     sinkage, slip = last.sinkage, last.slip
     propelled = slip < 1.0
-    return Gait(
-        most_sinkage=sinkage.max(axis=0),
+    return GaitMetrics(
+        max_sinkage=sinkage.max(axis=0),
         rms_sinkage=_rms(sinkage),
         mean_sinkage=sinkage.mean(axis=0),
         rms_slip=_rms(slip),
@@ -62,16 +62,19 @@ def _rms(values: Array) -> Array:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def legs_compared(ground: Ground, foot: str = "none", turns: float = 2.0) -> Gait:
-    """Wheel-legs of 1 to `MOST_LEGS` legs on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
-    return gait(walk([wheel_leg(foot, legs=n + 1) for n in range(MOST_LEGS)], ground, turns=turns))
+def compare_legs(ground: LinearGround, foot: str = "none", turns: float = 2.0) -> GaitMetrics:
+    """Wheel-legs of 1 to `MAX_LEGS` legs on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
+    return gait_metrics(
+        walk([wheel_leg(foot, legs=n + 1) for n in range(MAX_LEGS)], ground, turns=turns)
+    )
 
 
 @dataclass(frozen=True)
-class FeetCompared:
+class FeetComparison:
     """Sinkage (m) and slip of feet over the ground's stiffness (Comin and Saaj 2017, fig. 6).
 
-    `sinkage`, `slip`, `rms_slip`: (feet, stiffnesses), means of a turn but for the last.
+    `sinkage`, `slip`, `rms_slip`: (feet, stiffnesses), means over a turn, the last a root mean
+    square.
     """
 
     feet: tuple[str, ...]
@@ -82,23 +85,23 @@ class FeetCompared:
     status: Array
 
     def sensitivity(self, values: Array) -> tuple[Array, Array]:
-        """Straight slope of values over stiffness, per N/m^3, and its standard error, (feet,)."""
+        """Least-squares slope of values over stiffness, per N/m^3, and its std error, (feet,)."""
         centred = self.stiffness - self.stiffness.mean()
         spread = np.sum(centred**2)
         slope = values @ centred / spread
-        rest = values - values.mean(axis=1, keepdims=True) - slope[:, None] * centred
-        return slope, np.sqrt(np.sum(rest**2, axis=1) / (centred.size - 2) / spread)
+        residual = values - values.mean(axis=1, keepdims=True) - slope[:, None] * centred
+        return slope, np.sqrt(np.sum(residual**2, axis=1) / (centred.size - 2) / spread)
 
 
-def feet_compared(
+def compare_feet(
     stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET), legs: int = 5
-) -> FeetCompared:
+) -> FeetComparison:
     """Wheel-legs with each of the feet, rolling freely on each of three or more grounds."""
     cases = list(product(feet, stiffnesses))
     wheels = [wheel_leg(foot, legs=legs) for foot, _ in cases]
-    found = gait(walk(wheels, [Ground(stiffness=alpha) for _, alpha in cases]))
+    found = gait_metrics(walk(wheels, [LinearGround(stiffness=alpha) for _, alpha in cases]))
     shape = (len(feet), len(stiffnesses))
-    return FeetCompared(
+    return FeetComparison(
         feet=tuple(feet),
         stiffness=np.array(stiffnesses, float),
         sinkage=found.mean_sinkage.reshape(shape),
@@ -108,10 +111,10 @@ def feet_compared(
     )
 
 
-def falls_until(values: Array, least: float = 0.0) -> int:
-    """Number of the entry, from 1, up to which each is lower than the one before.
+def decreasing_until(values: Array, least: float = 0.0) -> int:
+    """Number of leading entries each of which is lower than the previous one.
 
-    By more than a share `least`; 1 where the second is not.
+    Lower by more than the fraction `least`; 1 if the second entry is not lower.
     """
     falls = values[1:] < values[:-1] * (1.0 - least)
     return 1 + (int(np.argmin(falls)) if not np.all(falls) else falls.size)

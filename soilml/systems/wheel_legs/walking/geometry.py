@@ -10,8 +10,8 @@ import numpy as np
 from soilml.arrays import Array
 from soilml.errors import InputError
 
-#: Most spokes that the model is meant for: contiguous feet must not share the soil under them.
-MOST_LEGS = 6
+#: Largest number of legs: neighbouring feet must not load the same soil.
+MAX_LEGS = 6
 
 
 @final
@@ -19,10 +19,10 @@ MOST_LEGS = 6
 class Section:
     """A strip of constant width and curvature: leg, tip or heel (Comin and Saaj 2017, fig. 4).
 
-    `arc` is the height of the arc over its chord, positive to the right of who walks outwards from
+    `arc` is the height of the arc over its chord, positive to the right when going outwards from
     the hub along the leg and on along the foot: a leg bulges to the rear, a tip downwards and a
-    heel upwards. So the heel of the CIF, -0.5 cm, is convex and its tip, -1 cm, concave, as the
-    paper's text says.
+    heel upwards. The heel of the CIF, -0.5 cm, is thus convex and its tip, -1 cm, concave, as
+    stated in the paper.
     """
 
     segments: int
@@ -31,9 +31,9 @@ class Section:
     arc: float  # m
 
     def outline(self) -> tuple[Array, Array]:
-        """Ends of the segments, (along, aside) the chord, (segments + 1,), m.
+        """End points of the segments along and normal to the chord, (segments + 1,), m.
 
-        Segments are equally long, chords of the arc.
+        The segments are chords of the arc, equally long.
         """
         chord, bulge = self.length, self.arc
         if abs(bulge) < 1e-9:
@@ -48,7 +48,7 @@ class Section:
 @final
 @dataclass(frozen=True)
 class Foot:
-    """What is fastened across the end of a leg: a tip ahead and a heel behind, or neither."""
+    """A foot across the end of a leg: a tip in front and a heel behind, or neither."""
 
     tip: Section | None = None
     heel: Section | None = None
@@ -66,11 +66,11 @@ FEET: dict[str, Foot] = {
 @final
 @dataclass(frozen=True)
 class WheelLeg:
-    """A rimless wheel of equal legs, and the share of the robot's body that it carries.
+    """A rimless wheel of equal legs, and the part of the robot's body that it carries.
 
-    Leg and body as simulated in the paper (table III). The body is a flat plate `clearance` below
-    the hub: what the robot falls on where no leg carries it. The paper does not print it: both
-    its numbers are assumed. An area of zero leaves it out.
+    Leg and mass as simulated in the paper (table III). The body is a flat plate `clearance` below
+    the hub that supports the robot where no leg does. Its clearance and area are not printed and
+    are assumed; an area of zero omits it.
     """
 
     foot: Foot = FEET["LTF"]
@@ -82,11 +82,11 @@ class WheelLeg:
     body_area: float = 0.04  # m^2, assumed
 
     @property
-    def flaw(self) -> str:
-        """What makes it no wheel-leg, or nothing."""
+    def invalid_reason(self) -> str:
+        """Why the wheel-leg is invalid; empty if it is valid."""
         sections = [s for s in (self.leg, self.foot.tip, self.foot.heel) if s is not None]
-        if self.legs not in range(1, MOST_LEGS + 1):
-            return f"{self.legs} legs; the model is for 1 to {MOST_LEGS}"
+        if self.legs not in range(1, MAX_LEGS + 1):
+            return f"{self.legs} legs; the model is for 1 to {MAX_LEGS}"
         if not 0.0 < self.mass < np.inf:
             return f"a mass of {self.mass:g} kg; it must be positive"
         if not 0.0 < self.speed < np.inf:
@@ -100,7 +100,7 @@ class WheelLeg:
         return ""
 
     def plates(self) -> Plates:
-        """All segments of all legs, the first leg straight down; then the body."""
+        """All segments of all legs, the first leg pointing straight down; the body is last."""
         along, aside = self.leg.outline()
         parts = [_plates(along, -aside, self.leg.width)]
         for section, ahead in ((self.foot.tip, 1.0), (self.foot.heel, -1.0)):
@@ -129,24 +129,39 @@ class Plates:
     z: Array
     area: Array
     tilt: Array  # from the direction of travel, anticlockwise
-    turns: Array  # 1 for what turns with the wheel, 0 for the body
+    turns: Array  # 1 for plates that turn with the wheel, 0 for the body
 
 
 def _plates(down: Array, forward: Array, width: float) -> tuple[Array, Array, Array, Array]:
-    """(down, forward, area, tilt) of the segments between points of a leg that hangs straight."""
+    """(down, forward, area, tilt) of the segments between points of a vertical leg."""
     fall, run = np.diff(down), np.diff(forward)
     middle_down, middle_forward = 0.5 * (down[1:] + down[:-1]), 0.5 * (forward[1:] + forward[:-1])
     return middle_down, middle_forward, width * np.hypot(fall, run), np.arctan2(-fall, run)
 
 
 def wheel_leg(foot: str = "LTF", **changes: Any) -> WheelLeg:
-    """The paper's wheel-leg with the foot of that name, and other fields of `WheelLeg` replaced.
+    """The paper's wheel-leg with a named foot and other fields of `WheelLeg` replaced.
 
-    Raises `InputError` for a foot that is not in `FEET`, and for a wheel-leg that cannot be.
+    Parameters
+    ----------
+    foot
+        Name of a foot in `FEET`.
+    **changes
+        Fields of `WheelLeg`, for example `legs=3, mass=2.0`.
+
+    Raises
+    ------
+    InputError
+        For an unknown foot, and for an invalid wheel-leg.
+
+    Examples
+    --------
+    >>> wheel_leg("CIF", legs=3).plates().x.shape  # 10 + 13 + 7 segments of each leg, and the body
+    (91,)
     """
     if foot not in FEET:
         raise InputError(f"no foot {foot!r}; there are: {', '.join(FEET)}")
     made = replace(WheelLeg(foot=FEET[foot]), **changes)
-    if made.flaw:
-        raise InputError(f"not a wheel-leg: {made.flaw}")
+    if made.invalid_reason:
+        raise InputError(f"invalid wheel-leg: {made.invalid_reason}")
     return made

@@ -1,4 +1,4 @@
-"""One step of the hub's motion: implicit, for every case at once; and the explicit reference."""
+"""Time steps of the hub's motion: implicit, for all cases at once, and an explicit reference."""
 
 from __future__ import annotations
 
@@ -9,27 +9,36 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.walking.ground_reaction import Batch, Reaction, reaction
+from soilml.systems.wheel_legs.walking.ground_reaction import (
+    GroundReaction,
+    PlateBatch,
+    ground_reaction,
+)
 
 GRAVITY = 9.81
-#: Speed below which the direction of motion fades, as a share of the leg end's: 1 mm/s.
+#: Speed below which the direction of motion is regularised, as a fraction of the speed of the leg's
+#: end: 1 mm/s for the paper's wheel-leg.
 FADING = 0.02
-#: A step is found when the forces balance to this share of the weight.
-BALANCED = 1e-6
-MOST_NEWTON_STEPS, MOST_HALVINGS = 25, 8
-#: Largest change of velocity that a Newton step may make, as a share of the leg end's.
-LARGEST_CHANGE = 0.3
-#: How often a step that is not found is cut in two, and one in which the hub falls or strikes.
-MOST_CUTS, MOST_FINE_CUTS = 16, 5
-#: Change of the hub's velocity that counts as a fall or a blow, as a share of the leg end's.
-ABRUPT = 0.2
+#: A step has converged when the forces balance to this fraction of the weight.
+TOLERANCE = 1e-6
+#: Newton iterations of a step, and halvings of one Newton update that does not reduce the
+#: imbalance.
+MAX_NEWTON_STEPS, MAX_HALVINGS = 25, 8
+#: Largest change of velocity by a Newton update, as a fraction of the speed of the leg's end: the
+#: force is a function of the direction of motion and nearly singular at rest.
+MAX_UPDATE = 0.3
+#: How often a step that does not converge is halved, and a step with an abrupt change of velocity.
+MAX_BISECTIONS, MAX_ABRUPT_BISECTIONS = 16, 5
+#: Change of the vertical velocity that counts as abrupt (a fall or an impact), as a fraction of the
+#: speed of the leg's end.
+ABRUPT_CHANGE = 0.2
 
-Cases = TypeVar("Cases", "Hub", "Drive", Reaction)
+Cases = TypeVar("Cases", "HubState", "DriveParameters", GroundReaction)
 
 
 @dataclass(frozen=True)
-class Hub:
-    """Place (m) and velocity (m/s) of every hub, (cases,)."""
+class HubState:
+    """Position (m) and velocity (m/s) of every hub, (cases,)."""
 
     x: Array
     z: Array
@@ -38,39 +47,42 @@ class Hub:
 
 
 @dataclass(frozen=True)
-class Drive:
-    """What is the same at every step, (cases,)."""
+class DriveParameters:
+    """Parameters that are constant over a walk, (cases,)."""
 
     mass: Array  # kg
-    pace: Array  # m/s, of the leg's end about the hub
+    tip_speed: Array  # m/s, of the leg's end about the hub
     legs: Array
     slip: Array  # commanded; NaN where the wheel rolls freely
-    fading: Array  # m/s, see `reaction`
+    fading: Array  # m/s, see `ground_reaction`
 
-    def target(self, angle: float) -> Array:
-        """Horizontal velocity that the commanded slip asks for (eq. 11), m/s; NaN: none."""
-        return (1.0 - self.slip) * self.pace * np.sin(nearest_attack(angle, self.legs))
+    def target_velocity(self, angle: float) -> Array:
+        """Horizontal velocity at the commanded slip (eq. 11), m/s; NaN where there is none."""
+        return (1.0 - self.slip) * self.tip_speed * np.sin(nearest_attack(angle, self.legs))
 
 
 def nearest_attack(angle: Array | float, legs: Array) -> Array:
-    """Attack angle, rad, of the leg nearest to straight down; pi/2 where it hangs straight.
+    """Attack angle, rad, of the leg closest to vertical; pi/2 where it points straight down.
 
-    `angle`: what the wheel has turned since a leg hung straight down.
+    `angle`: rotation of the wheel since a leg pointed straight down, rad.
     """
     pitch = 2.0 * np.pi / legs
     return 0.5 * np.pi + angle - pitch * np.round(angle / pitch)
 
 
-#: (batch, drive, hub, angle at the start, at the end) -> hub then, reaction, whether it is found.
-Step: TypeAlias = Callable[[Batch, Drive, Hub, float, float], tuple[Hub, Reaction, Array]]
+#: (plates, drive, hub, angle at the start, at the end) -> (hub at the end, ground reaction, whether
+#: the step has converged, (cases,)).
+StepMethod: TypeAlias = Callable[
+    [PlateBatch, DriveParameters, HubState, float, float], tuple[HubState, GroundReaction, Array]
+]
 
 
-def some(state: Cases, cases: Array) -> Cases:
-    """Some of the cases of a record of arrays whose last axis is the cases."""
+def select_cases(state: Cases, cases: Array) -> Cases:
+    """A subset of the cases of a record of arrays whose last axis is the cases."""
     return type(state)(**{f.name: getattr(state, f.name)[..., cases] for f in fields(state)})
 
 
-def merged(state: Cases, part: Cases, cases: Array) -> Cases:
+def replace_cases(state: Cases, part: Cases, cases: Array) -> Cases:
     """The record with `part` in place of those cases."""
     whole = {f.name: getattr(state, f.name).copy() for f in fields(state)}
     for name, array in whole.items():
@@ -78,84 +90,110 @@ def merged(state: Cases, part: Cases, cases: Array) -> Cases:
     return type(state)(**whole)
 
 
-def implicit(
-    given: Batch, drive: Drive, hub: Hub, start: float, stop: float, cuts: int = 0
-) -> tuple[Hub, Reaction, Array]:
-    r"""Hub and ground at the end of the step, and whether the forces balance there, (cases,).
+def implicit_step(
+    plates: PlateBatch,
+    drive: DriveParameters,
+    hub: HubState,
+    start: float,
+    stop: float,
+    depth: int = 0,
+) -> tuple[HubState, GroundReaction, Array]:
+    r"""Advance the hub from one wheel angle to another by an implicit Euler step.
 
     .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
 
-    by Newton steps in both velocities, each as long as lowers the imbalance. Cases for which that
-    fails, or whose velocity changes abruptly, take the step in two halves: a fall is resolved. A
-    commanded case takes its horizontal velocity as told.
+    is solved by a damped Newton method in both velocities. Cases that do not converge, or whose
+    velocity changes abruptly, take the step in two halves, recursively (`depth`). A case with a
+    commanded slip has its horizontal velocity prescribed.
+
+    Returns the state and the reaction at the end of the step, and whether the forces balance there,
+    (cases,).
     """
-    moved, found, balanced = _solved(given, drive, hub, start, stop)
-    abrupt = np.abs(moved.vz - hub.vz) > ABRUPT * drive.pace
-    hard = np.flatnonzero(~balanced | (abrupt & (cuts < MOST_FINE_CUTS)))
-    if hard.size and cuts < MOST_CUTS:
-        middle, part, told = 0.5 * (start + stop), given.of(hard), some(drive, hard)
-        half, _, first = implicit(part, told, some(hub, hard), start, middle, cuts + 1)
-        balanced[hard] = False
-        able, kept = hard[first], np.flatnonzero(first)
-        if able.size:
-            ahead = (part.of(kept), some(told, kept), some(half, kept))
-            end, felt, balanced[able] = implicit(*ahead, middle, stop, cuts + 1)
-            moved, found = merged(moved, end, able), merged(found, felt, able)
-    return moved, found, balanced
+    end, reaction, converged = _solve_step(plates, drive, hub, start, stop)
+    abrupt = np.abs(end.vz - hub.vz) > ABRUPT_CHANGE * drive.tip_speed
+    repeated = np.flatnonzero(~converged | (abrupt & (depth < MAX_ABRUPT_BISECTIONS)))
+    if repeated.size and depth < MAX_BISECTIONS:
+        middle = 0.5 * (start + stop)
+        some_plates, some_drives = plates.select(repeated), select_cases(drive, repeated)
+        halfway, _, first_converged = implicit_step(
+            some_plates, some_drives, select_cases(hub, repeated), start, middle, depth + 1
+        )
+        converged[repeated] = False
+        continued, kept = repeated[first_converged], np.flatnonzero(first_converged)
+        if continued.size:
+            part_end, part_reaction, converged[continued] = implicit_step(
+                some_plates.select(kept),
+                select_cases(some_drives, kept),
+                select_cases(halfway, kept),
+                middle,
+                stop,
+                depth + 1,
+            )
+            end = replace_cases(end, part_end, continued)
+            reaction = replace_cases(reaction, part_reaction, continued)
+    return end, reaction, converged
 
 
-def _solved(
-    given: Batch, drive: Drive, hub: Hub, start: float, stop: float
-) -> tuple[Hub, Reaction, Array]:
-    pose, dt, target = given.at(stop), (stop - start) / given.speed, drive.target(stop)
-    told = ~np.isnan(drive.slip)
+def _solve_step(
+    plates: PlateBatch, drive: DriveParameters, hub: HubState, start: float, stop: float
+) -> tuple[HubState, GroundReaction, Array]:
+    """Newton's method for the velocities at the end of one step."""
+    pose, dt = plates.at(stop), (stop - start) / plates.speed
+    target = drive.target_velocity(stop)
+    commanded = ~np.isnan(drive.slip)
     weight, inertia = drive.mass * GRAVITY, drive.mass / dt
 
-    def imbalance(vx: Array, vz: Array) -> tuple[Array, Array, Array, Reaction]:
-        found = reaction(given, pose, hub.z + vz * dt, vx, vz, drive.fading)
-        rx = np.where(told, 0.0, inertia * (vx - hub.vx) - found.ahead)
-        rz = inertia * (vz - hub.vz) - found.up + weight
-        return rx, rz, np.hypot(rx, rz) / weight, found
+    def imbalance(vx: Array, vz: Array) -> tuple[Array, Array, Array, GroundReaction]:
+        """Residual forces (x, z), N, their norm over the weight, and the ground reaction."""
+        reaction = ground_reaction(plates, pose, hub.z + vz * dt, vx, vz, drive.fading)
+        rx = np.where(commanded, 0.0, inertia * (vx - hub.vx) - reaction.ahead)
+        rz = inertia * (vz - hub.vz) - reaction.up + weight
+        return rx, rz, np.hypot(rx, rz) / weight, reaction
 
-    vx, vz = np.where(told, target, hub.vx), hub.vz
-    rx, rz, size, found = imbalance(vx, vz)
-    for _ in range(MOST_NEWTON_STEPS):
-        if np.all(size < BALANCED):
+    vx, vz = np.where(commanded, target, hub.vx), hub.vz
+    rx, rz, norm, reaction = imbalance(vx, vz)
+    for _ in range(MAX_NEWTON_STEPS):
+        if np.all(norm < TOLERANCE):
             break
-        dx, dz = _newton(found, rx, rz, inertia, dt, told)
-        change = np.maximum(np.hypot(dx, dz), 1e-300)
-        share = np.minimum(1.0, LARGEST_CHANGE * drive.pace / change)
-        share = np.where(size < BALANCED, 0.0, share)
-        for halving in range(MOST_HALVINGS):
-            tried = imbalance(vx + share * dx, vz + share * dz)
-            worse = ~(tried[2] < size) & (share > 0.0)
-            if halving == MOST_HALVINGS - 1 or not np.any(worse):
+        dx, dz = _newton_update(reaction, rx, rz, inertia, dt, commanded)
+        length = np.maximum(np.hypot(dx, dz), 1e-300)
+        share = np.minimum(1.0, MAX_UPDATE * drive.tip_speed / length)
+        share = np.where(norm < TOLERANCE, 0.0, share)
+        for halving in range(MAX_HALVINGS):
+            trial = imbalance(vx + share * dx, vz + share * dz)
+            worse = ~(trial[2] < norm) & (share > 0.0)
+            if halving == MAX_HALVINGS - 1 or not np.any(worse):
                 break
             share = np.where(worse, 0.5 * share, share)
         vx, vz = vx + share * dx, vz + share * dz
-        rx, rz, size, found = tried
-    return Hub(hub.x + vx * dt, hub.z + vz * dt, vx, vz), found, size < BALANCED
+        rx, rz, norm, reaction = trial
+    end = HubState(hub.x + vx * dt, hub.z + vz * dt, vx, vz)
+    return end, reaction, norm < TOLERANCE
 
 
-def _newton(
-    found: Reaction, rx: Array, rz: Array, inertia: Array, dt: Array, told: Array
+def _newton_update(
+    reaction: GroundReaction, rx: Array, rz: Array, inertia: Array, dt: Array, commanded: Array
 ) -> tuple[Array, Array]:
-    """The Newton step of both velocities, or of the vertical one where the other is commanded."""
-    xx = inertia - found.slopes[0, 0]
-    xz = -found.slopes[0, 1] - found.sinking[0] * dt
-    zx = -found.slopes[1, 0]
-    zz = inertia - found.slopes[1, 1] - found.sinking[1] * dt
-    xx, xz, zx = (np.where(told, fixed, free) for fixed, free in ((1, xx), (0, xz), (0, zx)))
+    """Newton update of both velocities, or of the vertical one where the other is commanded.
+
+    The Jacobian of the residual is inertia - dF/dv, with dF/dz dt added in the column of vz.
+    """
+    xx = inertia - reaction.velocity_jacobian[0, 0]
+    xz = -reaction.velocity_jacobian[0, 1] - reaction.height_derivative[0] * dt
+    zx = -reaction.velocity_jacobian[1, 0]
+    zz = inertia - reaction.velocity_jacobian[1, 1] - reaction.height_derivative[1] * dt
+    xx, xz, zx = (np.where(commanded, fixed, free) for fixed, free in ((1, xx), (0, xz), (0, zx)))
     determinant = xx * zz - xz * zx
     return (xz * rz - zz * rx) / determinant, (zx * rx - xx * rz) / determinant
 
 
-def explicit(
-    given: Batch, drive: Drive, hub: Hub, start: float, stop: float
-) -> tuple[Hub, Reaction, Array]:
-    """The paper's own step (eq. 8): velocities by the forces at its start; needs about 1e-4 s."""
-    dt, told = (stop - start) / given.speed, ~np.isnan(drive.slip)
-    found = reaction(given, given.at(start), hub.z, hub.vx, hub.vz, drive.fading)
-    vx = np.where(told, drive.target(stop), hub.vx + found.ahead / drive.mass * dt)
-    vz = hub.vz + (found.up / drive.mass - GRAVITY) * dt
-    return Hub(hub.x + vx * dt, hub.z + vz * dt, vx, vz), found, np.isfinite(vz)
+def explicit_step(
+    plates: PlateBatch, drive: DriveParameters, hub: HubState, start: float, stop: float
+) -> tuple[HubState, GroundReaction, Array]:
+    """The paper's explicit step (eq. 8), with the forces at its start; requires about 1e-4 s."""
+    dt, commanded = (stop - start) / plates.speed, ~np.isnan(drive.slip)
+    reaction = ground_reaction(plates, plates.at(start), hub.z, hub.vx, hub.vz, drive.fading)
+    free_vx = hub.vx + reaction.ahead / drive.mass * dt
+    vx = np.where(commanded, drive.target_velocity(stop), free_vx)
+    vz = hub.vz + (reaction.up / drive.mass - GRAVITY) * dt
+    return HubState(hub.x + vx * dt, hub.z + vz * dt, vx, vz), reaction, np.isfinite(vz)

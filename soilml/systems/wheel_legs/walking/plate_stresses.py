@@ -8,19 +8,19 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.systems.wheel_legs.walking.geometry import WheelLeg
-from soilml.systems.wheel_legs.walking.ground_reaction import SKIN, batch
+from soilml.systems.wheel_legs.walking.ground_reaction import SKIN, batch_plates
 from soilml.systems.wheel_legs.walking.integrator import FADING
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.resistive_force import resistance
 from soilml.systems.wheel_legs.walking.walk import Walk
 
 
 @dataclass(frozen=True)
 class PlateStress:
-    """Where the plates are (m, x along the walk, z up from the surface), and their stress (Pa).
+    """Positions of the plates (m, x along the walk, z up from the surface) and their stress (Pa).
 
-    Arrays (plates,): leg by leg, leg, tip and heel; the body last. `ahead` and `up` are the
-    stress on the plate; 0 above the ground.
+    Arrays (plates,), ordered by leg (leg, tip, heel), with the body last. `ahead` and `up` are the
+    components of the stress on the plate, 0 above the ground.
     """
 
     x: Array
@@ -30,21 +30,21 @@ class PlateStress:
     area: Array  # m^2
 
 
-def stresses(
-    walked: Walk, instant: int, wheel: WheelLeg, ground: Ground, case: int = 0
+def plate_stresses(
+    walked: Walk, instant: int, wheel: WheelLeg, ground: LinearGround, case: int = 0
 ) -> PlateStress:
     """Stress on every plate at an instant of a case of a walk (Comin and Saaj 2017, eq. 4)."""
-    given = batch([wheel], [ground])
-    pose = given.at(float(walked.angle[instant]))
+    plates = batch_plates([wheel], [ground])
+    pose = plates.at(float(walked.angle[instant]))
     x, z, vx, vz = (
         float(part[instant, case]) for part in (walked.x, walked.z, walked.vx, walked.vz)
     )
-    turning = given.speed * given.turns
+    turning = plates.speed * plates.turns
     across, upwards = vx + turning * pose.z, vz - turning * pose.x
     fading = FADING * wheel.speed * wheel.leg.length
     pace = np.sqrt(across**2 + upwards**2 + fading**2)
     sx, sz = resistance(pose.c2, pose.s2, across / pace, upwards / pace)
     depth = np.maximum(-(z + pose.z), 0.0)
     pressure = ground.stiffness * depth + ground.offset * (1.0 - np.exp(-depth / SKIN))
-    parts = (x + pose.x, z + pose.z, pressure * sx, pressure * sz, given.area)
+    parts = (x + pose.x, z + pose.z, pressure * sx, pressure * sz, plates.area)
     return PlateStress(*(part[:, 0] for part in parts))

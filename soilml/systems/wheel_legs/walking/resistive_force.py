@@ -1,19 +1,19 @@
 r"""Stress of granular ground on a thin plate that moves through it: resistive-force theory.
 
-Signs. The plate stands at the *attack* angle beta from the horizontal, positive where the end that
-leads in the direction of travel is raised, and moves at the *intrusion* angle gamma below the
+Signs. The plate is inclined at the *attack* angle beta from the horizontal, positive if its leading
+end is raised, and moves at the *intrusion* angle gamma below the
 horizontal: gamma = pi/2 is straight down. With alpha_x and alpha_z the stress per depth,
 
 .. math:: \sigma_x = -\alpha_x z \;\text{(against the travel)}, \qquad \sigma_z = \alpha_z z \;
     \text{(upwards)}
 
-The law is that of a thin plate, both faces together: it has no leading face to look for, a plate
-drawn out of the ground is held back by a quarter of what resisted it going in, and one that rests
-is carried by the part that does not depend on the motion.
+The law describes a thin plate, both faces together, without distinguishing a leading face. A plate
+being withdrawn is resisted by a quarter of the stress at intrusion, and a resting plate is
+supported by the part that does not depend on the motion.
 
 References: Li, Zhang and Goldman, Science 339, 2013; Comin and Saaj 2017, eqs. 4 to 6, table II.
-The paper's eq. 5 lost the sines: the terms of B and D are sines. Measured for dry, loosely packed
-grains, slow motion (no inertia of the grains) and plates near the surface.
+The paper's eq. 5 prints cosines throughout; the terms of B and D are sines. Measured for dry,
+loosely packed grains, slow motion (no inertia of the grains) and plates near the surface.
 """
 
 from __future__ import annotations
@@ -35,8 +35,14 @@ def stress_gains(attack: Array, intrusion: Array) -> tuple[Array, Array]:
     .. math::
         \alpha_z = \sum_{k,l} [A_{kl} \cos(2k\beta + l\gamma) + B_{kl} \sin(2k\beta + l\gamma)]
 
-    and alpha_x with C and D (Comin and Saaj 2017, eq. 5, with sines). A plate that moves the other
-    way, |gamma| > pi/2, is the mirror image: alpha_x then changes its sign. Any shape.
+    and alpha_x with C and D (Comin and Saaj 2017, eq. 5, with sines). A plate moving
+    backwards, |gamma| > pi/2, is the mirror image: alpha_x changes its sign. Inputs broadcast.
+
+    Examples
+    --------
+    >>> alpha_x, alpha_z = stress_gains(0.0, 0.5 * np.pi)  # a flat plate pushed straight down
+    >>> round(float(alpha_z), 3)
+    1.0
     """
     beta, gamma = np.broadcast_arrays(np.asarray(attack, float), np.asarray(intrusion, float))
     ahead = np.where(np.cos(gamma) < 0, -1.0, 1.0)
@@ -60,14 +66,14 @@ def resistance(c2: Array, s2: Array, ux: Array, uz: Array) -> tuple[Array, Array
 
     .. math:: (\sigma_x, \sigma_z) / z = \sigma_{rest}(\beta) - R(\beta) \hat v
 
-    so that it has no angle to wrap, no mirror image to choose, and a Jacobian by hand.
+    so that no angle is wrapped, no mirror image is chosen, and the Jacobian is explicit.
     """
     rest_x, rest_z, xx, xz, zx, zz = resistance_terms(c2, s2)
     return rest_x - xx * ux - xz * uz, rest_z - zx * ux - zz * uz
 
 
 def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """The parts of `resistance`: what rests (x, z), and the matrix R (xx, xz, zx, zz)."""
+    """Terms of `resistance`: the static part (x, z) and the matrix R (xx, xz, zx, zz)."""
     return (
         -D[1, 0] * s2,
         A[0, 0] + A[1, 0] * c2,

@@ -16,7 +16,7 @@ from soilml.systems.climbing import (
     identify_ground,
 )
 from soilml.systems.climbing.climb import WheelRun
-from soilml.systems.climbing.simulated_rover import Arc
+from soilml.systems.climbing.simulated_rover import StressArc
 from soilml.systems.force_sensor_wheel import StressProfile
 
 SAND = {"cohesion": 0.0, "friction_angle": float(np.deg2rad(38.0))}
@@ -29,14 +29,14 @@ def true():
 
 @pytest.fixture(scope="module")
 def stresses(true):
-    front, rear = true.artificial(np.random.default_rng(2))
-    return StressBySlip.of(front), StressBySlip.of(rear)
+    front, rear = true.simulate_artificial_slip(np.random.default_rng(2))
+    return StressBySlip.fit(front), StressBySlip.fit(rear)
 
 
 @pytest.fixture(scope="module")
 def ground(true):
-    climbs = true.climbs(np.random.default_rng(3), np.deg2rad([0.0, 4.0]).tolist())
-    return identify_ground(true.rover, climbs, given=SAND)
+    climbs = true.simulate_climbs(np.random.default_rng(3), np.deg2rad([0.0, 4.0]).tolist())
+    return identify_ground(true.rover, climbs, fixed=SAND)
 
 
 @pytest.fixture(scope="module")
@@ -68,22 +68,22 @@ def test_nothing_is_said_of_slips_where_no_stress_was_measured(stresses):
 
 
 def test_stress_at_one_slip_says_nothing_of_others(true):
-    front, _ = true.artificial(np.random.default_rng(0), [0.2], 3)
+    front, _ = true.simulate_artificial_slip(np.random.default_rng(0), [0.2], 3)
     with pytest.raises(FitError, match="two slips"):
-        StressBySlip.of(front)
+        StressBySlip.fit(front)
 
 
 def test_redrawn_stress_scatters_as_the_readings_do(true, stresses):
     rng = np.random.default_rng(0)
     at = np.asarray([0.36])
-    entries = [stresses[0].redrawn(rng).profiles(at)[0].entry_angle for _ in range(60)]
+    entries = [stresses[0].resampled(rng).profiles(at)[0].entry_angle for _ in range(60)]
     assert 1e-4 < np.std(entries) < 0.01
 
 
 def test_steep_slopes_are_predicted_from_gentle_ones(true, ability):
     slope = band(ability.slope)
     for driven in np.deg2rad([8.0, 10.0, 12.0]):
-        at = true.slip(driven)
+        at = true.slip_at(driven)
         low, high = (np.interp(at, ability.slip, v) for v in (slope.lower, slope.upper))
         assert low - 0.005 < driven < high + 0.005
     best = band(ability.steepest)
@@ -98,29 +98,30 @@ def test_the_steepest_slope_is_the_largest_of_the_curve(ability):
 
 
 def test_a_slip_limit_beyond_the_stresses_is_refused(ability):
-    with pytest.raises(InputError, match="nothing is said outside"):
+    with pytest.raises(InputError, match="there is no prediction outside"):
         ability.steepest_within(0.95)
 
 
 def test_front_and_rear_must_share_slips(true, ground):
     rng = np.random.default_rng(1)
-    front, _ = true.artificial(rng, [0.04, 0.13], 2)
-    _, rear = true.artificial(rng, [0.36, 0.68], 2)
-    with pytest.raises(FitError, match="slips that both had"):
-        climbing_ability(ground, StressBySlip.of(front), StressBySlip.of(rear))
+    front, _ = true.simulate_artificial_slip(rng, [0.04, 0.13], 2)
+    _, rear = true.simulate_artificial_slip(rng, [0.36, 0.68], 2)
+    with pytest.raises(FitError, match="ranges must overlap"):
+        climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
 
 
 def test_worse_speed_widens_the_band(true):
-    climbs = true.climbs(np.random.default_rng(3), [0.0, 0.07], 2)
-    narrow = identify_ground(true.rover, climbs, given=SAND, noise=true.noise)
+    climbs = true.simulate_climbs(np.random.default_rng(3), [0.0, 0.07], 2)
+    narrow = identify_ground(true.rover, climbs, fixed=SAND, noise=true.noise)
     poor = replace(true.noise, speed_scale=0.02)
-    wide = identify_ground(true.rover, climbs, given=SAND, noise=poor)
+    wide = identify_ground(true.rover, climbs, fixed=SAND, noise=poor)
     assert wide.fit.std[0] > 1.5 * narrow.fit.std[0]
 
 
 def test_arcs_further_forward_climb_less():
     back, ahead = (
-        SimulatedRover(arcs=(Arc(entry=entry), Arc(entry=entry))).steepest for entry in (0.31, 0.36)
+        SimulatedRover(arcs=(StressArc(entry=entry), StressArc(entry=entry))).steepest
+        for entry in (0.31, 0.36)
     )
     assert ahead < back
 
@@ -129,7 +130,7 @@ def test_a_profile_keeps_its_shape_whatever_its_height():
     angle = np.linspace(-0.2, 0.4, 61)
     stress = np.maximum(0.0, 1.0 - ((angle - 0.1) / 0.25) ** 2)
     low, high = (
-        StressBySlip.of([WheelRun(s, StressProfile(angle, m * stress)) for s in (0.1, 0.3, 0.5)])
+        StressBySlip.fit([WheelRun(s, StressProfile(angle, m * stress)) for s in (0.1, 0.3, 0.5)])
         for m in (1e3, 3e4)
     )
     at = np.asarray([0.2])

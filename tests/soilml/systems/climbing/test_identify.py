@@ -7,9 +7,9 @@ import pytest
 
 from soilml.errors import FitError, InputError
 from soilml.numerics.prior import Prior
-from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_of_each
-from soilml.systems.climbing.climb import conditions
-from soilml.systems.climbing.coverage_study import coverage
+from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_per_climb
+from soilml.systems.climbing.climb import group_by_slope
+from soilml.systems.climbing.coverage_study import simulate_coverage
 
 SAND = {"cohesion": 0.0, "friction_angle": float(np.deg2rad(38.0))}
 SLOPES = np.deg2rad([0.0, 4.0, 8.0, 12.0]).tolist()
@@ -22,7 +22,7 @@ def true():
 
 @pytest.fixture(scope="module")
 def climbs(true):
-    return true.climbs(np.random.default_rng(5), SLOPES, 3)
+    return true.simulate_climbs(np.random.default_rng(5), SLOPES, 3)
 
 
 @pytest.fixture(scope="module")
@@ -32,18 +32,18 @@ def exact():
 
 
 def test_the_shear_modulus_of_given_sand_is_found(true, climbs):
-    ground = identify_ground(true.rover, climbs, given=SAND)
+    ground = identify_ground(true.rover, climbs, fixed=SAND)
     assert ground.fit.names == ("shear_modulus",)
     error = ground.fit["shear_modulus"] - true.shear[2]
     assert abs(error) < 3.0 * ground.fit.std[0] < 0.003
     assert ground.fit.left["shear_modulus"] < 0.1
-    assert np.all(ground.draws[:, 0] == 0.0)
+    assert np.all(ground.samples[:, 0] == 0.0)
 
 
 def test_friction_and_shear_modulus_trade_for_one_another(true, climbs):
-    fit = identify_ground(true.rover, climbs, given={"cohesion": 0.0}).fit
+    fit = identify_ground(true.rover, climbs, fixed={"cohesion": 0.0}).fit
     assert fit.correlation[0, 1] > 0.8
-    assert fit.std[1] > 3.0 * identify_ground(true.rover, climbs, given=SAND).fit.std[0]
+    assert fit.std[1] > 3.0 * identify_ground(true.rover, climbs, fixed=SAND).fit.std[0]
     for value, std, truth in zip(fit.values, fit.std, true.shear[1:], strict=True):
         assert abs(value - truth) < 3.0 * std
 
@@ -56,61 +56,63 @@ def test_cohesion_that_slopes_do_not_show_is_said_not_to_be_identified(true, cli
 
 def test_each_parameter_needs_a_slope_of_its_own(true, climbs):
     two = [c for c in climbs if c.slope < 0.1]
-    with pytest.raises(FitError, match=r"2 slopes for 3 parameters.*needed are 3 slopes"):
+    with pytest.raises(FitError, match=r"2 slopes for 3 parameters.*needed are 3 different slopes"):
         identify_ground(true.rover, two)
     with pytest.raises(FitError, match="no climb for 1 parameter"):
-        identify_ground(true.rover, [], given=SAND)
-    identify_ground(true.rover, two, given=SAND)
+        identify_ground(true.rover, [], fixed=SAND)
+    identify_ground(true.rover, two, fixed=SAND)
 
 
 def test_repetitions_of_a_slope_are_one_condition(climbs):
-    assert [len(group) for group in conditions(climbs, 0.005)] == [3, 3, 3, 3]
+    assert [len(group) for group in group_by_slope(climbs, 0.005)] == [3, 3, 3, 3]
 
 
 def test_one_slope_finds_the_shear_modulus_and_says_it_is_one(true, climbs):
-    ground = identify_ground(true.rover, climbs[:3], given=SAND)
+    ground = identify_ground(true.rover, climbs[:3], fixed=SAND)
     assert any("one slope" in text for text in ground.fit.warnings)
 
 
 def test_a_rover_that_does_not_know_its_loads_finds_the_same_soil(true, climbs):
     unknown = replace(true.rover, front_share=None, height_ratio=None)
     known, shared = (
-        identify_ground(rover, climbs, given=SAND).fit for rover in (true.rover, unknown)
+        identify_ground(rover, climbs, fixed=SAND).fit for rover in (true.rover, unknown)
     )
     assert shared.values[0] == pytest.approx(known.values[0], abs=2.0 * known.std[0])
 
 
 def test_a_climb_beyond_all_grip_is_refused_by_name(true, climbs):
     steep = [replace(climbs[0], name="cliff", slope=0.9), *climbs[1:]]
-    with pytest.raises(InputError, match=r"run cliff: a slope of 0.9 rad takes .* at most"):
+    with pytest.raises(InputError, match=r"run cliff: a slope of 0.9 rad requires .* at most"):
         identify_ground(true.rover, steep)
     narrow = {"shear_modulus": Prior(0.03, 0.05, log=True)}
     with pytest.raises(InputError, match="at most"):
-        identify_ground(true.rover, climbs, given=SAND, prior=narrow)
+        identify_ground(true.rover, climbs, fixed=SAND, prior=narrow)
 
 
 def test_climbs_that_contradict_each_other_are_refused(true, climbs):
     odd = [replace(climbs[-1], name="odd", slope=0.45), *climbs[:-1]]
-    with pytest.raises(FitError, match=r"no one soil.*run odd"):
-        identify_ground(true.rover, odd, given=SAND)
+    with pytest.raises(FitError, match=r"no single soil.*run odd"):
+        identify_ground(true.rover, odd, fixed=SAND)
 
 
 def test_an_unknown_parameter_is_refused(true, climbs):
     with pytest.raises(InputError, match="no soil parameter 'k'"):
-        identify_ground(true.rover, climbs, given={"k": 1.0})
+        identify_ground(true.rover, climbs, fixed={"k": 1.0})
 
 
 def test_each_slope_alone_gives_nearly_one_shear_modulus(exact):
-    climbs = exact.climbs(np.random.default_rng(1), SLOPES, 1)
-    each = modulus_of_each(exact.rover, climbs, cohesion=0.0, friction_angle=SAND["friction_angle"])
+    climbs = exact.simulate_climbs(np.random.default_rng(1), SLOPES, 1)
+    each = modulus_per_climb(
+        exact.rover, climbs, cohesion=0.0, friction_angle=SAND["friction_angle"]
+    )
     assert each == pytest.approx(np.full(4, exact.shear[2]), rel=0.06)
 
 
 def test_an_error_of_the_speed_spoils_the_shear_modulus_at_low_slip(exact):
-    climbs = exact.climbs(np.random.default_rng(1), SLOPES, 1)
+    climbs = exact.simulate_climbs(np.random.default_rng(1), SLOPES, 1)
     size = {"cohesion": 0.0, "friction_angle": SAND["friction_angle"]}
     low, as_read, high = (
-        modulus_of_each(exact.rover, climbs, speed_error=e, **size) for e in (-0.015, 0.0, 0.015)
+        modulus_per_climb(exact.rover, climbs, speed_error=e, **size) for e in (-0.015, 0.0, 0.015)
     )
     assert np.all(low > as_read) and np.all(high < as_read)
     assert np.all(np.diff((low - high) / as_read) < 0.0)
@@ -120,12 +122,12 @@ def test_an_error_of_the_speed_spoils_the_shear_modulus_at_low_slip(exact):
 def test_no_shear_modulus_balances_a_slope_beyond_grip(true, climbs):
     cliff = replace(climbs[0], slope=0.9)
     size = {"cohesion": 0.0, "friction_angle": SAND["friction_angle"]}
-    assert np.isnan(modulus_of_each(true.rover, [cliff], **size)).all()
+    assert np.isnan(modulus_per_climb(true.rover, [cliff], **size)).all()
 
 
 def test_bands_hold_the_truth_of_drawn_rovers():
     """Six rovers: three or fewer inside bands of nine tenths would come once in sixty."""
-    found = coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())
+    found = simulate_coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())
     for name, covered in found.items():
         assert covered.inside > 0.6, name
         assert 0.3 < covered.score < 1.9, name

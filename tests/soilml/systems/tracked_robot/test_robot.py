@@ -14,8 +14,8 @@ from soilml.systems.tracked_robot.robot import (
     BEYOND_PEAK,
     GROUSERS,
     WANG2018,
-    balance,
-    settled_by_moments,
+    settling_from_moments,
+    track_balance,
 )
 
 SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
@@ -42,7 +42,7 @@ def test_two_tracks_pull_twice_as_much_as_one():
 
 def test_the_parts_of_a_track_carry_the_load_together():
     at = Operating(slip=np.asarray([0.1, 0.5]), load=WANG2018.load)
-    found = balance(Model(WANG2018.track), SAND, at)
+    found = track_balance(Model(WANG2018.track), SAND, at)
     np.testing.assert_allclose(found.front + found.middle + found.rear, 1.0, rtol=1e-12)
     assert (found.middle > found.front).all() and (found.front > found.rear).all()
     sunk = Model(WANG2018.track)(SAND, at).sinkage
@@ -52,7 +52,7 @@ def test_the_parts_of_a_track_carry_the_load_together():
 def test_a_slacker_belt_has_less_tension_and_loads_its_wheels():
     at = Operating(slip=0.2, load=WANG2018.load)
     taut, slack = (
-        balance(Model(replace(WANG2018.track, leaving=a)), SAND, at) for a in (0.05, 0.3)
+        track_balance(Model(replace(WANG2018.track, leaving=a)), SAND, at) for a in (0.05, 0.3)
     )
     assert slack.tension < 0.1 * taut.tension
     assert slack.middle < 0.5 * taut.middle
@@ -62,7 +62,7 @@ def test_the_tension_of_an_even_pressure_is_that_of_a_ring():
     """A taut belt lies nearly flat: the pressure is even, and so the tension b R_t sigma."""
     track = replace(WANG2018.track, leaving=0.001, rebound=1.0, settling=0.0)
     at = Operating(slip=0.2, load=WANG2018.load)
-    found, sunk = balance(Model(track), CLAY, at), Model(track)(CLAY, at).sinkage
+    found, sunk = track_balance(Model(track), CLAY, at), Model(track)(CLAY, at).sinkage
     expected = 0.08 * found.arc_radius * CLAY.kphi * sunk**CLAY.n
     assert found.tension == pytest.approx(float(expected), rel=0.01)
 
@@ -70,7 +70,7 @@ def test_the_tension_of_an_even_pressure_is_that_of_a_ring():
 def test_a_tail_that_settles_moves_the_pressure_back():
     at = Operating(slip=0.2, load=WANG2018.load)
     level, down = (
-        balance(Model(replace(WANG2018.track, settling=s)), SAND, at) for s in (0.0, 0.4)
+        track_balance(Model(replace(WANG2018.track, settling=s)), SAND, at) for s in (0.0, 0.4)
     )
     assert down.centre > level.centre + 0.01 and down.rear > level.rear
 
@@ -79,15 +79,15 @@ def test_a_pull_above_the_ground_sets_the_tail_down():
     """Wang et al. 2018, section 4.1.3: the more it pulls, the more the robot inclines."""
     model = Model(WANG2018.track)
     at = Operating(slip=np.asarray([0.02, 0.1, 0.5]), load=WANG2018.load)
-    level = settled_by_moments(model, SAND, at, behind=0.01)
-    pulled = settled_by_moments(model, SAND, at, behind=0.01, hitch=0.03)
+    level = settling_from_moments(model, SAND, at, behind=0.01)
+    pulled = settling_from_moments(model, SAND, at, behind=0.01, hitch=0.03)
     assert (pulled > level).all() and (np.diff(pulled) > 0).all()
     trimmed = Model(replace(WANG2018.track, settling=pulled))
-    force, stands = trimmed(SAND, at), balance(trimmed, SAND, at)
+    force, stands = trimmed(SAND, at), track_balance(trimmed, SAND, at)
     expected = 0.01 + 0.03 * force.drawbar_pull / WANG2018.load
     np.testing.assert_allclose(stands.centre, expected, atol=5e-5)
     assert (np.diff(stands.trim) > 0).all()
-    assert np.isnan(settled_by_moments(model, SAND, at, behind=-0.3)).all()
+    assert np.isnan(settling_from_moments(model, SAND, at, behind=-0.3)).all()
 
 
 def test_the_lines_on_the_page_run(capsys):
@@ -95,13 +95,13 @@ def test_the_lines_on_the_page_run(capsys):
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
     assert np.all(names["force"].status == 0)
-    assert names["stands"].middle > names["stands"].front > names["stands"].rear
+    assert names["balance"].middle > names["balance"].front > names["balance"].rear
     assert capsys.readouterr().out
 
 
 def test_only_a_track_has_a_balance_along_its_belt():
     at = Operating(slip=0.2, load=100.0)
     wheel = Model(gear=Wheel(radius=0.1, width=0.08))
-    for asked in (balance, settled_by_moments):
+    for asked in (track_balance, settling_from_moments):
         with pytest.raises(InputError, match="the gear is a wheel; this needs a track"):
             asked(wheel, CLAY, at)

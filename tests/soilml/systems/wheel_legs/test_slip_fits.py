@@ -7,14 +7,18 @@ from soilml.errors import FitError
 from soilml.systems.wheel_legs.sensing.simulated_stances import (
     SLIPS,
     four_soils,
-    torques,
-    varied_soils,
+    midstance_torques,
+    sample_soils,
 )
-from soilml.systems.wheel_legs.sensing.slip_fits import fit_torque_slip, fit_vibration_slip, lines
+from soilml.systems.wheel_legs.sensing.slip_fits import (
+    fit_lines,
+    fit_torque_slip,
+    fit_vibration_slip,
+)
 from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP
 
 GRID = [v.ravel() for v in np.meshgrid(np.deg2rad([20.0, 30.0, 40.0]), [700.0, 800.0, 900.0])]
-SANDS = varied_soils(12, seed=2)
+SANDS = sample_soils(12, seed=2)
 
 
 @pytest.mark.parametrize("name", ["terramechanics", "empirical"])
@@ -46,23 +50,23 @@ def test_without_the_stiffness_the_law_leaves_more_unexplained():
 
 def test_lines_are_those_of_a_polynomial_of_degree_one():
     felt = np.random.default_rng(0).normal(size=(5, 3)) + SLIPS[:, None]
-    a, b, r2 = lines(felt, SLIPS)
+    a, b, r2 = fit_lines(felt, SLIPS)
     for k in range(3):
         np.testing.assert_allclose(np.polyfit(felt[:, k], SLIPS, 1), [b[k], a[k]])
         assert r2[k] == pytest.approx(np.corrcoef(felt[:, k], SLIPS)[0, 1] ** 2)
 
 
 def test_midstance_torque_rises_with_slip_on_the_stiff_soils_and_then_no_more():
-    torque = torques(four_soils())
+    torque = midstance_torques(four_soils())
     assert (torque[1, [0, 1, 3]] > 1.2 * torque[0, [0, 1, 3]]).all()
     assert (np.abs(torque[-1] / torque[1] - 1) < 0.05).all()
 
 
 def test_a_soil_that_does_not_carry_the_foot_has_no_line():
     known = four_soils()
-    heavy = torques(known, load=36.8)
+    heavy = midstance_torques(known, load=36.8)
     assert list(np.isnan(heavy).all(axis=0)) == [True, False, True, False]
-    with pytest.raises(FitError, match="2 of 4 soils have no line"):
+    with pytest.raises(FitError, match="2 of 4 soils have no slip model"):
         fit_torque_slip(
             heavy, SLIPS, known.soil.friction_angle, known.normal_stiffness, "terramechanics"
         )

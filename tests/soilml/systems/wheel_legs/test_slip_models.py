@@ -69,9 +69,9 @@ def test_one_vibration_and_slip_give_the_drop_that_gives_that_slip():
 
 
 def test_models_that_cannot_tell_say_which_can():
-    with pytest.raises(InputError, match="take the planar one"):
+    with pytest.raises(InputError, match="use the planar model"):
         VIBRATION_SLIP["linear"].spring(0.1, 0.1)
-    with pytest.raises(InputError, match="take the linear model"):
+    with pytest.raises(InputError, match="use the linear model"):
         VIBRATION_SLIP["planar"].drop(1.0, 0.1)
 
 

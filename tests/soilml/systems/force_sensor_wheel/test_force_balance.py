@@ -10,21 +10,21 @@ from scipy.integrate import quad
 from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
 from soilml.errors import FitError, InputError
 from soilml.systems.force_sensor_wheel import (
-    Run,
     SensingWheel,
-    Strength,
+    ShearStrength,
+    SteadyRun,
     StressProfile,
     balanced_arc,
-    conventional,
-    forces,
-    solve,
-    stressed_arc,
+    bekker_stress_profile,
+    forces_from_profile,
+    parabolic_arc,
+    solve_force_balance,
 )
-from soilml.systems.force_sensor_wheel.force_balance import excess
+from soilml.systems.force_sensor_wheel.force_balance import excess_pull
 
 SENSORS = SensingWheel(noise=0.0)
 PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
-STRENGTH = Strength(friction_angle=PHI)
+STRENGTH = ShearStrength(friction_angle=PHI)
 RIM = {"radius": 0.055, "width": 0.064}
 
 
@@ -53,8 +53,8 @@ def by_hand(profile, magnification, modulus, cohesion, slip):
     ("cohesion", "slip", "modulus"), [(0.0, 0.11, 0.0072), (800.0, 0.6, 0.001), (0.0, -0.2, 0.003)]
 )
 def test_forces_are_those_of_dense_quadrature(cohesion, slip, modulus):
-    profile = stressed_arc(0.2, 0.6, 2e4, lean=0.3, points=41)
-    found = forces(
+    profile = parabolic_arc(0.2, 0.6, 2e4, lean=0.3, points=41)
+    found = forces_from_profile(
         profile,
         magnification=1.3,
         shear_modulus=modulus,
@@ -69,11 +69,15 @@ def test_forces_are_those_of_dense_quadrature(cohesion, slip, modulus):
 
 
 def test_a_batch_is_its_rows():
-    profile = stressed_arc(0.2, 0.6, 2e4)
+    profile = parabolic_arc(0.2, 0.6, 2e4)
     modulus, slip = np.geomspace(1e-3, 0.1, 4)[:, None], np.asarray([0.1, 0.5, -0.1])
-    found = forces(profile, shear_modulus=modulus, friction_angle=PHI, slip=slip, **RIM)
+    found = forces_from_profile(
+        profile, shear_modulus=modulus, friction_angle=PHI, slip=slip, **RIM
+    )
     assert found.load.shape == (4, 3)
-    one = forces(profile, shear_modulus=modulus[2, 0], friction_angle=PHI, slip=slip[2], **RIM)
+    one = forces_from_profile(
+        profile, shear_modulus=modulus[2, 0], friction_angle=PHI, slip=slip[2], **RIM
+    )
     assert found.drawbar_pull[2, 2] == pytest.approx(float(one.drawbar_pull), rel=1e-12)
 
 
@@ -82,30 +86,34 @@ def test_the_stress_of_the_model_gives_the_forces_of_the_model():
     sand, at = soil("nagatani2009/toyoura_sand"), Operating(slip=0.3, load=20.0)
     force, p = model(sand, at), model.profile(sand, at, points=401)
     profile = StressProfile(p.angle[::-1], np.maximum(p.normal[::-1], 0.0))
-    found = forces(profile, shear_modulus=TRUE, friction_angle=sand.friction_angle, slip=0.3, **RIM)
+    found = forces_from_profile(
+        profile, shear_modulus=TRUE, friction_angle=sand.friction_angle, slip=0.3, **RIM
+    )
     assert float(found.load) == pytest.approx(20.0, rel=1e-3)
     assert float(found.torque) == pytest.approx(float(force.torque), rel=1e-3)
-    pulled = Run(
+    pulled = SteadyRun(
         slip=0.3,
         weight=math.hypot(20.0, force.drawbar_pull),
         slope=math.atan2(force.drawbar_pull, 20.0),
     )
-    back = solve(profile, pulled, SENSORS, Strength(friction_angle=float(sand.friction_angle)))
+    back = solve_force_balance(
+        profile, pulled, SENSORS, ShearStrength(friction_angle=float(sand.friction_angle))
+    )
     assert back.shear_modulus == pytest.approx(TRUE, rel=0.02)
 
 
 @pytest.mark.parametrize(("slip", "slope"), [(0.11, 0.0), (0.39, 6.0), (0.8, 8.0)])
 def test_the_modulus_and_magnification_put_in_come_back(slip, slope):
-    at = Run(slip=slip, weight=WEIGHT, slope=math.radians(slope))
+    at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(slope))
     arc = balanced_arc(math.radians(30.0), at, SENSORS, STRENGTH, TRUE, lean=0.2)
-    found = solve(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
+    found = solve_force_balance(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
     assert found.shear_modulus == pytest.approx(TRUE, rel=1e-6)
     assert found.magnification == pytest.approx(1.7, rel=1e-6)
 
 
 def test_softer_shear_pulls_less():
-    profile, modulus = stressed_arc(0.2, 0.5, 2e4), np.geomspace(1e-4, 1.0, 30)
-    found = forces(profile, shear_modulus=modulus, friction_angle=PHI, slip=0.2, **RIM)
+    profile, modulus = parabolic_arc(0.2, 0.5, 2e4), np.geomspace(1e-4, 1.0, 30)
+    found = forces_from_profile(profile, shear_modulus=modulus, friction_angle=PHI, slip=0.2, **RIM)
     assert (np.diff(found.drawbar_pull / found.load) < 0).all()
 
 
@@ -115,7 +123,7 @@ def test_the_arc_that_table_i_asks_for_moves_forward_with_slip():
     peaks = [
         balanced_arc(
             math.radians(30.0),
-            Run(slip=s, weight=WEIGHT, slope=math.radians(a)),
+            SteadyRun(slip=s, weight=WEIGHT, slope=math.radians(a)),
             SENSORS,
             STRENGTH,
             k,
@@ -126,48 +134,50 @@ def test_the_arc_that_table_i_asks_for_moves_forward_with_slip():
 
 
 def test_the_conventional_profile_makes_too_much_of_the_grip():
-    at = Run(slip=0.11, weight=WEIGHT)
+    at = SteadyRun(slip=0.11, weight=WEIGHT)
     sand, wheel = soil("nagatani2009/toyoura_sand"), Wheel(**RIM)
-    wide = conventional(wheel, sand, slip=0.11, sinkage=0.016, rebound=0.3)
+    wide = bekker_stress_profile(wheel, sand, slip=0.11, sinkage=0.016, rebound=0.3)
     assert wide.entry_angle == pytest.approx(math.acos(1.0 - 0.016 / 0.055))
     assert wide.exit_angle == pytest.approx(-math.acos(1.0 - 0.3 * 0.016 / 0.055))
-    assert solve(wide, at, SENSORS, STRENGTH).shear_modulus > 2.0 * TRUE
-    found = forces(wide, shear_modulus=TRUE, friction_angle=PHI, slip=0.11, **RIM)
+    assert solve_force_balance(wide, at, SENSORS, STRENGTH).shear_modulus > 2.0 * TRUE
+    found = forces_from_profile(wide, shear_modulus=TRUE, friction_angle=PHI, slip=0.11, **RIM)
     assert float(found.drawbar_pull / found.load) * WEIGHT > 4.0
 
 
 def test_no_balance_says_which_side():
-    front, rear = stressed_arc(0.9, 0.5, 2e4), stressed_arc(-0.5, 0.5, 2e4)
-    at = Run(slip=0.2, weight=WEIGHT)
-    with pytest.raises(FitError, match="even with perfect grip"):
-        solve(front, at, SENSORS, STRENGTH)
-    with pytest.raises(FitError, match="even with hardly any grip"):
-        solve(rear, at, SENSORS, STRENGTH)
+    front, rear = parabolic_arc(0.9, 0.5, 2e4), parabolic_arc(-0.5, 0.5, 2e4)
+    at = SteadyRun(slip=0.2, weight=WEIGHT)
+    with pytest.raises(FitError, match="even with fully mobilised shear"):
+        solve_force_balance(front, at, SENSORS, STRENGTH)
+    with pytest.raises(FitError, match="even with hardly any shear"):
+        solve_force_balance(rear, at, SENSORS, STRENGTH)
     with pytest.raises(FitError, match="cohesion alone"):
-        solve(
-            stressed_arc(0.6, 0.5, 2e4),
-            Run(slip=0.2, weight=0.001),
+        solve_force_balance(
+            parabolic_arc(0.6, 0.5, 2e4),
+            SteadyRun(slip=0.2, weight=0.001),
             SENSORS,
-            Strength(friction_angle=PHI, cohesion=9e5),
+            ShearStrength(friction_angle=PHI, cohesion=9e5),
         )
 
 
 def test_there_is_at_most_one_balance():
     rng, modulus = np.random.default_rng(0), np.geomspace(1e-5, 10.0, 64)
     for _ in range(150):
-        arc = stressed_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
-        at = Run(slip=rng.uniform(-0.6, 0.9), weight=WEIGHT, slope=rng.uniform(-0.8, 0.5))
-        strength = Strength(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
-        left, _ = excess(arc, at, SENSORS, strength, modulus)
+        arc = parabolic_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
+        at = SteadyRun(slip=rng.uniform(-0.6, 0.9), weight=WEIGHT, slope=rng.uniform(-0.8, 0.5))
+        strength = ShearStrength(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
+        left, _ = excess_pull(arc, at, SENSORS, strength, modulus)
         above = left[np.isfinite(left)] > 0
         assert np.count_nonzero(above[1:] != above[:-1]) <= 1
 
 
 def test_several_balances_would_be_said(monkeypatch):
     waves = lambda *given: (np.sin(np.log(given[-1])), np.ones_like(given[-1]))  # noqa: E731
-    monkeypatch.setattr("soilml.systems.force_sensor_wheel.force_balance.excess", waves)
+    monkeypatch.setattr("soilml.systems.force_sensor_wheel.force_balance.excess_pull", waves)
     with pytest.raises(FitError, match="shear moduli satisfy both balances"):
-        solve(stressed_arc(0.2, 0.5, 2e4), Run(slip=0.2, weight=WEIGHT), SENSORS, STRENGTH)
+        solve_force_balance(
+            parabolic_arc(0.2, 0.5, 2e4), SteadyRun(slip=0.2, weight=WEIGHT), SENSORS, STRENGTH
+        )
 
 
 @pytest.mark.parametrize(
@@ -175,7 +185,7 @@ def test_several_balances_would_be_said(monkeypatch):
     [
         ([0.0, 0.1, 0.2], [0.0, 0.0, 0.0], "without contact"),
         ([0.0, 10.0, 20.0], [0.0, 1.0, 0.0], "radians"),
-        ([0.0, 0.2, 0.1], [0.0, 1.0, 0.0], "rise"),
+        ([0.0, 0.2, 0.1], [0.0, 1.0, 0.0], "increase"),
         ([0.0, 0.1, 0.2], [0.0, -1.0, 0.0], "sensor's zero"),
         ([0.0, 0.1, 0.2], [0.0, math.nan, 0.0], "not finite"),
         ([0.0, 0.1], [0.0, 1.0], "three or more"),
@@ -189,16 +199,16 @@ def test_what_is_no_profile_is_refused(angle, normal, said):
 
 
 def test_values_out_of_range_are_refused():
-    profile = stressed_arc(0.2, 0.5, 2e4)
+    profile = parabolic_arc(0.2, 0.5, 2e4)
     with pytest.raises(InputError, match="degrees"):
-        forces(profile, shear_modulus=TRUE, friction_angle=38.0, slip=0.2, **RIM)
+        forces_from_profile(profile, shear_modulus=TRUE, friction_angle=38.0, slip=0.2, **RIM)
     with pytest.raises(InputError, match="slip"):
-        forces(profile, shear_modulus=TRUE, friction_angle=PHI, slip=1.2, **RIM)
+        forces_from_profile(profile, shear_modulus=TRUE, friction_angle=PHI, slip=1.2, **RIM)
     with pytest.raises(InputError, match="slope"):
-        Run(slip=0.2, weight=WEIGHT, slope=8.0)
+        SteadyRun(slip=0.2, weight=WEIGHT, slope=8.0)
     with pytest.raises(InputError, match="rebound"):
-        conventional(
+        bekker_stress_profile(
             Wheel(**RIM), soil("nagatani2009/toyoura_sand"), slip=0.1, sinkage=0.06, rebound=0.1
         )
-    with pytest.raises(FitError, match="no place of an arc"):
-        balanced_arc(0.5, Run(slip=0.1, weight=WEIGHT, slope=-1.2), SENSORS, STRENGTH, TRUE)
+    with pytest.raises(FitError, match="no position of an arc"):
+        balanced_arc(0.5, SteadyRun(slip=0.1, weight=WEIGHT, slope=-1.2), SENSORS, STRENGTH, TRUE)

@@ -11,28 +11,28 @@ import pytest
 from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
 from soilml.errors import FitError, InputError
 from soilml.systems.force_sensor_wheel import (
-    Readings,
-    Run,
     SensingWheel,
-    Strength,
+    SensorReadings,
+    ShearStrength,
+    SteadyRun,
     StressProfile,
-    averaged,
     balanced_arc,
-    estimate,
-    profiled,
-    pull,
-    sensed,
-    sharpened,
-    solve,
+    bin_stress,
+    deconvolve,
+    estimate_shear_modulus,
+    predict_pull,
+    profile_from_readings,
+    simulate_readings,
+    solve_force_balance,
 )
-from soilml.systems.force_sensor_wheel.uncertainty import between_turns, student
+from soilml.systems.force_sensor_wheel.uncertainty import jackknife_covariance, student_t_quantile
 
 NOISY = SensingWheel()
 QUIET = replace(NOISY, noise=0.0)
 TRUE, WEIGHT = 0.0072, 28.92
-STRENGTH = Strength(friction_angle=math.radians(38.0))
-LEVEL = Run(slip=0.11, weight=WEIGHT)
-UP = Run(slip=0.29, weight=WEIGHT, slope=math.radians(4.0))
+STRENGTH = ShearStrength(friction_angle=math.radians(38.0))
+LEVEL = SteadyRun(slip=0.11, weight=WEIGHT)
+UP = SteadyRun(slip=0.29, weight=WEIGHT, slope=math.radians(4.0))
 
 
 def arc(at=LEVEL, lean=0.0):
@@ -41,39 +41,41 @@ def arc(at=LEVEL, lean=0.0):
 
 def test_a_sensor_reads_the_mean_over_its_disc():
     flat = StressProfile(np.asarray([-0.8, -0.79, 0.8, 0.81]), np.asarray([0.0, 2e4, 2e4, 0.0]))
-    force = sensed(flat, QUIET, turns=1).force
+    force = simulate_readings(flat, QUIET, turns=1).force
     assert force.max() == pytest.approx(2e4 * math.pi * 0.00475**2, rel=1e-9)
-    edge = sensed(flat, replace(QUIET, deadband=0.0), turns=200)
+    edge = simulate_readings(flat, replace(QUIET, deadband=0.0), turns=200)
     at_edge = np.abs(edge.angle - 0.805) < 0.003
     assert edge.force[at_edge].mean() == pytest.approx(0.5 * force.max(), rel=0.03)
 
 
 def test_the_deadband_and_the_end_of_the_sensors_show():
-    force = sensed(arc(), NOISY, turns=2).force
+    force = simulate_readings(arc(), NOISY, turns=2).force
     assert force[force > 0].min() >= 0.1
-    strong = sensed(StressProfile(arc().angle, 10.0 * arc().normal), NOISY, turns=2).force
+    strong = simulate_readings(
+        StressProfile(arc().angle, 10.0 * arc().normal), NOISY, turns=2
+    ).force
     assert strong.max() == 4.4
 
 
 def test_more_stress_in_the_middle_keeps_the_mean_over_the_width():
     many = replace(QUIET, sensors=40, deadband=0.0)
-    even, crowned = (sensed(arc(), many, turns=1, crown=c).force for c in (0.0, 0.4))
+    even, crowned = (simulate_readings(arc(), many, turns=1, crown=c).force for c in (0.0, 0.4))
     assert crowned.mean() == pytest.approx(even.mean(), rel=1e-3)
     assert crowned[..., 20].max() > 1.3 * crowned[..., 0].max()
 
 
 def test_readings_as_they_are_look_too_long_and_make_k_too_large():
-    felt = averaged(sensed(arc(), QUIET), QUIET)
-    raw = StressProfile(felt.angle, felt.normal)
+    binned = bin_stress(simulate_readings(arc(), QUIET), QUIET)
+    raw = StressProfile(binned.angle, binned.normal)
     assert raw.entry_angle > arc().entry_angle + 0.01
-    assert solve(raw, LEVEL, QUIET, STRENGTH).shear_modulus > 1.08 * TRUE
+    assert solve_force_balance(raw, LEVEL, QUIET, STRENGTH).shear_modulus > 1.08 * TRUE
 
 
 @pytest.mark.parametrize("at", [LEVEL, UP], ids=["level", "uphill"])
 @pytest.mark.parametrize("lean", [-0.4, 0.0])
 def test_the_modulus_comes_back_through_quiet_sensors(at, lean):
-    readings = sensed(arc(at, lean), QUIET, crown=0.3, lugs=(0.3, 0.3))
-    found = solve(profiled(readings, QUIET), at, QUIET, STRENGTH)
+    readings = simulate_readings(arc(at, lean), QUIET, crown=0.3, lugs=(0.3, 0.3))
+    found = solve_force_balance(profile_from_readings(readings, QUIET), at, QUIET, STRENGTH)
     assert found.shear_modulus == pytest.approx(TRUE, rel=0.02)
     assert found.magnification == pytest.approx(1.0 / 0.7, rel=0.03)
 
@@ -84,15 +86,22 @@ def test_the_modulus_of_a_wheel_with_stress_shift_comes_back_through_quiet_senso
     force, p = model(sand, at), model.profile(sand, at, points=401)
     true = StressProfile(p.angle[::-1], np.maximum(p.normal[::-1], 0.0))
     slope = math.atan2(force.drawbar_pull, 20.0)
-    run = Run(slip=0.3, weight=math.hypot(20.0, force.drawbar_pull), slope=slope)
-    found = solve(profiled(sensed(true, QUIET), QUIET), run, QUIET, STRENGTH)
+    run = SteadyRun(slip=0.3, weight=math.hypot(20.0, force.drawbar_pull), slope=slope)
+    found = solve_force_balance(
+        profile_from_readings(simulate_readings(true, QUIET), QUIET), run, QUIET, STRENGTH
+    )
     assert found.shear_modulus == pytest.approx(TRUE, rel=0.02)
 
 
 def test_lugs_that_carry_more_in_front_make_k_too_large():
     """M is one number: it cannot follow the lugs along the arc."""
     even, front = (
-        solve(profiled(sensed(arc(), QUIET, lugs=lugs), QUIET), LEVEL, QUIET, STRENGTH)
+        solve_force_balance(
+            profile_from_readings(simulate_readings(arc(), QUIET, lugs=lugs), QUIET),
+            LEVEL,
+            QUIET,
+            STRENGTH,
+        )
         for lugs in ((0.3, 0.3), (0.5, 0.1))
     )
     assert front.shear_modulus > 1.1 * even.shear_modulus
@@ -101,11 +110,13 @@ def test_lugs_that_carry_more_in_front_make_k_too_large():
 
 def test_a_saturated_top_is_inferred_from_the_flanks_and_said():
     weak = replace(QUIET, saturation=1.2)
-    readings = sensed(arc(), weak)
-    grip = estimate(readings, LEVEL, weak, STRENGTH)
+    readings = simulate_readings(arc(), weak)
+    grip = estimate_shear_modulus(readings, LEVEL, weak, STRENGTH)
     assert any("saturated" in said for said in grip.warnings)
     assert grip.shear_modulus == pytest.approx(TRUE, rel=0.05)
-    assert not estimate(sensed(arc(), QUIET), LEVEL, QUIET, STRENGTH).warnings
+    assert not estimate_shear_modulus(
+        simulate_readings(arc(), QUIET), LEVEL, QUIET, STRENGTH
+    ).warnings
 
 
 def test_nine_of_ten_intervals_hold_the_truth():
@@ -124,12 +135,14 @@ def test_nine_of_ten_intervals_hold_the_truth():
         )
 
     for i in range(runs):
-        first = sensed(level[i % 3], NOISY, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=i)
-        grip = estimate(first, driven(LEVEL), NOISY, STRENGTH)
+        first = simulate_readings(level[i % 3], NOISY, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=i)
+        grip = estimate_shear_modulus(first, driven(LEVEL), NOISY, STRENGTH)
         held += grip.interval[0] <= TRUE <= grip.interval[1]
         apart.append(math.log(grip.shear_modulus / TRUE) / math.sqrt(grip.covariance[0, 0]))
-        later = sensed(up[i % 3], NOISY, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=runs + i)
-        found = pull(later, driven(UP), NOISY, STRENGTH, grip)
+        later = simulate_readings(
+            up[i % 3], NOISY, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=runs + i
+        )
+        found = predict_pull(later, driven(UP), NOISY, STRENGTH, grip)
         pulled += found.interval[0] <= WEIGHT * math.sin(UP.slope) <= found.interval[1]
     assert held / runs == pytest.approx(0.9, abs=0.1)
     assert pulled / runs == pytest.approx(0.9, abs=0.1)
@@ -140,16 +153,18 @@ def test_noisier_sensors_and_unsure_slips_widen_the_answer():
     def std(noise, slip_std):
         wheel = replace(NOISY, noise=noise)
         at = replace(LEVEL, slip_std=slip_std)
-        return estimate(sensed(arc(), wheel), at, wheel, STRENGTH).shear_modulus_std
+        return estimate_shear_modulus(
+            simulate_readings(arc(), wheel), at, wheel, STRENGTH
+        ).shear_modulus_std
 
     assert std(0.05, 0.0) > 1.3 * std(0.0, 0.0)
     assert std(0.02, 0.02) > 2.0 * std(0.02, 0.0)
 
 
 def test_a_pull_beyond_the_slips_it_holds_for_says_so():
-    grip = estimate(sensed(arc(), QUIET), LEVEL, QUIET, STRENGTH)
-    fast = Run(slip=0.8, weight=WEIGHT, slope=math.radians(8.0))
-    found = pull(sensed(arc(fast), QUIET), fast, QUIET, STRENGTH, grip)
+    grip = estimate_shear_modulus(simulate_readings(arc(), QUIET), LEVEL, QUIET, STRENGTH)
+    fast = SteadyRun(slip=0.8, weight=WEIGHT, slope=math.radians(8.0))
+    found = predict_pull(simulate_readings(arc(fast), QUIET), fast, QUIET, STRENGTH, grip)
     assert "0.5" in found.warnings[0]
     assert found.drawbar_pull == pytest.approx(WEIGHT * math.sin(fast.slope), abs=0.3)
 
@@ -158,51 +173,51 @@ def test_students_t_is_that_of_the_tables():
     from scipy.stats import t
 
     for freedom in (3, 5, 20, 1000.0):
-        assert student(freedom) == pytest.approx(t.ppf(0.95, freedom), rel=0.005)
-    assert student(2) == pytest.approx(t.ppf(0.95, 2), rel=0.025)
+        assert student_t_quantile(freedom) == pytest.approx(t.ppf(0.95, freedom), rel=0.005)
+    assert student_t_quantile(2) == pytest.approx(t.ppf(0.95, 2), rel=0.025)
 
 
 def test_the_jackknife_of_a_mean_is_its_variance():
     force = np.random.default_rng(3).normal(2.0, 0.3, (8, 1, 1))
-    readings = Readings(np.zeros((8, 1)), force)
-    found = between_turns(readings, lambda r: np.asarray([r.force.mean()]))
+    readings = SensorReadings(np.zeros((8, 1)), force)
+    found = jackknife_covariance(readings, lambda r: np.asarray([r.force.mean()]))
     assert found[0, 0] == pytest.approx(force.var(ddof=1) / 8, rel=1e-9)
 
 
 def test_readings_that_tell_nothing_are_refused():
-    readings = sensed(arc(), QUIET, turns=2)
+    readings = simulate_readings(arc(), QUIET, turns=2)
     with pytest.raises(InputError, match="without contact"):
-        averaged(Readings(readings.angle, 0.0 * readings.force), QUIET)
+        bin_stress(SensorReadings(readings.angle, 0.0 * readings.force), QUIET)
     with pytest.raises(FitError, match="turns"):
-        estimate(readings, LEVEL, QUIET, STRENGTH)
-    with pytest.raises(FitError, match="places on the rim"):
+        estimate_shear_modulus(readings, LEVEL, QUIET, STRENGTH)
+    with pytest.raises(FitError, match="bins of the rim"):
         weak = replace(QUIET, saturation=0.15)
-        sharpened(averaged(sensed(arc(), weak), weak), weak)
-    with pytest.raises(FitError, match="single arc"):
-        both = Readings(readings.angle, readings.force + np.roll(readings.force, 85, axis=1))
-        sharpened(averaged(both, QUIET), QUIET)
+        deconvolve(bin_stress(simulate_readings(arc(), weak), weak), weak)
+    with pytest.raises(FitError, match="single stress arc"):
+        both = SensorReadings(readings.angle, readings.force + np.roll(readings.force, 85, axis=1))
+        deconvolve(bin_stress(both, QUIET), QUIET)
     with pytest.raises(InputError, match="whole number"):
         replace(QUIET, sensors=2.5)
     with pytest.raises(InputError, match="radians"):
-        Readings(np.rad2deg(readings.angle), readings.force)
+        SensorReadings(np.rad2deg(readings.angle), readings.force)
     with pytest.raises(InputError, match="shape"):
-        Readings(readings.angle[0], readings.force)
+        SensorReadings(readings.angle[0], readings.force)
     with pytest.raises(InputError, match="deadband"):
         replace(QUIET, saturation=0.05)
     with pytest.raises(InputError, match="lugs"):
-        sensed(arc(), QUIET, lugs=(1.0, 0.0))
+        simulate_readings(arc(), QUIET, lugs=(1.0, 0.0))
     with pytest.raises(InputError, match="turns"):
-        sensed(arc(), QUIET, turns=0)
+        simulate_readings(arc(), QUIET, turns=0)
 
 
 def test_the_lines_on_the_page_run():
     page = (Path(__file__).parents[4] / "docs/papers/nagatani2009.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
-    assert names["grip"].interval[0] < TRUE < names["grip"].interval[1]
+    assert names["modulus"].interval[0] < TRUE < names["modulus"].interval[1]
 
 
 def test_readings_of_another_row_of_sensors_are_refused():
     angle = np.zeros((3, 5))
     with pytest.raises(InputError, match="readings of 2 sensors; the wheel has 4 in a row"):
-        averaged(Readings(angle, np.ones((3, 5, 2))), SensingWheel())
+        bin_stress(SensorReadings(angle, np.ones((3, 5, 2))), SensingWheel())

@@ -74,7 +74,7 @@ def test_legs_stand_evenly_about_the_hub():
 def test_what_is_no_wheel_leg_is_refused_in_one_line(change, said):
     with pytest.raises(InputError, match=said):
         wheel_leg("LTF", **change)
-    assert replace(WheelLeg(), **change).flaw
+    assert replace(WheelLeg(), **change).invalid_reason
 
 
 def test_an_unknown_foot_is_refused_with_those_there_are():

@@ -7,11 +7,11 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.systems.climbing import Rover, SimulatedRover, Uncertainty
-from soilml.systems.climbing.ability import grip_of_rover
-from soilml.systems.climbing.balance_noise import spread
-from soilml.systems.climbing.wheel_force_parts import parts, pull_of_rover
-from soilml.systems.climbing.wheel_loads import with_loads
-from soilml.systems.force_sensor_wheel import forces
+from soilml.systems.climbing.ability import slope_pull
+from soilml.systems.climbing.balance_noise import balance_std
+from soilml.systems.climbing.wheel_force_components import force_components, pull_of_rover
+from soilml.systems.climbing.wheel_loads import estimate_wheel_loads
+from soilml.systems.force_sensor_wheel import forces_from_profile
 
 EXACT = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0)
 
@@ -23,12 +23,12 @@ def true():
 
 @pytest.fixture(scope="module")
 def climb(true):
-    return true.climbs(np.random.default_rng(0), [0.14], 1)[0]
+    return true.simulate_climbs(np.random.default_rng(0), [0.14], 1)[0]
 
 
 def test_forces_are_straight_lines_in_magnification_and_cohesion(true, climb):
-    wheel = parts(climb.front, true.rover, 0.007)
-    whole = forces(
+    wheel = force_components(climb.front, true.rover, 0.007)
+    whole = forces_from_profile(
         climb.front.profile,
         magnification=1.7,
         cohesion=300.0,
@@ -56,40 +56,45 @@ def test_half_a_centre_of_mass_is_refused():
 
 def test_a_climb_balances_at_its_true_soil(true, climb):
     c, phi, k = true.shear
-    wheels = parts(climb.front, true.rover, k), parts(climb.rear, true.rover, k)
+    wheels = (
+        force_components(climb.front, true.rover, k),
+        force_components(climb.rear, true.rover, k),
+    )
     pull = pull_of_rover(true.rover, climb.slope, wheels, c, np.tan(phi))
     # what is left is the sampling of the rim
     assert pull == pytest.approx(true.rover.weight * np.sin(climb.slope), abs=0.6)
 
 
 def test_soil_that_gives_way_pulls_less(true, climb):
-    wheels = tuple(parts(w, true.rover, np.asarray([0.003, 0.007, 0.02])) for w in climb.wheels)
+    wheels = tuple(
+        force_components(w, true.rover, np.asarray([0.003, 0.007, 0.02])) for w in climb.wheels
+    )
     pull = pull_of_rover(true.rover, climb.slope, wheels, 0.0, np.tan(0.66))
     assert np.all(np.diff(pull) < 0.0)
 
 
-def test_the_slope_that_a_grip_climbs_is_where_pull_equals_weight(true, climb):
-    wheels = tuple(parts(w, true.rover, 0.007) for w in climb.wheels)
+def test_the_slope_that_a_forces_climbs_is_where_pull_equals_weight(true, climb):
+    wheels = tuple(force_components(w, true.rover, 0.007) for w in climb.wheels)
     for cohesion in (0.0, 800.0):
-        grip = grip_of_rover(true.rover, wheels, cohesion, np.tan(0.66), true.rover.front_share)
-        slope = grip.slope()
-        assert grip.pull(slope) == pytest.approx(true.rover.weight * np.sin(slope), rel=1e-12)
+        forces = slope_pull(true.rover, wheels, cohesion, np.tan(0.66), true.rover.front_share)
+        slope = forces.equilibrium_slope()
+        assert forces.pull(slope) == pytest.approx(true.rover.weight * np.sin(slope), rel=1e-12)
         apart = pull_of_rover(true.rover, slope, wheels, cohesion, np.tan(0.66))
-        assert grip.pull(slope) == pytest.approx(apart, rel=1e-12)
+        assert forces.pull(slope) == pytest.approx(apart, rel=1e-12)
 
 
 def test_loads_of_wheels_are_found_from_climbs(true):
-    climbs = true.climbs(np.random.default_rng(1), [0.0, 0.07, 0.14, 0.2], 1)
+    climbs = true.simulate_climbs(np.random.default_rng(1), [0.0, 0.07, 0.14, 0.2], 1)
     unknown = replace(true.rover, front_share=None, height_ratio=None)
-    found = with_loads(unknown, climbs, true.shear)
+    found = estimate_wheel_loads(unknown, climbs, true.shear)
     assert found.front_share == pytest.approx(0.52, abs=0.005)
     assert found.height_ratio == pytest.approx(0.4, abs=0.03)
 
 
 def test_speed_matters_most_at_low_slip(true):
     noise = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0, speed_scale=0.01)
-    climbs = true.climbs(np.random.default_rng(2), [0.0, 0.1, 0.2], 1)
-    by_speed = [abs(spread(true.rover, c, true.shear, noise)[1]) for c in climbs]
+    climbs = true.simulate_climbs(np.random.default_rng(2), [0.0, 0.1, 0.2], 1)
+    by_speed = [abs(balance_std(true.rover, c, true.shear, noise)[1]) for c in climbs]
     assert by_speed[0] > 2.0 * by_speed[2]
 
 
@@ -100,9 +105,12 @@ def test_noise_of_the_balance_is_what_repeated_readings_show():
     c, phi, k = true.shear
     unknown = replace(true.rover, front_share=None, height_ratio=None)
     off = []
-    for climb in true.climbs(np.random.default_rng(3), [0.1], 200):
-        wheels = parts(climb.front, true.rover, k), parts(climb.rear, true.rover, k)
+    for climb in true.simulate_climbs(np.random.default_rng(3), [0.1], 200):
+        wheels = (
+            force_components(climb.front, true.rover, k),
+            force_components(climb.rear, true.rover, k),
+        )
         pull = pull_of_rover(unknown, climb.slope, wheels, c, np.tan(phi))
         off.append(pull - true.rover.weight * np.sin(climb.slope))
-    claimed = spread(unknown, climb, true.shear, noise)[0]
+    claimed = balance_std(unknown, climb, true.shear, noise)[0]
     assert np.std(off) == pytest.approx(claimed, rel=0.2)

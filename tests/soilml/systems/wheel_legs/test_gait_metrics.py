@@ -4,33 +4,33 @@ import numpy as np
 import pytest
 
 from soilml.systems.wheel_legs.walking.gait_metrics import (
-    falls_until,
-    feet_compared,
-    gait,
-    legs_compared,
+    compare_feet,
+    compare_legs,
+    decreasing_until,
+    gait_metrics,
 )
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import Ground
+from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.walk import walk
 
 
 @pytest.fixture(scope="module")
 def legs():
-    return legs_compared(Ground(stiffness=0.7e6))
+    return compare_legs(LinearGround(stiffness=0.7e6))
 
 
 @pytest.fixture(scope="module")
 def feet():
-    return feet_compared()
+    return compare_feet()
 
 
 def test_every_leg_added_up_to_five_lowers_the_slip(legs):
-    assert falls_until(legs.rms_slip) >= 5
+    assert decreasing_until(legs.rms_slip) >= 5
 
 
 def test_the_body_lies_on_the_ground_until_a_fifth_leg_lifts_it(legs):
-    assert np.ptp(legs.most_sinkage[:4]) < 0.01 * legs.most_sinkage[0]
-    assert legs.most_sinkage[4] < 0.9 * legs.most_sinkage[3]
+    assert np.ptp(legs.max_sinkage[:4]) < 0.01 * legs.max_sinkage[0]
+    assert legs.max_sinkage[4] < 0.9 * legs.max_sinkage[3]
 
 
 def test_up_to_four_legs_the_mean_square_of_sinkage_grows_with_the_time_on_the_ground(legs):
@@ -73,14 +73,14 @@ def test_a_straight_line_has_its_slope_and_no_error(feet):
 
 
 def test_falling_ends_where_a_value_is_not_lower():
-    assert falls_until(np.array([3.0, 2.0, 1.0])) == 3
-    assert falls_until(np.array([3.0, 2.0, 2.0, 1.0])) == 2
-    assert falls_until(np.array([1.0, 2.0])) == 1
-    assert falls_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
+    assert decreasing_until(np.array([3.0, 2.0, 1.0])) == 3
+    assert decreasing_until(np.array([3.0, 2.0, 2.0, 1.0])) == 2
+    assert decreasing_until(np.array([1.0, 2.0])) == 1
+    assert decreasing_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
 
 
 def test_a_walk_that_stopped_has_no_figures():
-    stopped = gait(walk(wheel_leg("LTF"), Ground(stiffness=10.0)))
+    stopped = gait_metrics(walk(wheel_leg("LTF"), LinearGround(stiffness=10.0)))
     assert stopped.status[0] != 0
     figures = [v for name, v in vars(stopped).items() if name != "status"]
     assert np.isnan(figures).all()

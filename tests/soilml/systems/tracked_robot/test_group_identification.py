@@ -9,8 +9,13 @@ from soilml import Case, Model, soil
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
-from soilml.systems.tracked_robot.group_identification import FIVE, driven, identified, predicted
-from soilml.systems.tracked_robot.pull_regression import regression
+from soilml.systems.tracked_robot.group_identification import (
+    PARAMETERS,
+    identify_groups,
+    predicted_pull,
+    simulate_group,
+)
+from soilml.systems.tracked_robot.pull_regression import linear_regression
 from soilml.systems.tracked_robot.robot import WANG2018
 
 PRIOR = {
@@ -33,16 +38,19 @@ SHEAR = ("friction_angle", "shear_modulus", "cohesion")
 def groups():
     rng = np.random.default_rng(3)
     slips = np.linspace(0.05, 0.85, 8)
-    tables = [driven(CASE, slips, WANG2018.load, rng) for _ in range(4)]
-    return identified(CASE, tables, SHEAR)
+    tables = [simulate_group(CASE, slips, WANG2018.load, rng) for _ in range(4)]
+    return identify_groups(CASE, tables, SHEAR)
 
 
 def test_pull_at_one_load_finds_friction_and_modulus_and_not_cohesion(groups):
     assert groups.names == SHEAR
-    assert "cohesion" in groups.open
-    assert groups.left["friction_angle"] < 0.5 and groups.left["shear_modulus"] < 0.5
+    assert "cohesion" in groups.unidentified
+    assert (
+        groups.remaining_fraction["friction_angle"] < 0.5
+        and groups.remaining_fraction["shear_modulus"] < 0.5
+    )
     cohesion = groups.names.index("cohesion")
-    assert groups.joint.left["cohesion"] > 0.9
+    assert groups.pooled.left["cohesion"] > 0.9
     # the average of what is not told is as wide as the prior
     assert groups.std[cohesion] > 0.7 * PRIOR["cohesion"].std
 
@@ -50,7 +58,7 @@ def test_pull_at_one_load_finds_friction_and_modulus_and_not_cohesion(groups):
 def test_the_truth_lies_within_what_is_claimed(groups):
     truth = np.asarray([getattr(CASE.soil, name) for name in groups.names])
     assert (np.abs(groups.mean - truth) < 3.0 * groups.std).all()
-    assert (np.abs(groups.joint.values - truth) < 3.0 * groups.joint.std).all()
+    assert (np.abs(groups.pooled.values - truth) < 3.0 * groups.pooled.std).all()
 
 
 def test_an_average_is_surer_than_a_group_only_where_groups_differ(groups):
@@ -61,15 +69,17 @@ def test_an_average_is_surer_than_a_group_only_where_groups_differ(groups):
 
 
 def test_a_fit_predicts_fresh_runs(groups):
-    fresh = driven(CASE, np.linspace(0.08, 0.8, 12), WANG2018.load, np.random.default_rng(9))
-    line = regression(predicted(CASE, groups.joint, fresh), fresh["drawbar_pull_N"])
+    fresh = simulate_group(
+        CASE, np.linspace(0.08, 0.8, 12), WANG2018.load, np.random.default_rng(9)
+    )
+    line = linear_regression(predicted_pull(CASE, groups.pooled, fresh), fresh["drawbar_pull_N"])
     assert line.r2 > 0.95 and abs(line.slope - 1.0) < 4.0 * line.slope_std
 
 
 def test_five_parameters_are_those_of_the_paper_and_one_group_is_no_average():
-    assert set(FIVE) == set(PRIOR)
-    table = driven(CASE, np.linspace(0.1, 0.8, 4), WANG2018.load, np.random.default_rng(0))
+    assert set(PARAMETERS) == set(PRIOR)
+    table = simulate_group(CASE, np.linspace(0.1, 0.8, 4), WANG2018.load, np.random.default_rng(0))
     with pytest.raises(InputError, match="1 groups of data"):
-        identified(CASE, [table])
+        identify_groups(CASE, [table])
     with pytest.raises(InputError, match="must carry"):
-        driven(CASE, np.asarray([0.3]), 1e6, np.random.default_rng(0))
+        simulate_group(CASE, np.asarray([0.3]), 1e6, np.random.default_rng(0))

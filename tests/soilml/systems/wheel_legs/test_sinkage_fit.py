@@ -4,18 +4,23 @@ import numpy as np
 import pytest
 
 from soilml.errors import FitError, InputError
-from soilml.systems.wheel_legs.sensing.sinkage_fit import SinkageFit, fitted, fitted_to, simulated
+from soilml.systems.wheel_legs.sensing.sinkage_fit import (
+    SinkageFit,
+    fit_simulated_sinkage,
+    fit_sinkage,
+    simulate_sinkage,
+)
 from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return simulated()
+    return simulate_sinkage()
 
 
 @pytest.fixture(scope="module")
 def fit(rows):
-    return fitted_to(rows)
+    return fit_simulated_sinkage(rows)
 
 
 def test_denser_soil_is_sunk_into_less(rows):
@@ -25,7 +30,7 @@ def test_denser_soil_is_sunk_into_less(rows):
 
 def test_lines_that_hold_are_found_exactly():
     z = np.array([0.01, 0.02, 0.03, 0.05])
-    found = fitted(z, 400.0 / z, 0.8 - 6.0 * z, list("abcd"))
+    found = fit_sinkage(z, 400.0 / z, 0.8 - 6.0 * z, list("abcd"))
     assert found.s_sigma == pytest.approx(400.0)
     assert (found.s_i, found.s_z) == pytest.approx((0.8, -6.0))
     assert found.stiffness_r2 == pytest.approx(1.0) and found.friction_r2 == pytest.approx(1.0)
@@ -48,7 +53,7 @@ def test_soils_left_out_of_the_fit_lie_within_what_it_claims(rows):
     for name in GROUNDS:
         out = soils == name
         kept = (rows.sinkage, rows.normal_stiffness, rows.friction_angle)
-        found = fitted(*(values[~out] for values in kept), soils[~out])(rows.sinkage[out])
+        found = fit_sinkage(*(values[~out] for values in kept), soils[~out])(rows.sinkage[out])
         stiffness_off += [
             (rows.normal_stiffness[out] - found.normal_stiffness) / found.normal_stiffness_std
         ]
@@ -81,7 +86,7 @@ def test_a_sinkage_that_is_none_is_refused(fit, sinkage):
 
 def test_too_few_soils_are_refused():
     with pytest.raises(FitError, match="2 soils"):
-        fitted([0.01, 0.02, 0.03], [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], ["a", "b", "b"])
+        fit_sinkage([0.01, 0.02, 0.03], [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], ["a", "b", "b"])
     with pytest.raises(FitError, match="different sinkages"):
-        fitted([0.02] * 3, [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], list("abc"))
+        fit_sinkage([0.02] * 3, [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], list("abc"))
     assert SinkageFit.__doc__

@@ -5,14 +5,14 @@ import pytest
 from scipy import stats
 
 from soilml.errors import FitError, InputError
-from soilml.systems.tracked_robot.pull_regression import points_behind, regression
+from soilml.systems.tracked_robot.pull_regression import implied_points, linear_regression
 
 
 def test_the_line_is_that_of_scipy():
     rng = np.random.default_rng(0)
     x = rng.uniform(100.0, 700.0, 18)
     y = 1.13 * x - 30.0 + 60.0 * rng.standard_normal(18)
-    ours, theirs = regression(x, y), stats.linregress(x, y)
+    ours, theirs = linear_regression(x, y), stats.linregress(x, y)
     assert ours.slope == pytest.approx(theirs.slope)
     assert ours.intercept == pytest.approx(theirs.intercept)
     assert ours.r2 == pytest.approx(theirs.rvalue**2)
@@ -23,21 +23,21 @@ def test_the_line_is_that_of_scipy():
 
 def test_the_size_of_f_gives_away_the_number_of_points():
     x = np.arange(25.0)
-    line = regression(x, x + np.sin(7.0 * x))
-    assert points_behind(line.r2, line.f) == pytest.approx(25.0)
+    line = linear_regression(x, x + np.sin(7.0 * x))
+    assert implied_points(line.r2, line.f) == pytest.approx(25.0)
     with pytest.raises(InputError, match="r2 is 1"):
-        points_behind(1.0, 10.0)
+        implied_points(1.0, 10.0)
 
 
 def test_a_perfect_line_explains_all_and_no_line_is_refused():
-    line = regression([1.0, 2.0, 4.0], [3.0, 5.0, 9.0])
+    line = linear_regression([1.0, 2.0, 4.0], [3.0, 5.0, 9.0])
     assert (line.slope, line.intercept) == pytest.approx((2.0, 1.0))
     assert line.r2 == pytest.approx(1.0) and line.f > 1e12
-    with pytest.raises(FitError, match="no line"):
-        regression([1.0, 1.0, 1.0], [1.0, 2.0, 3.0])
+    with pytest.raises(FitError, match="no regression line"):
+        linear_regression([1.0, 1.0, 1.0], [1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="three or more"):
-        regression([1.0, 2.0], [1.0, 2.0])
+        linear_regression([1.0, 2.0], [1.0, 2.0])
     with pytest.raises(InputError, match="finite"):
-        regression([1.0, 2.0, np.nan], [1.0, 2.0, 3.0])
+        linear_regression([1.0, 2.0, np.nan], [1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="one length"):
-        regression([1.0, 2.0, 3.0], [1.0, 2.0])
+        linear_regression([1.0, 2.0, 3.0], [1.0, 2.0])

@@ -1,0 +1,52 @@
+"""Joining what three estimators say of a soil."""
+
+import numpy as np
+import pytest
+
+from soilml.errors import FitError
+from soilml.systems.wheel_legs.sensing.sensor_fusion import (
+    PROPERTIES,
+    RULES,
+    SENSORS,
+    fit_estimators,
+    score_estimators,
+)
+from soilml.systems.wheel_legs.sensing.simulated_stances import simulate_stances
+
+LEARN, HOLD = simulate_stances(300, seed=1), simulate_stances(300, seed=7)
+
+
+@pytest.fixture(scope="module", params=PROPERTIES)
+def estimators(request):
+    return fit_estimators(LEARN, request.param)
+
+
+def test_the_best_linear_rule_errs_no_more_than_any_other(estimators):
+    found = score_estimators(estimators, HOLD)
+    for name in (*SENSORS, "pairwise", "inverse variance"):
+        assert found["best linear"].rmse < 1.03 * found[name].rmse, name
+
+
+def test_rules_for_independent_errors_claim_too_much_where_errors_go_together(estimators):
+    found = score_estimators(estimators, HOLD)
+    assert np.abs(estimators.correlation[np.triu_indices(3, 1)]).max() > 0.5
+    assert found["inverse variance"].coverage_95 < 0.92
+    assert found["pairwise"].coverage_95 < 0.92
+    assert found["best linear"].coverage_95 == pytest.approx(0.95, abs=0.035)
+
+
+def test_sinkage_tells_the_stiffness_better_than_torque_or_vibration():
+    found = score_estimators(fit_estimators(LEARN, "normal_stiffness"), HOLD)
+    assert found["sinkage"].rmse < 0.7 * min(found["torque"].rmse, found["vibration"].rmse)
+
+
+def test_weights_sum_to_one_for_every_stance(estimators):
+    for rule in RULES:
+        weights = estimators.fused(HOLD, rule).weights
+        assert weights.shape == (3, 300)
+        np.testing.assert_allclose(weights.sum(axis=0), 1.0)
+
+
+def test_a_few_stances_are_refused():
+    with pytest.raises(FitError, match="5 stances are given; 20 or more"):
+        fit_estimators(simulate_stances(5, seed=1), "friction_angle")
