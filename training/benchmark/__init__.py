@@ -1,1 +1,13 @@
-"""The fixed benchmark beside the Bayes limit, and comparisons on data of one's own."""
+"""Benchmark of estimators on fixed simulated sets, relative to the Bayes limit of the same sets.
+
+`benchmark` (in `suite`) scores model files, analytic methods and functions of the caller; `goals`
+(in `acceptance`) tests the scores against acceptance goals; `compare` (in `user_comparison`) does
+the same on the user's test data, without a Bayes limit.
+"""
+
+from training.benchmark.acceptance import Goal, goals
+from training.benchmark.paired_results import PairedResult
+from training.benchmark.suite import benchmark
+from training.benchmark.user_comparison import MethodScore, compare
+
+__all__ = ["Goal", "MethodScore", "PairedResult", "benchmark", "compare", "goals"]

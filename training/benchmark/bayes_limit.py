@@ -1,4 +1,4 @@
-"""The Bayes limit of the benchmark's sets: exact posteriors, slow, so made once and kept."""
+"""The Bayes limit of the benchmark's sets: exact posteriors, computed once and stored."""
 
 from __future__ import annotations
 
@@ -18,101 +18,103 @@ from soilml.identification.observations import read_observations
 from soilml.identification.posterior import most_misfit
 from soilml.identification.predictions import readings
 from soilml.io.table import Table
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from training.benchmark.chebyshev_surrogate import interpolated
-from training.benchmark.designs import DesignSets, fingerprint, sets_of, shown, with_effect
+from soilml.numerics.importance_sampling import importance_sample
+from training.benchmark.chebyshev_surrogate import fit_chebyshev_surrogate
+from training.benchmark.designs import (
+    DesignSets,
+    generate_design_sets,
+    recipe_with_effect,
+    select_channels,
+    set_hash,
+)
+from training.benchmark.posterior_summary import (
+    FRACTIONS,
+    HPD_DRAWS,
+    PosteriorSummary,
+    systematic_resample,
+)
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-#: Fractions of the posterior that are kept.
-FRACTIONS = (0.05, 0.25, 0.75, 0.95)
-#: Samples of the posterior whose density is compared with the truth's.
-COMPARED = 200
 PROCESSES = 2
 TORQUE = "torque_Nm"
-#: Effects that no method of the benchmark knows, the designs that are driven with them, and sets.
-UNKNOWN = ("slip-sinkage", "torque-offset")
-UNKNOWN_DESIGNS = ("1x", "6x3load_N", "18x6slip-3load_N")
-UNKNOWN_SETS = 50
-
-
-@dataclass(frozen=True)
-class ExactPosterior:
-    r"""The posterior of one set: moments and quantiles (4, q), and how it stands to the truth.
-
-    `density` is the logarithm of the posterior density at the truth, of the parameters as fractions
-    of their priors, exact but for sampling of the evidence:
-
-    .. math:: \log p(\theta^* | y) = \log p(y | \theta^*) - \log \int p(y | \theta) d\theta
-
-    `denser` is the share of the posterior that is denser than the truth: a truth is inside the
-    smallest region that holds 90 % where it is below 0.9. `flagged`: the residuals of the best
-    sample are larger than noise makes them once in a thousand times.
-    """
-
-    mean: Floats
-    covariance: Floats
-    quantiles: Floats
-    density: float
-    denser: float
-    flagged: bool
+#: Effects that no method of the benchmark models, the designs that are simulated with them, and
+#: the number of sets of each.
+UNMODELLED_EFFECTS = ("slip-sinkage", "torque-offset")
+UNMODELLED_DESIGNS = ("1x", "6x3load_N", "18x6slip-3load_N")
+UNMODELLED_SETS = 50
 
 
 def exact_posterior(
-    case: Case, table: Table, truth: Floats, names: Sequence[str], widen: bool = False
-) -> ExactPosterior:
-    """The posterior of one set's torques, by the posterior method's own sampler.
+    case: Case, table: Table, truth: Floats, names: Sequence[str], inflate_noise: bool = False
+) -> PosteriorSummary:
+    """The posterior of one set's torques, by the sampler of the `posterior` method.
 
-    The model is taken by its `Polynomial`, off by less than a hundredth of the noise. With `widen`,
-    a flagged set is answered as the posterior method answers it: with noise larger by as much. The
-    limit itself is not: noise that is rare is noise still.
+    Parameters
+    ----------
+    case
+        Model, priors and noise of the simulation.
+    table
+        Slips, loads (N) and torques (N m) of one soil.
+    truth
+        True values (q,) of the parameters.
+    names
+        The parameters.
+    inflate_noise
+        Treat a flagged set as the `posterior` method does: with a noise standard deviation that is
+        larger by the root of the reduced chi-square. False for the Bayes limit itself, because the
+        noise level is known there: large residuals are rare noise.
+
+    Notes
+    -----
+    The model's torque is replaced by `ChebyshevSurrogate`, whose error is below a hundredth of the
+    noise.
     """
-    data, free = read_observations(case, shown(table, ["torque"])), select_free(case, names)
-    model, reading, noise = interpolated(case, data, free), readings(data)[0], case.noise[TORQUE]
+    data, free = (
+        read_observations(case, select_channels(table, ["torque"])),
+        select_free(case, names),
+    )
+    surrogate = fit_chebyshev_surrogate(case, data, free)
+    reading, noise = readings(data)[0], case.noise[TORQUE]
 
-    def squares(u: Floats, larger: float) -> tuple[Floats, Floats]:
-        y = model.at(u)
-        std = larger * noise.std(y)
+    def misfit_terms(u: Floats, noise_factor: float) -> tuple[Floats, Floats]:
+        """Chi-square (n,), and the sum (n,) over rows of the logarithm of the noise."""
+        y = surrogate.torque(u)
+        std = noise_factor * noise.std(y)
         return (((reading - y) / std) ** 2).sum(axis=1), np.log(std).sum(axis=1)
 
-    def logs(u: Floats, larger: float = 1.0) -> Floats:
-        """The likelihood but for (2 pi)^(-rows / 2), which is left out of the evidence too."""
-        square, size = squares(u, larger)
-        return np.asarray(-0.5 * square - size)
+    def log_likelihood(u: Floats, noise_factor: float = 1.0) -> Floats:
+        """Without the factor (2 pi)^(-rows / 2), which is left out of the evidence too."""
+        chi_square, log_noise = misfit_terms(u, noise_factor)
+        return np.asarray(-0.5 * chi_square - log_noise)
 
-    found = importance_sample(logs, len(free))
-    best = found.u[[int(np.argmax(found.weights))]]
+    sample = importance_sample(log_likelihood, len(free))
+    best = sample.u[[int(np.argmax(sample.weights))]]
     freedom = len(reading) - len(free)
-    misfit = float(squares(best, 1.0)[0][0]) / max(freedom, 1)
-    flagged = misfit > most_misfit(freedom)
-    if widen and flagged:
-        found = importance_sample(partial(logs, larger=float(np.sqrt(misfit))), len(free))
-    values = np.stack([f.prior.at(found.u[:, i]) for i, f in enumerate(free)], axis=1)
-    mean = found.mean(values)
-    off = values - mean
+    reduced_chi_square = float(misfit_terms(best, 1.0)[0][0]) / max(freedom, 1)
+    flagged = reduced_chi_square > most_misfit(freedom)
+    if inflate_noise and flagged:
+        factor = float(np.sqrt(reduced_chi_square))
+        sample = importance_sample(partial(log_likelihood, noise_factor=factor), len(free))
+    values = np.stack([f.prior.at(sample.u[:, i]) for i, f in enumerate(free)], axis=1)
+    mean = sample.mean(values)
+    deviation = values - mean
     at_truth = [f.prior.fraction(float(t)) for f, t in zip(free, truth, strict=True)]
-    density = logs(np.vstack([at_truth, _drawn(found)]))
-    return ExactPosterior(
+    density = log_likelihood(np.vstack([at_truth, systematic_resample(sample, HPD_DRAWS)]))
+    return PosteriorSummary(
         mean=mean,
-        covariance=(off.T * found.weights) @ off,
-        quantiles=found.quantiles(values, np.asarray(FRACTIONS)),
-        density=float(density[0]) - found.evidence,
-        denser=float(np.mean(density[1:] > density[0])),
+        covariance=(deviation.T * sample.weights) @ deviation,
+        quantiles=sample.quantiles(values, np.asarray(FRACTIONS)),
+        log_density=float(density[0]) - sample.evidence,
+        hpd_level=float(np.mean(density[1:] > density[0])),
         flagged=bool(flagged),
     )
 
 
-def _drawn(found: ImportanceSample) -> Floats:
-    """Some samples of the posterior, evenly through its weights."""
-    places = (np.arange(COMPARED) + 0.5) / COMPARED
-    rows = np.searchsorted(np.cumsum(found.weights), places)
-    return found.u[np.minimum(rows, len(found.u) - 1)]
-
-
 @dataclass(frozen=True)
-class Job:
-    """One set whose limit is wanted; `effect` is blank where the model knows all there is."""
+class BenchmarkSet:
+    """One set of the benchmark; `effect` is blank where the model is complete."""
 
     effect: str
     design: str
@@ -124,37 +126,44 @@ class Job:
 
     @property
     def hash(self) -> str:
-        """What the stored limit is recognised by."""
-        return fingerprint(self.table, self.case)
+        """Identifies the rows that a stored posterior belongs to."""
+        return set_hash(self.table, self.case)
 
 
-def jobs(recipe: Recipe, names: Sequence[str], most: int | None = None) -> list[Job]:
-    """Every set of the benchmark, those with an unknown effect last."""
-    found = [("", sets) for sets in sets_of(recipe, names, most)]
-    found += [(e, s) for e in UNKNOWN for s in unknown_sets(recipe, e, names, most)]
+def benchmark_sets(
+    recipe: Recipe, names: Sequence[str], max_sets: int | None = None
+) -> list[BenchmarkSet]:
+    """Every set of the benchmark, those with an unmodelled effect last."""
+    designs = [("", sets) for sets in generate_design_sets(recipe, names, max_sets)]
+    for effect in UNMODELLED_EFFECTS:
+        designs += [(effect, s) for s in unmodelled_sets(recipe, effect, names, max_sets)]
     return [
-        Job(effect, sets.design.key, i, recipe.case, table, sets.truth[i], tuple(names))
-        for effect, sets in found
-        for i, table in enumerate(sets.tables)
+        BenchmarkSet(effect, s.design.key, i, recipe.case, table, s.truth[i], tuple(names))
+        for effect, s in designs
+        for i, table in enumerate(s.tables)
     ]
 
 
-def unknown_sets(
-    recipe: Recipe, effect: str, names: Sequence[str], most: int | None = None
+def unmodelled_sets(
+    recipe: Recipe, effect: str, names: Sequence[str], max_sets: int | None = None
 ) -> list[DesignSets]:
-    """The sets that are driven with an effect which no method knows."""
-    count = UNKNOWN_SETS if most is None else min(most, UNKNOWN_SETS)
-    made = sets_of(with_effect(recipe, effect), names, count)
-    return [sets for sets in made if sets.design.key in UNKNOWN_DESIGNS]
+    """The sets that are simulated with an effect that no method models."""
+    count = UNMODELLED_SETS if max_sets is None else min(max_sets, UNMODELLED_SETS)
+    designs = generate_design_sets(recipe_with_effect(recipe, effect), names, count)
+    return [sets for sets in designs if sets.design.key in UNMODELLED_DESIGNS]
 
 
-def computed(wanted: Sequence[Job], progress: Progress) -> Iterator[ExactPosterior]:
-    """The limit of each job, in order, from two processes."""
+def compute_posteriors(
+    sets: Sequence[BenchmarkSet], progress: Progress
+) -> Iterator[PosteriorSummary]:
+    """The exact posterior of each set, in order, computed by two processes."""
     with ProcessPoolExecutor(min(PROCESSES, os.cpu_count() or 1)) as pool:
-        for done, found in enumerate(pool.map(_answered, wanted, chunksize=4), 1):
-            progress("the Bayes limit", done, len(wanted))
-            yield found
+        for done, summary in enumerate(pool.map(_posterior_of, sets, chunksize=4), 1):
+            progress("the Bayes limit", done, len(sets))
+            yield summary
 
 
-def _answered(job: Job) -> ExactPosterior:
-    return exact_posterior(job.case, job.table, job.truth, job.names, widen=bool(job.effect))
+def _posterior_of(one: BenchmarkSet) -> PosteriorSummary:
+    return exact_posterior(
+        one.case, one.table, one.truth, one.names, inflate_noise=bool(one.effect)
+    )

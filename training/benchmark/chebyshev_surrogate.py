@@ -1,4 +1,4 @@
-"""The model's torque at fixed rows, as a polynomial of the soil, to far below its noise."""
+"""Chebyshev interpolation of the model's torque over the prior box, at fixed slips and loads."""
 
 from __future__ import annotations
 
@@ -17,33 +17,41 @@ from soilml.identification.predictions import predicted
 
 Floats = NDArray[np.float64]
 
-#: Nodes along each parameter, points that the polynomial is checked at, and what it may be off.
+#: Interpolation nodes along each parameter: 1000 evaluations of the model for three parameters,
+#: against the ten thousand and more that posterior sampling needs.
 NODES = 10
-CHECKED = 64
+#: Random points that the surrogate is verified at, and the largest relative error accepted there,
+#: a hundredth of 2 % noise.
+CHECK_POINTS = 64
 TOLERANCE = 2e-4
 
 
 @dataclass(frozen=True)
-class Polynomial:
-    """Torques of rows (r,) by coefficients (NODES^p, r) of products of Chebyshev polynomials."""
+class ChebyshevSurrogate:
+    """Torques of r rows: coefficients (NODES^p, r) of tensor products of Chebyshev polynomials."""
 
     coefficients: Floats
 
-    def at(self, u: Floats) -> Floats:
+    def torque(self, u: Floats) -> Floats:
         """Torques (n, r), N m, at fractions of the priors (n, p)."""
         basis = np.ones((len(u), 1))
-        for along in u.T:
-            own = chebvander(2.0 * along - 1.0, NODES - 1)
-            basis = (basis[:, :, None] * own[:, None, :]).reshape(len(u), -1)
+        for fraction in u.T:
+            polynomials = chebvander(2.0 * fraction - 1.0, NODES - 1)
+            basis = (basis[:, :, None] * polynomials[:, None, :]).reshape(len(u), -1)
         return np.asarray(basis @ self.coefficients)
 
 
-def interpolated(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Polynomial:
-    """The polynomial through the model's torques at the Chebyshev nodes of the priors' box.
+def fit_chebyshev_surrogate(
+    case: Case, data: Observations, free: Sequence[FreeParameter]
+) -> ChebyshevSurrogate:
+    """Interpolate the model's torques at the Chebyshev nodes of the prior box.
 
-    A posterior takes ten thousand soils a row; this asks the model for a thousand. Raises
-    `FitError` where it is off by more than `TOLERANCE` of a torque at points between, a hundredth
-    of 2 % noise. References: Trefethen, Approximation Theory and Approximation Practice, 2013.
+    Raises `FitError` where the relative error exceeds `TOLERANCE` at a check point: the torque is
+    then not smooth over the prior.
+
+    References
+    ----------
+    Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013.
     """
     p = len(free)
     node = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
@@ -54,10 +62,13 @@ def interpolated(case: Case, data: Observations, free: Sequence[FreeParameter]) 
     cube = values.reshape(*[NODES] * p, -1)
     for axis in range(p):
         cube = np.moveaxis(np.tensordot(inverse, cube, axes=(1, axis)), 0, axis)
-    found = Polynomial(cube.reshape(NODES**p, -1))
-    u = np.random.default_rng(0).random((CHECKED, p))
+    surrogate = ChebyshevSurrogate(cube.reshape(NODES**p, -1))
+    u = np.random.default_rng(0).random((CHECK_POINTS, p))
     true = predicted(case, free, u, data.at)["torque"]
-    off = float(np.max(np.abs(found.at(u) / true - 1.0)))
-    if not off < TOLERANCE:
-        raise FitError(f"the torque is no smooth function of the soil here: off by {off:.1e}")
-    return found
+    error = float(np.max(np.abs(surrogate.torque(u) / true - 1.0)))
+    if not error < TOLERANCE:
+        raise FitError(
+            f"the torque is not a smooth function of the soil here: relative error {error:.1e}, "
+            f"needed is less than {TOLERANCE:.1e}"
+        )
+    return surrogate

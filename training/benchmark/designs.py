@@ -1,4 +1,4 @@
-"""The measured sets of the benchmark: how each was driven, and what its soil truly is."""
+"""The simulated sets of the benchmark: experimental design, readings and true soil."""
 
 from __future__ import annotations
 
@@ -19,15 +19,19 @@ from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 
-#: Columns of a set that methods read of how it was driven and of its torque.
-READ = ("slip", "load_N", "torque_Nm")
-#: Significant digits that two machines' rows share.
-DIGITS = 5
+#: Columns of a set that its hash covers: what every method reads.
+HASHED_COLUMNS = ("slip", "load_N", "torque_Nm")
+#: Significant digits that enter a hash: rows of two machines agree to more than these.
+HASHED_DIGITS = 5
 
 
 @dataclass(frozen=True)
 class Design:
-    """Sets of one size that were driven alike; `loads` is how many loads a set has, 0 for any."""
+    """Experimental design of sets of one size.
+
+    `loads` is the number of load levels of a set, 0 where loads are not restricted to levels;
+    `grid` tells whether every slip level is combined with every load level.
+    """
 
     key: str
     rows: int
@@ -35,26 +39,22 @@ class Design:
     grid: bool
 
     @property
-    def text(self) -> str:
+    def description(self) -> str:
         """In words."""
         if self.rows == 1:
             return "1 row"
-        loads = {0: "loads free", 1: "one load", 3: "three loads"}
-        said = loads.get(self.loads, f"{self.loads} loads")
-        return f"{self.rows} rows, {said}" + (", slips in a grid" if self.grid else "")
+        levels = {0: "loads unrestricted", 1: "one load", 3: "three loads"}
+        loads = levels.get(self.loads, f"{self.loads} loads")
+        return f"{self.rows} rows, {loads}" + (", slips in a grid" if self.grid else "")
 
 
 @dataclass(frozen=True)
 class DesignSets:
-    """Sets of one design: their rows, and the truth (n, q) of the parameters asked for."""
+    """Sets of one design: their rows, and the true values (n, q) of the estimated parameters."""
 
     design: Design
     tables: tuple[Table, ...]
     truth: Floats
-
-    def first(self, count: int | None) -> DesignSets:
-        """The first sets, all where `count` is None."""
-        return DesignSets(self.design, self.tables[:count], self.truth[:count])
 
 
 def design_of(block: Block) -> Design:
@@ -64,37 +64,44 @@ def design_of(block: Block) -> Design:
     return Design(block.label.rstrip("-"), block.rows, loads, "slip" in levels)
 
 
-def sets_of(recipe: Recipe, names: Sequence[str], most: int | None = None) -> list[DesignSets]:
-    """Every design's sets, the first `most` of each; the same recipe gives the same sets.
+def generate_design_sets(
+    recipe: Recipe, names: Sequence[str], max_sets: int | None = None
+) -> list[DesignSets]:
+    """Simulated sets of every design, the first `max_sets` of each; reproducible from the recipe.
 
-    Raises `InputError` where a row has no equilibrium: the limit would not be of the same rows.
+    Raises `InputError` where a row has no equilibrium: stored posteriors refer to complete sets.
     """
-    found = []
+    designs = []
     for number, (block, size) in enumerate(zip(recipe.blocks, sizes(recipe), strict=True)):
-        count = size // block.rows if most is None else min(most, size // block.rows)
+        available = size // block.rows
+        count = available if max_sets is None else min(max_sets, available)
         table = Table(piece(recipe, number, 0, count * block.rows), f"recipe, runs of {block.rows}")
         if not table.answered.all():
             raise InputError(f"{table.source}: a row has no equilibrium; narrow [operating]")
-        each = np.arange(len(table)).reshape(count, block.rows)
-        truth = np.stack([table[column(name)][each[:, 0]] for name in names], axis=1)
-        found.append(DesignSets(design_of(block), tuple(table.rows(rows) for rows in each), truth))
-    return found
+        rows_of_set = np.arange(len(table)).reshape(count, block.rows)
+        truth = np.stack([table[column(name)][rows_of_set[:, 0]] for name in names], axis=1)
+        tables = tuple(table.rows(rows) for rows in rows_of_set)
+        designs.append(DesignSets(design_of(block), tables, truth))
+    return designs
 
 
-def with_effect(recipe: Recipe, effect: str) -> Recipe:
-    """The same recipe driven with an effect at its reference; the same soils, slips and loads."""
-    known = EFFECTS[effect](**EFFECTS[effect].about.reference)
-    return replace(recipe, case=replace(recipe.case, model=recipe.case.model + known))
+def recipe_with_effect(recipe: Recipe, effect: str) -> Recipe:
+    """The same soils, slips and loads, simulated with an effect at its reference size."""
+    cls = EFFECTS[effect]
+    model = recipe.case.model + cls(**cls.about.reference)
+    return replace(recipe, case=replace(recipe.case, model=model))
 
 
-def shown(table: Table, channels: Sequence[str]) -> Table:
-    """The rows without the readings of all other channels, as a method is given them."""
+def select_channels(table: Table, channels: Sequence[str]) -> Table:
+    """The table without the readings of all channels but these."""
     hidden = {column(c) for c in CHANNELS if c not in channels}
     return replace(table, columns={k: v for k, v in table.columns.items() if k not in hidden})
 
 
-def fingerprint(table: Table, case: Case) -> str:
-    """Hash of a set's slips, loads and torques, and of what the case says of their noise."""
-    text = [" ".join(f"{value:.{DIGITS}g}" for value in table[name]) for name in READ]
+def set_hash(table: Table, case: Case) -> str:
+    """Hash of a set's slips, loads and torques, and of the case's torque noise and priors."""
+    text = [
+        " ".join(f"{value:.{HASHED_DIGITS}g}" for value in table[name]) for name in HASHED_COLUMNS
+    ]
     text += [repr(case.noise.get("torque_Nm")), repr(sorted(case.prior.items()))]
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:12]

@@ -1,4 +1,4 @@
-"""The methods that are compared, all asked alike: the rows of one soil in, an answer out."""
+"""The methods compared: each maps the rows of one soil to an estimate with intervals."""
 
 from __future__ import annotations
 
@@ -18,53 +18,57 @@ from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
-from training.benchmark.designs import shown
+from training.benchmark.designs import select_channels
+from training.benchmark.method_kind import MethodKind, classify_estimator
 from training.calibration.scores import HALF, NINETY
 
 Floats = NDArray[np.float64]
 
-#: The line of the prior, and what stands before the name of an analytic method.
-PRIOR, ANALYTIC = "prior", "analytic "
-#: What stands behind a model file's name where its estimates of single rows are joined.
-JOINED = ", joined"
-#: A method of one's own: slips, torques (N m) and loads (N) of one soil, each (rows,), to the mean
-#: (q,) and the standard deviation (q,) or covariance (q, q) of its parameters, SI units.
-Own = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
+#: Label of the prior, and prefix of the labels of analytic methods.
+PRIOR_LABEL, ANALYTIC_PREFIX = "prior", "analytic "
+#: Suffix of a model file's label where its estimates of single rows are pooled.
+POOLED_SUFFIX = ", pooled"
+#: A user's method: slips, torques (N m) and loads (N) of one soil, each (rows,), to the mean (q,)
+#: and the standard deviation (q,) or covariance (q, q) of its parameters, in SI units.
+UserMethod = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
-class MethodAnswer:
-    """What a method says of one soil: mean and std (q,), covariance (q, q), interval ends (2, q).
+class MethodEstimate:
+    """A method's estimate of one soil: mean (q,), covariance (q, q), interval ends (2, q) each.
 
-    NaN where it does not estimate a parameter. `inner` holds 50 % by the method's own word, `outer`
-    90 %. `flagged`: the method itself says that it is not to be believed.
+    NaN where a parameter is not estimated. `flagged`: the method itself reports its estimate as
+    unreliable.
     """
 
     mean: Floats
     covariance: Floats
-    inner: Floats
-    outer: Floats
+    interval50: Floats
+    interval90: Floats
     flagged: bool
 
 
 @dataclass(frozen=True)
-class MethodAnswers:
-    """One method's answers for sets (n,): as `MethodAnswer`, stacked; NaN where it failed."""
+class MethodEstimates:
+    """The estimates of one method for n sets: as `MethodEstimate`, stacked; NaN where it failed.
+
+    `seconds` is the mean wall time of one estimate.
+    """
 
     mean: Floats
     covariance: Floats
-    inner: Floats
-    outer: Floats
+    interval50: Floats
+    interval90: Floats
     flagged: NDArray[np.bool_]
     seconds: float
 
-    def rows(self, index: NDArray[np.bool_]) -> MethodAnswers:
-        """Those of some sets."""
-        return MethodAnswers(
+    def subset(self, index: NDArray[np.bool_]) -> MethodEstimates:
+        """The estimates of some sets."""
+        return MethodEstimates(
             self.mean[index],
             self.covariance[index],
-            self.inner[index],
-            self.outer[index],
+            self.interval50[index],
+            self.interval90[index],
             self.flagged[index],
             self.seconds,
         )
@@ -72,100 +76,107 @@ class MethodAnswers:
 
 @dataclass(frozen=True)
 class Method:
-    """A method by name; `ask` answers for the rows of one soil, or raises `FitError`."""
+    """A method: label, kind, description of its inputs, and the channels that it reads.
 
-    name: str
+    `estimate` maps the rows of one soil to an estimate, or raises `FitError`.
+    """
+
+    label: str
+    kind: MethodKind
     inputs: str
     channels: tuple[str, ...]
-    ask: Callable[[Table], MethodAnswer]
+    estimate: Callable[[Table], MethodEstimate]
 
-    def answers(
+    def estimate_sets(
         self,
         sets: Sequence[Table],
         q: int,
         progress: Callable[[int, int], None] = lambda done, total: None,
-    ) -> MethodAnswers:
-        """One call for each set, as on board, for q parameters."""
-        none = gaussian(np.full(q, np.nan), np.full((q, q), np.nan))
-        found = []
+    ) -> MethodEstimates:
+        """Estimates of q parameters for every set, one call each as on board."""
+        failure = gaussian_estimate(np.full(q, np.nan), np.full((q, q), np.nan))
+        estimates = []
         started = time.perf_counter()
         for done, rows in enumerate(sets):
             progress(done, len(sets))
             try:
-                found.append(self.ask(rows))
+                estimates.append(self.estimate(rows))
             except FitError:
-                found.append(none)
+                estimates.append(failure)
         seconds = (time.perf_counter() - started) / max(len(sets), 1)
         progress(len(sets), len(sets))
-        return MethodAnswers(
-            np.stack([a.mean for a in found]),
-            np.stack([a.covariance for a in found]),
-            np.stack([a.inner for a in found]),
-            np.stack([a.outer for a in found]),
-            np.asarray([a.flagged for a in found]),
+        return MethodEstimates(
+            np.stack([e.mean for e in estimates]),
+            np.stack([e.covariance for e in estimates]),
+            np.stack([e.interval50 for e in estimates]),
+            np.stack([e.interval90 for e in estimates]),
+            np.asarray([e.flagged for e in estimates]),
             seconds,
         )
 
 
-def held(truth: Floats, ends: Floats) -> Floats:
-    """Share (q,) of truths (n, q) inside intervals (n, 2, q), of those that there are."""
-    there = np.isfinite(ends).all(axis=1)
-    inside = (truth >= ends[:, 0]) & (truth <= ends[:, 1]) & there
-    count = there.sum(axis=0)
+def interval_coverage(truth: Floats, ends: Floats) -> Floats:
+    """Fraction (q,) of true values (n, q) in intervals (n, 2, q), of the intervals not NaN."""
+    finite = np.isfinite(ends).all(axis=1)
+    inside = (truth >= ends[:, 0]) & (truth <= ends[:, 1]) & finite
+    count = finite.sum(axis=0)
     return np.where(count > 0, inside.sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def gaussian(
-    mean: Floats, covariance: Floats, outer: Floats | None = None, flagged: bool = False
-) -> MethodAnswer:
-    """An answer whose intervals, where it does not give its own, are a Gaussian's."""
+def gaussian_estimate(
+    mean: Floats, covariance: Floats, interval90: Floats | None = None, flagged: bool = False
+) -> MethodEstimate:
+    """An estimate with Gaussian intervals, unless the method provides its own 90 % interval."""
     std = np.sqrt(np.diag(covariance))
-    outer = np.stack([mean - NINETY * std, mean + NINETY * std]) if outer is None else outer
-    return MethodAnswer(
-        mean, covariance, np.stack([mean - HALF * std, mean + HALF * std]), outer, flagged
-    )
+    if interval90 is None:
+        interval90 = np.stack([mean - NINETY * std, mean + NINETY * std])
+    interval50 = np.stack([mean - HALF * std, mean + HALF * std])
+    return MethodEstimate(mean, covariance, interval50, interval90, flagged)
 
 
-def prior_alone(priors: Sequence[Prior]) -> Method:
-    """What is known before anything is measured."""
-    ends = np.stack([p.at(np.asarray([0.5, 0.25, 0.75, 0.05, 0.95])) for p in priors], axis=1)
+def prior_method(priors: Sequence[Prior]) -> Method:
+    """The prior alone, whatever is measured."""
+    quantiles = [p.at(np.asarray([0.5, 0.25, 0.75, 0.05, 0.95])) for p in priors]
+    ends = np.stack(quantiles, axis=1)
     covariance = np.diag([p.std**2 for p in priors])
-    answer = MethodAnswer(ends[0], covariance, ends[1:3], ends[3:], False)
-    return Method(PRIOR, "-", (), lambda rows: answer)
+    estimate = MethodEstimate(ends[0], covariance, ends[1:3], ends[3:], False)
+    return Method(PRIOR_LABEL, MethodKind.PRIOR, "-", (), lambda rows: estimate)
 
 
-def trained(label: str, estimator: Estimator) -> list[Method]:
-    """A model file's line; two lines where it offers two ways to join the rows of a soil.
+def model_file_methods(label: str, estimator: Estimator) -> list[Method]:
+    """The methods that a model file offers: one, or two where it has two ways to combine rows.
 
-    `run` is what the file answers with. Where that is its set posterior, and it estimates single
-    readings too, these joined by the fusion rule are a line of their own, in which one row is a
-    plain call.
+    `Estimator.run` is the answer of the file. Where that is its set posterior, and the file also
+    estimates single rows, pooling those by the fusion rule is a method of its own.
     """
-    used = ", ".join(estimator.inputs)
-    both = estimator.sets is not None and not estimator.sets.alone
-
-    def asked(call: Callable[..., Estimate], single: bool) -> Callable[[Table], MethodAnswer]:
-        def ask(rows: Table) -> MethodAnswer:
-            readings = {name: rows[column(name)] for name in estimator.inputs}
-            if single and len(rows) == 1:
-                return estimated(estimator(**{n: v[0] for n, v in readings.items()}))
-            return estimated(call(**readings))
-
-        return ask
-
+    inputs = ", ".join(estimator.inputs)
     channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
-    if not both:
-        return [Method(label, used, channels, asked(estimator.run, True))]
+    kind = classify_estimator(estimator)
+
+    def by(combine: Callable[..., Estimate], plain_call: bool) -> Callable[[Table], MethodEstimate]:
+        """`combine` as a method; with `plain_call` a single row is estimated by a plain call."""
+
+        def estimate(rows: Table) -> MethodEstimate:
+            readings = {name: rows[column(name)] for name in estimator.inputs}
+            if plain_call and len(rows) == 1:
+                return onboard_estimate(estimator(**{n: v[0] for n, v in readings.items()}))
+            return onboard_estimate(combine(**readings))
+
+        return estimate
+
+    if estimator.sets is None or estimator.sets.alone:
+        return [Method(label, kind, inputs, channels, by(estimator.run, True))]
+    pooled = f"{label}{POOLED_SUFFIX}"
     return [
-        Method(f"{label}{JOINED}", used, channels, asked(estimator.joined, True)),
-        Method(label, used, channels, asked(estimator.run, False)),
+        Method(pooled, MethodKind.POOLED, inputs, channels, by(estimator.joined, True)),
+        Method(label, kind, inputs, channels, by(estimator.run, False)),
     ]
 
 
-def estimated(estimate: Estimate) -> MethodAnswer:
-    """An onboard estimate as an answer."""
+def onboard_estimate(estimate: Estimate) -> MethodEstimate:
+    """An estimate of the onboard runtime, with a Gaussian 50 % interval."""
     half = HALF * estimate.std
-    return MethodAnswer(
+    return MethodEstimate(
         estimate.mean,
         estimate.covariance,
         np.stack([estimate.mean - half, estimate.mean + half]),
@@ -174,35 +185,38 @@ def estimated(estimate: Estimate) -> MethodAnswer:
     )
 
 
-def analytic(case: Case, method: str, names: Sequence[str]) -> Method:
-    """An identification method, shown slip, load, torque, and sinkage only where it needs that."""
-    channels = ("torque", "sinkage") if method in CLOSED_FORM else ("torque",)
-    given = {"linear": "; K given", "newton": "; c given"}.get(method, "")
+def analytic_method(case: Case, name: str, names: Sequence[str]) -> Method:
+    """An identification method; it reads sinkage only where its equations need it."""
+    channels = ("torque", "sinkage") if name in CLOSED_FORM else ("torque",)
+    fixed = {"linear": "; K fixed", "newton": "; c fixed"}.get(name, "")
 
-    def ask(rows: Table) -> MethodAnswer:
-        fit = identify(case, shown(rows, channels), list(names), method)
-        own = [fit.names.index(n) if n in fit.names else -1 for n in names]
-        mean = np.where(np.asarray(own) < 0, np.nan, fit.values[own])
-        both = np.logical_and.outer(np.asarray(own) >= 0, np.asarray(own) >= 0)
-        covariance = np.where(both, fit.covariance[np.ix_(own, own)], np.nan)
-        outer = np.where(np.isnan(mean), np.nan, np.stack(fit.interval)[:, own])
-        return gaussian(mean, covariance, outer, any(SURPLUS in w for w in fit.warnings))
+    def estimate(rows: Table) -> MethodEstimate:
+        fit = identify(case, select_channels(rows, channels), list(names), name)
+        index = np.asarray([fit.names.index(n) if n in fit.names else -1 for n in names])
+        fitted = index >= 0
+        mean = np.where(~fitted, np.nan, fit.values[index])
+        pairs = np.logical_and.outer(fitted, fitted)
+        covariance = np.where(pairs, fit.covariance[np.ix_(index, index)], np.nan)
+        interval90 = np.where(np.isnan(mean), np.nan, np.stack(fit.interval)[:, index])
+        return gaussian_estimate(
+            mean, covariance, interval90, any(SURPLUS in w for w in fit.warnings)
+        )
 
-    used = ", ".join(["slip", "load", *channels]) + given
-    return Method(f"{ANALYTIC}{method}", used, channels, ask)
+    inputs = ", ".join(["slip", "load", *channels]) + fixed
+    return Method(f"{ANALYTIC_PREFIX}{name}", MethodKind.ANALYTIC, inputs, channels, estimate)
 
 
-def own_methods(functions: Mapping[str, Own]) -> list[Method]:
-    """Functions of one's own as methods, by the name of their line; see `Own`."""
+def user_methods(functions: Mapping[str, UserMethod]) -> list[Method]:
+    """Functions of the caller as methods, by label; see `UserMethod`."""
 
-    def asked(function: Own) -> Callable[[Table], MethodAnswer]:
-        def ask(rows: Table) -> MethodAnswer:
+    def by(function: UserMethod) -> Callable[[Table], MethodEstimate]:
+        def estimate(rows: Table) -> MethodEstimate:
             mean, spread = function(rows["slip"], rows["torque_Nm"], rows["load_N"])
             spread = np.asarray(spread, float)
             covariance = np.diag(spread**2) if spread.ndim == 1 else spread
-            return gaussian(np.asarray(mean, float), covariance)
+            return gaussian_estimate(np.asarray(mean, float), covariance)
 
-        return ask
+        return estimate
 
-    used = "slip, torque, load"
-    return [Method(name, used, ("torque",), asked(f)) for name, f in functions.items()]
+    kind, inputs = MethodKind.USER_FUNCTION, "slip, torque, load"
+    return [Method(label, kind, inputs, ("torque",), by(f)) for label, f in functions.items()]

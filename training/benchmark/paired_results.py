@@ -1,4 +1,4 @@
-"""One method on sets of one design, and the Bayes limit on the very same sets."""
+"""Scores of one method on the sets of one design, paired with the Bayes limit of those sets."""
 
 from __future__ import annotations
 
@@ -11,167 +11,193 @@ from scipy.stats import chi2
 
 from soilml.numerics.prior import Prior
 from training.benchmark.designs import Design
-from training.benchmark.methods import MethodAnswers, held
+from training.benchmark.jackknife import jackknife_rmse_ratio_std
+from training.benchmark.method_kind import MethodKind
+from training.benchmark.methods import MethodEstimates, interval_coverage
 
 Floats = NDArray[np.float64]
 
-#: Share of truths that intervals and ellipsoids are to hold.
-NINETY = 0.9
+#: Nominal coverage of intervals, ellipsoids and highest-density regions.
+NOMINAL = 0.9
 
 
 @dataclass(frozen=True)
-class Result:
-    """Answers of a method beside truth (n, q) and the limit's mean (n, q), of the same sets.
+class PairedResult:
+    """Estimates of a method, with the true values and the Bayes limit of the same n sets.
 
-    `effect` names what the method's model lacks, blank where nothing. `density`, where the method
-    knows it, is the logarithm of its density at the truth (n,), parameters as fractions of their
-    priors, and `denser` the share of its density that is denser than there; NaN elsewhere.
+    Attributes
+    ----------
+    design, effect
+        Experimental design, and the effect that the method's model lacks (blank where none).
+    method, kind, inputs
+        Label, kind and inputs of the method.
+    priors, truth
+        Priors and true values (n, q) of the parameters, SI units.
+    estimates
+        The method's estimates.
+    limit_mean
+        Mean (n, q) of the exact posterior.
+    log_densities
+        Logarithm (n,) of the method's own density at the truth, parameters as fractions of their
+        priors, where it is available; NaN elsewhere.
+    hpd_levels
+        Share (n,) of the method's density that is higher than at the truth; NaN elsewhere.
     """
 
     design: Design
     effect: str
     method: str
+    kind: MethodKind
     inputs: str
     priors: tuple[Prior, ...]
     truth: Floats
-    answers: MethodAnswers
-    limit: Floats
-    density: Floats
-    denser: Floats
+    estimates: MethodEstimates
+    limit_mean: Floats
+    log_densities: Floats
+    hpd_levels: Floats
 
-    def where(self, index: NDArray[np.bool_]) -> Result:
-        """The same of some sets."""
+    def subset(self, index: NDArray[np.bool_]) -> PairedResult:
+        """The result on some of the sets."""
         return replace(
             self,
             truth=self.truth[index],
-            answers=self.answers.rows(index),
-            limit=self.limit[index],
-            density=self.density[index],
-            denser=self.denser[index],
+            estimates=self.estimates.subset(index),
+            limit_mean=self.limit_mean[index],
+            log_densities=self.log_densities[index],
+            hpd_levels=self.hpd_levels[index],
         )
 
     @property
-    def driven(self) -> str:
-        """The design, and the effect that no method knows, in words."""
-        return ", ".join(filter(None, (self.design.text, self.effect)))
+    def description(self) -> str:
+        """The design and the unmodelled effect, in words."""
+        return ", ".join(filter(None, (self.design.description, self.effect)))
 
     @property
     def sets(self) -> int:
-        """How many sets there are."""
+        """Number of sets."""
         return len(self.truth)
 
     @property
-    def never(self) -> NDArray[np.bool_]:
+    def not_estimated(self) -> NDArray[np.bool_]:
         """Parameters (q,) that the method does not estimate."""
-        return np.asarray(~np.isfinite(self.answers.mean).any(axis=0))
+        return np.asarray(~np.isfinite(self.estimates.mean).any(axis=0))
 
     @property
     def failed(self) -> int:
-        """Sets without an answer."""
-        given = np.isfinite(self.answers.mean[:, ~self.never])
-        return int((~given).any(axis=1).sum()) if given.shape[1] else self.sets
+        """Number of sets without an estimate."""
+        answered = np.isfinite(self.estimates.mean[:, ~self.not_estimated])
+        return int((~answered).any(axis=1).sum()) if answered.shape[1] else self.sets
 
     @property
     def error(self) -> Floats:
-        """Estimate less truth (n, q), NaN for parameters that are not estimated.
+        """Estimate less truth (n, q), SI units, NaN for parameters that are not estimated.
 
-        Values outside the prior are moved to its edge, and a failed fit counts as its middle.
+        Estimates outside the prior are clipped to it; a failed fit counts as the prior's median.
         """
-        middle = _columns(self.priors, lambda p: float(p.at(np.asarray(0.5))))
-        lower = _columns(self.priors, lambda p: p.lower)
-        upper = _columns(self.priors, lambda p: p.upper)
-        given = self.answers.mean
-        value = np.where(np.isfinite(given), np.clip(given, lower, upper), middle)
-        return np.where(self.never, np.nan, value - self.truth)
+        median = _of_priors(self.priors, lambda p: float(p.at(np.asarray(0.5))))
+        lower = _of_priors(self.priors, lambda p: p.lower)
+        upper = _of_priors(self.priors, lambda p: p.upper)
+        mean = self.estimates.mean
+        value = np.where(np.isfinite(mean), np.clip(mean, lower, upper), median)
+        return np.where(self.not_estimated, np.nan, value - self.truth)
 
     @property
     def rmse(self) -> Floats:
-        """Root mean squared error (q,)."""
+        """Root mean squared error (q,), SI units."""
         return np.asarray(np.sqrt(np.mean(self.error**2, axis=0)))
 
     @property
-    def relative(self) -> Floats:
-        """The same over the prior's standard deviation."""
-        return self.rmse / _columns(self.priors, lambda p: p.std)
+    def rmse_over_prior(self) -> Floats:
+        """RMSE (q,) over the prior's standard deviation."""
+        return self.rmse / _of_priors(self.priors, lambda p: p.std)
 
     @property
-    def ratio(self) -> Floats:
-        """RMSE over the limit's RMSE on the same sets, (q,)."""
-        return np.asarray(self.rmse / np.sqrt(np.mean((self.limit - self.truth) ** 2, axis=0)))
+    def rmse_ratio(self) -> Floats:
+        """RMSE (q,) over that of the Bayes limit on the same sets."""
+        return np.asarray(self.rmse / np.sqrt(np.mean((self.limit_mean - self.truth) ** 2, axis=0)))
 
     @property
-    def ratio_std(self) -> Floats:
-        r"""Standard error of `ratio`, (q,): the jackknife over sets.
-
-        .. math:: \sigma^2 = \frac{n - 1}{n} \sum_i (r_{(i)} - \bar{r})^2
-
-        with r_(i) the ratio without set i. Errors of method and limit go together, so that it is
-        smaller than that of either RMSE. Reference: Efron and Stein, Annals of Statistics 9, 1981.
-        """
-        own, least = self.error**2, (self.limit - self.truth) ** 2
-        left = np.sqrt((own.sum(axis=0) - own) / (least.sum(axis=0) - least))
-        n = self.sets
-        return np.asarray(np.sqrt((n - 1) / n * ((left - left.mean(axis=0)) ** 2).sum(axis=0)))
+    def rmse_ratio_std(self) -> Floats:
+        """Standard error (q,) of `rmse_ratio`, by `jackknife_rmse_ratio_std`."""
+        return jackknife_rmse_ratio_std(self.error**2, (self.limit_mean - self.truth) ** 2)
 
     @property
-    def cover50(self) -> Floats:
-        """Share (q,) of truths inside the method's 50 % interval, of the sets answered."""
-        return held(self.truth, self.answers.inner)
+    def rmse_std(self) -> Floats:
+        """Standard error (q,) of `rmse` over sets, SI units."""
+        square = self.error**2
+        return np.asarray(square.std(axis=0) / np.sqrt(self.sets) / (2.0 * self.rmse))
 
     @property
-    def cover90(self) -> Floats:
-        """Share (q,) of truths inside the method's 90 % interval, of the sets answered."""
-        return held(self.truth, self.answers.outer)
+    def coverage50(self) -> Floats:
+        """Coverage (q,) of the method's 50 % intervals, of the sets answered."""
+        return interval_coverage(self.truth, self.estimates.interval50)
 
     @property
-    def joint90(self) -> float:
-        r"""Share of truths inside the 90 % ellipsoid of all parameters that are estimated.
+    def coverage90(self) -> Floats:
+        """Coverage (q,) of the method's 90 % intervals, of the sets answered."""
+        return interval_coverage(self.truth, self.estimates.interval90)
+
+    @property
+    def joint_coverage90(self) -> float:
+        r"""Coverage of the 90 % ellipsoid of all parameters that are estimated.
 
         .. math:: (\theta^* - \mu)^T \Sigma^{-1} (\theta^* - \mu) \le \chi^2_q(0.9)
 
-        An exact posterior that is no Gaussian need not hold 90 % by it: read it beside the limit's.
+        The ellipsoid of an exact posterior that is not Gaussian need not have 90 % coverage:
+        compare with the figure of the Bayes limit.
         """
-        own = ~self.never
-        width = _columns(self.priors, lambda p: p.std)[own]
-        off = ((self.answers.mean - self.truth)[:, own]) / width
-        spread = self.answers.covariance[:, own][:, :, own] / np.outer(width, width)
-        there = np.isfinite(off).all(axis=1)
-        if not own.any() or not there.any():
+        estimated = ~self.not_estimated
+        width = _of_priors(self.priors, lambda p: p.std)[estimated]
+        error = ((self.estimates.mean - self.truth)[:, estimated]) / width
+        covariance = self.estimates.covariance[:, estimated][:, :, estimated]
+        covariance = covariance / np.outer(width, width)
+        answered = np.isfinite(error).all(axis=1)
+        if not estimated.any() or not answered.any():
             return float("nan")
-        inverse = np.linalg.pinv(spread[there], rcond=1e-12, hermitian=True)
-        square = np.einsum("ni,nij,nj->n", off[there], inverse, off[there])
-        return float(np.mean(square <= chi2.ppf(NINETY, own.sum())))
+        inverse = np.linalg.pinv(covariance[answered], rcond=1e-12, hermitian=True)
+        square = np.einsum("ni,nij,nj->n", error[answered], inverse, error[answered])
+        return float(np.mean(square <= chi2.ppf(NOMINAL, estimated.sum())))
 
     @property
-    def flagged(self) -> float:
-        """Share of sets that the method itself says not to believe."""
-        return float(np.mean(self.answers.flagged))
+    def flagged_fraction(self) -> float:
+        """Fraction of sets whose estimate the method itself reports as unreliable."""
+        return float(np.mean(self.estimates.flagged))
 
     @property
-    def log_density(self) -> float:
-        """Mean logarithm of the density at the truth: 0 is the prior's, no method has the limit's.
+    def log_score(self) -> float:
+        """Mean log posterior density at the truth (logarithmic score), nat; larger is better.
 
-        A Gaussian's for a method that gives mean and covariance; a failed set counts as the prior.
+        The prior has 0. In expectation no method exceeds the Bayes limit. Where a method reports
+        mean and covariance alone, its density is Gaussian; a failed set counts as the prior. NaN
+        where a parameter is not estimated.
+
+        References
+        ----------
+        Gneiting and Raftery, Strictly proper scoring rules, prediction, and estimation, J. American
+        Statistical Association 102, 2007.
         """
-        if self.never.any() and np.isnan(self.density).all():
+        if self.not_estimated.any() and np.isnan(self.log_densities).all():
             return float("nan")
-        known = np.where(np.isnan(self.density), self._gaussian(), self.density)
-        return float(np.mean(known))
+        gaussian = self._gaussian_log_densities()
+        densities = np.where(np.isnan(self.log_densities), gaussian, self.log_densities)
+        return float(np.mean(densities))
 
-    def _gaussian(self) -> Floats:
-        rates = []
+    def _gaussian_log_densities(self) -> Floats:
+        """Log density (n,) at the truth, of parameters as fractions of their priors."""
+        rates = []  # derivative of each parameter with respect to its fraction of the prior
         for prior, truth in zip(self.priors, self.truth.T, strict=True):
             rates.append(prior.rate(np.asarray([prior.fraction(float(t)) for t in truth])))
         rate = np.stack(rates, axis=1)
-        there = np.asarray(np.isfinite(self.answers.mean).all(axis=1))
-        spread = self.answers.covariance / (rate[:, :, None] * rate[:, None, :])
-        spread = np.where(there[:, None, None], spread, np.eye(len(self.priors)))
-        off = np.where(there[:, None], (self.answers.mean - self.truth) / rate, 0.0)
-        sign, size = np.linalg.slogdet(2.0 * np.pi * spread)
-        square = np.einsum("ni,nij,nj->n", off, np.linalg.pinv(spread, hermitian=True), off)
-        logs = np.where(sign > 0, -0.5 * (size + square), -np.inf)
-        return np.where(there, logs, 0.0)
+        answered = np.asarray(np.isfinite(self.estimates.mean).all(axis=1))
+        covariance = self.estimates.covariance / (rate[:, :, None] * rate[:, None, :])
+        covariance = np.where(answered[:, None, None], covariance, np.eye(len(self.priors)))
+        error = np.where(answered[:, None], (self.estimates.mean - self.truth) / rate, 0.0)
+        sign, log_det = np.linalg.slogdet(2.0 * np.pi * covariance)
+        inverse = np.linalg.pinv(covariance, hermitian=True)
+        square = np.einsum("ni,nij,nj->n", error, inverse, error)
+        logs = np.where(sign > 0, -0.5 * (log_det + square), -np.inf)
+        return np.where(answered, logs, 0.0)
 
 
-def _columns(priors: Sequence[Prior], figure: Callable[[Prior], float]) -> Floats:
+def _of_priors(priors: Sequence[Prior], figure: Callable[[Prior], float]) -> Floats:
     return np.asarray([figure(p) for p in priors])

@@ -1,4 +1,4 @@
-"""The benchmark's picture: errors and coverage against the number of rows."""
+"""The benchmark's figure: RMSE and coverage against the number of rows."""
 
 from __future__ import annotations
 
@@ -7,68 +7,77 @@ from collections.abc import Sequence
 from typing import Any
 
 from soilml.io.atomic_files import replacing
-from training.benchmark.acceptance import HELD, SHOWN
-from training.benchmark.methods import ANALYTIC, PRIOR
-from training.benchmark.paired_results import Result
+from training.benchmark.acceptance import COVERAGE_RANGE
+from training.benchmark.method_kind import MethodKind
+from training.benchmark.paired_results import PairedResult
+from training.benchmark.table_format import SHEAR_UNITS
 
 #: Titles of the columns.
-NAMES = ("cohesion", "friction angle", "shear modulus")
+TITLES = ("cohesion c", "friction angle phi", "shear modulus K")
 
 
-def draw(results: Sequence[Result], limit: str, path: str | os.PathLike[str]) -> None:
-    """RMSE at one load and at three, and what 90 % intervals hold, as PNG."""
+def plot_benchmark(results: Sequence[PairedResult], path: str | os.PathLike[str]) -> None:
+    """RMSE at one load and at three, and the coverage of 90 % intervals, as PNG."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    known = [r for r in results if not r.effect]
-    methods = list(dict.fromkeys(r.method for r in known))
-    coloured = [m for m in methods if m not in (limit, PRIOR)]
-    colours = {m: f"C{i % 10}" for i, m in enumerate(coloured)} | {limit: "k", PRIOR: "0.6"}
+    modelled = [r for r in results if not r.effect]
+    kinds = {r.method: r.kind for r in modelled}
     figure = Figure(figsize=(12.5, 12.0), layout="constrained")
     axes = figure.subplots(4, 3, sharex=True, height_ratios=[1.3, 1.3, 0.8, 0.8])
-    sizes = sorted({r.design.rows for r in known})
-    for k, (factor, unit) in enumerate(SHOWN):
-        for half, wanted in enumerate((1, 3)):
-            error, cover = axes[half][k], axes[2 + half][k]
-            for method in methods:
-                own = [r for r in known if r.method == method and r.design.loads in (0, wanted)]
-                own += [r for r in known if r.method == method and r.design.rows == 1][:half]
+    sizes = sorted({r.design.rows for r in modelled})
+    styles = _styles(kinds)
+    for k, (factor, unit) in enumerate(SHEAR_UNITS):
+        for half, loads in enumerate((1, 3)):
+            error, coverage = axes[half][k], axes[2 + half][k]
+            for method, kind in kinds.items():
+                own = [r for r in modelled if r.method == method and r.design.loads in (0, loads)]
+                # single rows have one load: they start the curves of three loads as well
+                own += [r for r in modelled if r.method == method and r.design.rows == 1][:half]
                 own.sort(key=lambda r: r.design.rows)
                 x = [sizes.index(r.design.rows) for r in own]
-                style = _style(method, limit, colours)
-                error.plot(x, [r.rmse[k] * factor for r in own], label=method, **style)
-                if method != PRIOR:
-                    cover.plot(x, [r.cover90[k] for r in own], **style)
+                error.plot(x, [r.rmse[k] * factor for r in own], label=method, **styles[method])
+                if kind is not MethodKind.PRIOR:
+                    coverage.plot(x, [r.coverage90[k] for r in own], **styles[method])
             error.set_yscale("log")
             error.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             error.yaxis.set_minor_formatter(NullFormatter())
             error.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
             error.grid(alpha=0.3, which="both")
-            cover.axhspan(*HELD, color="C2", alpha=0.2, lw=0)
-            cover.set_ylim(0.28, 1.02)
-            cover.grid(alpha=0.3)
-            loads = "one load" if wanted == 1 else "three loads"
-            error.set_title(f"{NAMES[k]}, {loads}", fontsize=10)
-            cover.set_title(f"{NAMES[k]}, {loads}", fontsize=10)
-            error.set_ylabel(f"RMSE, {unit}")
-            cover.set_ylabel("in the 90 % interval")
+            coverage.axhspan(*COVERAGE_RANGE, color="C2", alpha=0.2, lw=0)
+            coverage.set_ylim(0.28, 1.02)
+            coverage.grid(alpha=0.3)
+            title = f"{TITLES[k]}, {'one load' if loads == 1 else 'three loads'}"
+            error.set_title(title, fontsize=10)
+            coverage.set_title(title, fontsize=10)
+            error.set_ylabel(f"RMSE ({unit})")
+            coverage.set_ylabel("coverage of 90 % interval")
         lower = min(a.get_ylim()[0] for a in (axes[0][k], axes[1][k]))
         upper = max(a.get_ylim()[1] for a in (axes[0][k], axes[1][k]))
         for a in (axes[0][k], axes[1][k]):
             a.set_ylim(lower, upper)
     for a in axes[3]:
         a.set_xticks(range(len(sizes)), [str(size) for size in sizes])
-        a.set_xlabel("rows of one soil (18: 6 slips x 3 loads)")
+        a.set_xlabel("rows per set (18: 6 slips x 3 loads)")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
     with replacing(path) as part:
         figure.savefig(part, format="png", dpi=100, metadata={"Software": "soilml"})
 
 
-def _style(method: str, limit: str, colours: dict[str, str]) -> dict[str, Any]:
-    if method == limit:
-        return {"color": "k", "lw": 4.5, "alpha": 0.85, "zorder": 1}
-    if method == PRIOR:
-        return {"color": "0.6", "lw": 2, "ls": ":"}
-    mark = {"marker": "s", "ls": "--"} if method.startswith(ANALYTIC) else {"marker": "o"}
-    return {"color": colours[method], "lw": 1.3, "ms": 4, "zorder": 3, **mark}
+def _styles(kinds: dict[str, MethodKind]) -> dict[str, dict[str, Any]]:
+    """Line style by method: the limit black, the prior grey, analytic methods dashed."""
+    styles: dict[str, dict[str, Any]] = {}
+    number = 0
+    for method, kind in kinds.items():
+        if kind is MethodKind.BAYES_LIMIT:
+            styles[method] = {"color": "k", "lw": 4.5, "alpha": 0.85, "zorder": 1}
+            continue
+        if kind is MethodKind.PRIOR:
+            styles[method] = {"color": "0.6", "lw": 2, "ls": ":"}
+            continue
+        analytic = kind is MethodKind.ANALYTIC
+        marker = {"marker": "s", "ls": "--"} if analytic else {"marker": "o"}
+        styles[method] = {"color": f"C{number % 10}", "lw": 1.3, "ms": 4, "zorder": 3, **marker}
+        number += 1
+    return styles

@@ -1,4 +1,4 @@
-"""Whether a model file, test data and trained models are of one wheel, soil and prior."""
+"""Provenance: whether a model file, test data and estimators share one wheel, soil and prior."""
 
 from __future__ import annotations
 
@@ -13,84 +13,108 @@ from soilml.io.toml_settings import Settings
 from soilml.onboard.estimator import Estimator
 from soilml.physics.gears import GEARS
 
-#: Relative difference of two values that are meant to be one: of a size measured, and of others.
-OF_SIZES, OF_OTHERS = 0.005, 0.001
+#: Relative tolerance of values that should be equal: measured dimensions of the wheel, and others.
+DIMENSION_TOLERANCE, VALUE_TOLERANCE = 0.005, 0.001
 
 
 def check_same_provenance(
     case: Case, table: Table, estimators: Mapping[str, Estimator], names: Sequence[str]
 ) -> list[str]:
-    """Raise `InputError` where the test data are not of the case, or a model is of another wheel.
+    """Compare the recipes of test data and estimators with a case.
 
-    Both tell what they are of by their recipe; without one nothing is checked. A model that was
-    trained on another soil, other effects or another prior may be compared: how it fares then is
-    worth knowing; that it was is returned, in words. `names` are the parameters compared.
+    Test data and estimators without a recipe are not checked.
+
+    Parameters
+    ----------
+    case
+        The model file.
+    table
+        The test data, with their recipe in its metadata.
+    estimators
+        Estimators by label, each with the recipe of its training data in its metadata.
+    names
+        The parameters compared, whose priors must agree.
+
+    Returns
+    -------
+    list of str
+        One note for each difference between the case and the training data of an estimator in
+        soil, effects or prior: such an estimator is compared nevertheless.
+
+    Raises
+    ------
+    InputError
+        Where the test data differ from the case, or an estimator is of another wheel.
     """
     test = _recipe(table.metadata.get("soilml_recipe", "{}"), table.source)
-    others = {label: _recipe(e.metadata["recipe"], e.path) for label, e in estimators.items()}
-    for label, other in ({table.source: test} | others).items():
-        for said in _gears(case, other) if other else ():
-            raise InputError(f"{label} is of {said}: compare what belongs to one wheel")
-    for said in _differences(case, test, names) if test else ():
-        raise InputError(f"{table.source} has {said}: give the model file that belongs to it")
+    trained = {label: _recipe(e.metadata["recipe"], e.path) for label, e in estimators.items()}
+    for label, other in ({table.source: test} | trained).items():
+        for difference in _gear_differences(case, other) if other else ():
+            raise InputError(f"{label} is of {difference}: compare data and models of one wheel")
+    for difference in _differences(case, test, names) if test else ():
+        raise InputError(
+            f"{table.source} has {difference}: use the model file that the data were made with"
+        )
     return [
-        f"{label} was trained with {said}"
-        for label, other in others.items()
-        for said in (_differences(case, other, names) if other else ())
+        f"{label} was trained with {difference}"
+        for label, other in trained.items()
+        for difference in (_differences(case, other, names) if other else ())
     ]
 
 
-def _recipe(text: str, where: str) -> Case | None:
+def _recipe(text: str, source: str) -> Case | None:
     """The case in a recipe; None where there is no recipe."""
     try:
         content = json.loads(text, parse_int=float)
     except (ValueError, RecursionError):
         content = None
     if not isinstance(content, dict):
-        raise InputError(f"{where}: its recipe is damaged; generate or train it again")
-    return take_case(Settings(content, f"recipe of {where}", Path())) if content else None
+        raise InputError(f"{source}: its recipe is damaged; generate or train the file again")
+    return take_case(Settings(content, f"recipe of {source}", Path())) if content else None
 
 
-def _gears(case: Case, other: Case) -> Iterator[str]:
-    """What wheel the other has, where it is another."""
-    own, its = _kind(case), _kind(other)
-    if own != its:
-        yield f"a gear of type {its!r}, the model file of {own!r}"
-    sizes = other.parameters()
-    for path, (_, size) in case.parameters().items():
-        if path.startswith("gear.") and not _near(size, sizes[path][1], OF_SIZES):
+def _gear_differences(case: Case, other: Case) -> Iterator[str]:
+    """Type and dimensions of the other's gear that differ from the case's."""
+    own_type, other_type = _gear_type(case), _gear_type(other)
+    if own_type != other_type:
+        yield f"a gear of type {other_type!r}, the model file of type {own_type!r}"
+    others = other.parameters()
+    for path, (_, value) in case.parameters().items():
+        if path.startswith("gear.") and not _close(value, others[path][1], DIMENSION_TOLERANCE):
             name = path.removeprefix("gear.")
-            yield f"a wheel with {name} {sizes[path][1]:g}, the model file has {size:g}"
+            yield f"a wheel with {name} {others[path][1]:g}, the model file has {value:g}"
 
 
-def _kind(case: Case) -> str:
-    return next(name for name, kind in GEARS.items() if type(case.model.gear) is kind)
+def _gear_type(case: Case) -> str:
+    return next(name for name, cls in GEARS.items() if type(case.model.gear) is cls)
 
 
 def _differences(case: Case, other: Case, names: Sequence[str]) -> Iterator[str]:
-    """What the other has, where it is not what the case has; what it varies has no value."""
-    own, its = ({e.name for e in c.model.effects} for c in (case, other))
-    if own != its:
-        yield f"effects {_list(its)}, the model file {_list(own)}"
-    values = other.parameters()
+    """Effects, fixed values and priors of the other that differ from the case's."""
+    own_effects, other_effects = ({e.name for e in c.model.effects} for c in (case, other))
+    if own_effects != other_effects:
+        yield f"effects {_list(other_effects)}, the model file {_list(own_effects)}"
+    others = other.parameters()
     for path, (_, value) in case.parameters().items():
-        fixed = path in values and path not in other.prior and not path.startswith("gear.")
-        if fixed and not _near(value, values[path][1], OF_OTHERS):
-            yield f"{path} {values[path][1]:g}, the model file {value:g}"
+        # a parameter that the other varies has no one value
+        fixed = path in others and path not in other.prior and not path.startswith("gear.")
+        if fixed and not _close(value, others[path][1], VALUE_TOLERANCE):
+            yield f"{path} {others[path][1]:g}, the model file {value:g}"
     for name in names:
-        mine, yours = case.prior.get(name), other.prior.get(name)
-        if mine is None:
+        own, its = case.prior.get(name), other.prior.get(name)
+        if own is None:
             continue
-        if yours is None:
-            yield f"no prior of {name}, the model file {mine.as_setting()}"
-        elif mine.log != yours.log or not (
-            _near(mine.lower, yours.lower, OF_OTHERS) and _near(mine.upper, yours.upper, OF_OTHERS)
+        if its is None:
+            yield f"no prior of {name}, the model file {own.as_setting()}"
+        elif own.log != its.log or not (
+            _close(own.lower, its.lower, VALUE_TOLERANCE)
+            and _close(own.upper, its.upper, VALUE_TOLERANCE)
         ):
-            yield f"prior {yours.as_setting()} of {name}, the model file {mine.as_setting()}"
+            yield f"prior {its.as_setting()} of {name}, the model file {own.as_setting()}"
 
 
-def _near(a: float, b: float, share: float) -> bool:
-    return abs(a - b) <= share * max(abs(a), abs(b))
+def _close(a: float, b: float, tolerance: float) -> bool:
+    return abs(a - b) <= tolerance * max(abs(a), abs(b))
 
 
 def _list(names: set[str]) -> str:

@@ -1,11 +1,10 @@
-"""The fixed benchmark: every method on the same sets, beside the Bayes limit of those sets."""
+"""The fixed benchmark: every method on the same sets, paired with the Bayes limit of those sets."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import groupby
 
 import numpy as np
@@ -15,114 +14,178 @@ from soilml.errors import InputError
 from soilml.identification import METHODS
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import SHEAR
-from training.benchmark.bayes_limit import FRACTIONS, Job, jobs
-from training.benchmark.bayes_limit_file import BayesLimit, load, shipped
+from training.benchmark.bayes_limit import BenchmarkSet, benchmark_sets
+from training.benchmark.bayes_limit_file import BayesLimit, load_limit, packaged_limit
 from training.benchmark.designs import Design, design_of
+from training.benchmark.method_kind import MethodKind
 from training.benchmark.methods import (
-    ANALYTIC,
-    PRIOR,
+    ANALYTIC_PREFIX,
     Method,
-    MethodAnswers,
-    Own,
-    analytic,
-    own_methods,
-    prior_alone,
-    trained,
+    MethodEstimates,
+    UserMethod,
+    analytic_method,
+    model_file_methods,
+    prior_method,
+    user_methods,
 )
-from training.benchmark.paired_results import Result
+from training.benchmark.paired_results import PairedResult
 
 Progress = Callable[[str, int, int], None]
 
-#: The recipe whose sets these are; it comes with the package.
+#: The packaged recipe whose sets the benchmark has.
 RECIPE = "benchmark"
-#: The line of the limit; with an effect that its model lacks, it is but the posterior method.
-LIMIT, POSTERIOR = "Bayes limit", f"{ANALYTIC}posterior"
-#: Analytic methods that are asked; the exact posterior is the limit itself.
-ASKED = tuple(name for name in METHODS if name != "posterior")
+#: Label of the exact posterior. On sets with an unmodelled effect it is no limit, and has the label
+#: of the analytic method that it is.
+LIMIT_LABEL, POSTERIOR_LABEL = "Bayes limit", f"{ANALYTIC_PREFIX}posterior"
+#: Analytic methods of the benchmark; `posterior` is the limit itself.
+ANALYTIC_METHODS = tuple(name for name in METHODS if name != "posterior")
 
 
-def methods(
+def benchmark_methods(
     recipe: Recipe,
     estimators: Mapping[str, Estimator] | None = None,
-    own: Mapping[str, Own] | None = None,
-    named: Sequence[str] = ASKED,
+    functions: Mapping[str, UserMethod] | None = None,
+    analytic: Sequence[str] = ANALYTIC_METHODS,
 ) -> list[Method]:
-    """The prior, model files, functions of one's own (see `Own`) and analytic methods by name."""
+    """The prior, model files, functions of the caller, and analytic methods by name.
+
+    Raises `InputError` for a model file of other parameters, and for a label that occurs twice.
+    """
     for label, estimator in (estimators or {}).items():
         if estimator.names != SHEAR:
             raise InputError(
-                f"{label} estimates {', '.join(estimator.names)}; the benchmark is for "
-                f"{', '.join(SHEAR)}"
+                f"{label} estimates {', '.join(estimator.names)}; the benchmark needs an estimator "
+                f"of {', '.join(SHEAR)}"
             )
-    found = [prior_alone([recipe.case.prior[n] for n in SHEAR])]
+    methods = [prior_method([recipe.case.prior[n] for n in SHEAR])]
     for label, estimator in (estimators or {}).items():
-        found += trained(label, estimator)
-    found += own_methods(own or {})
-    return found + [analytic(recipe.case, name, SHEAR) for name in named]
+        methods += model_file_methods(label, estimator)
+    methods += user_methods(functions or {})
+    methods += [analytic_method(recipe.case, name, SHEAR) for name in analytic]
+    labels = [LIMIT_LABEL, POSTERIOR_LABEL, *(m.label for m in methods)]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise InputError(f"two methods are called {label!r}: rename the file or function")
+    return methods
 
 
 def benchmark(
     estimators: Mapping[str, Estimator] | None = None,
-    own: Mapping[str, Own] | None = None,
-    most: int | None = None,
+    functions: Mapping[str, UserMethod] | None = None,
+    max_sets: int | None = None,
     limit: str | os.PathLike[str] | None = None,
     progress: Progress = lambda text, done, total: None,
-    named: Sequence[str] = ASKED,
-) -> list[Result]:
-    """Every method on every design, without and with effects that none of them knows.
+    analytic: Sequence[str] = ANALYTIC_METHODS,
+) -> list[PairedResult]:
+    """Score methods on the fixed sets of the packaged recipe, next to their Bayes limit.
 
-    `named` are the analytic methods. `most` sets of each design are used, all where it is None.
-    `limit` is a file of `soilml compare --limit`, else the one that comes with the package. Raises
-    `InputError` where it is not of these rows.
+    Parameters
+    ----------
+    estimators
+        Model files by label, on the wheel of the recipe (see `for_simulated_case`).
+    functions
+        Methods of the caller by label: slips (1), torques (N m) and loads (N) of one soil, each
+        (rows,), to the mean (3,) and the standard deviation (3,) or covariance (3, 3) of cohesion
+        (Pa), friction angle (rad) and shear modulus (m). A `FitError` counts as a failed set.
+    max_sets
+        Number of sets of each design, in order; all where it is None.
+    limit
+        File of `soilml compare --limit`; the packaged one where it is None.
+    progress
+        Called with a description, the number of estimates done, and their total.
+    analytic
+        Names of the analytic methods.
+
+    Returns
+    -------
+    list of PairedResult
+        For each design, without and with unmodelled effects: the Bayes limit first (with an effect,
+        `analytic posterior`), then all methods.
+
+    Raises
+    ------
+    InputError
+        Where `limit` lacks a set or is stale, an estimator has other parameters, or two methods
+        have one label.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def prior_mean(slip, torque, load):
+    ...     return np.array([1500.0, 0.61, 0.0175]), np.array([870.0, 0.1, 0.0072])
+    >>> results = benchmark(functions={"prior mean": prior_mean}, max_sets=2, analytic=())
+    >>> [r.method for r in results[:3]]
+    ['Bayes limit', 'prior', 'prior mean']
     """
     recipe = read_recipe(RECIPE)
-    asked = methods(recipe, estimators, own, named)
-    wanted = jobs(recipe, SHEAR, most)
-    known = load(limit or shipped(), wanted)
+    methods = benchmark_methods(recipe, estimators, functions, analytic)
+    sets = benchmark_sets(recipe, SHEAR, max_sets)
+    posteriors = load_limit(limit or packaged_limit(), sets)
     designs = {design.key: design for design in map(design_of, recipe.blocks)}
-    groups = [list(same) for _, same in groupby(wanted, key=lambda j: (j.effect, j.design))]
-    found, start = [], 0
+    groups = [list(group) for _, group in groupby(sets, key=lambda s: (s.effect, s.design))]
+    results, start = [], 0
     for group in groups:
         part = slice(start, start := start + len(group))
-        found += _scored(designs[group[0].design], group, known.rows(part), asked, progress)
-    return found
+        design = designs[group[0].design]
+        results += _score_design(design, group, posteriors.subset(part), methods, progress)
+    return results
 
 
-def _scored(
+def _score_design(
     design: Design,
-    group: Sequence[Job],
-    known: BayesLimit,
-    asked: Sequence[Method],
+    sets: Sequence[BenchmarkSet],
+    posteriors: BayesLimit,
+    methods: Sequence[Method],
     progress: Progress,
-) -> list[Result]:
-    """A line for the limit and one for each method, on the sets of one design."""
-    low, first, third, high = (known.quantiles[:, i] for i in range(len(FRACTIONS)))
-    inner, outer = np.stack([first, third], axis=1), np.stack([low, high], axis=1)
-    least = MethodAnswers(known.mean, known.covariance, inner, outer, known.flagged, float("nan"))
-    limit = Result(
-        design=design,
-        effect=group[0].effect,
-        method=POSTERIOR if group[0].effect else LIMIT,
-        inputs="slip, load, torque",
-        priors=tuple(group[0].case.prior[n] for n in SHEAR),
-        truth=np.stack([job.truth for job in group]),
-        answers=least,
-        limit=known.mean,
-        density=known.density,
-        denser=known.denser,
+) -> list[PairedResult]:
+    """The result of the limit and one of each method, on the sets of one design."""
+    limit = _limit_result(design, sets, posteriors)
+    results, unavailable = [limit], np.full(len(sets), np.nan)
+    tables, total = [one.table for one in sets], len(methods) * len(sets)
+    for number, method in enumerate(methods):
+
+        def report(done: int, _: int, before: int = number * len(sets)) -> None:
+            progress(limit.description, before + done, total)
+
+        estimates = method.estimate_sets(tables, len(SHEAR), report)
+        prior = method.kind is MethodKind.PRIOR
+        results.append(
+            replace(
+                limit,
+                method=method.label,
+                kind=method.kind,
+                inputs=method.inputs,
+                estimates=estimates,
+                log_densities=np.zeros(len(sets)) if prior else unavailable,
+                hpd_levels=unavailable,
+            )
+        )
+    return results
+
+
+def _limit_result(
+    design: Design, sets: Sequence[BenchmarkSet], posteriors: BayesLimit
+) -> PairedResult:
+    """The exact posterior as a method."""
+    effect, quantiles = sets[0].effect, posteriors.quantiles
+    estimates = MethodEstimates(
+        mean=posteriors.mean,
+        covariance=posteriors.covariance,
+        interval50=quantiles[:, [1, 2]],
+        interval90=quantiles[:, [0, 3]],
+        flagged=posteriors.flagged,
+        seconds=float("nan"),
     )
-    found, unknown = [limit], np.full(len(group), np.nan)
-    tables, total = [job.table for job in group], len(asked) * len(group)
-    for method in asked:
-        before = (len(found) - 1) * len(group)
-        told = partial(_told, progress, limit.driven, before, total)
-        answers = method.answers(tables, len(SHEAR), told)
-        density = np.zeros(len(group)) if method.name == PRIOR else unknown
-        line = replace(limit, method=method.name, inputs=method.inputs)
-        found.append(replace(line, answers=answers, density=density, denser=unknown))
-    return found
-
-
-def _told(progress: Progress, text: str, before: int, total: int, done: int, sets: int) -> None:
-    """One bar for all methods on a design."""
-    progress(text, before + done, total)
+    return PairedResult(
+        design=design,
+        effect=effect,
+        method=POSTERIOR_LABEL if effect else LIMIT_LABEL,
+        kind=MethodKind.ANALYTIC if effect else MethodKind.BAYES_LIMIT,
+        inputs="slip, load, torque",
+        priors=tuple(sets[0].case.prior[n] for n in SHEAR),
+        truth=np.stack([one.truth for one in sets]),
+        estimates=estimates,
+        limit_mean=posteriors.mean,
+        log_densities=posteriors.log_densities,
+        hpd_levels=posteriors.hpd_levels,
+    )

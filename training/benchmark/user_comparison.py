@@ -1,8 +1,8 @@
-"""Trained models and analytic identification on the same measured sets."""
+"""Model files and analytic identification on the same test data of the user."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,124 +18,175 @@ from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import column
-from training.benchmark.methods import Method, MethodAnswers, analytic, held, prior_alone, trained
+from training.benchmark.method_kind import MethodKind
+from training.benchmark.methods import (
+    Method,
+    MethodEstimates,
+    analytic_method,
+    interval_coverage,
+    model_file_methods,
+    prior_method,
+)
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-#: Sets of one size that are scored, and of these, how many the slower analytic methods are given.
-MOST_SETS = 4000
+#: Most sets of one size that are scored, and how many of these the slower analytic methods get.
+MAX_SETS = 4000
 ANALYTIC_SETS = 120
-#: Least sets of a size that are worth scoring.
-LEAST_SETS = 20
+#: Fewest sets of a size that are scored: the standard error of 90 % coverage is then 7 %.
+MIN_SETS = 20
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line of the benchmark: a method on sets of one size, per parameter (q,)."""
+class MethodScore:
+    """Scores of a method on sets of one size, per parameter (q,); NaN where not estimated.
+
+    `rows` is the number of readings per set; `rmse` is in SI units; `seconds` is per estimate.
+    """
 
     rows: int
     method: str
+    kind: MethodKind
     inputs: str
     sets: int
     failed: int
     rmse: Floats
-    relative: Floats
-    cover50: Floats
-    cover90: Floats
+    rmse_over_prior: Floats
+    coverage50: Floats
+    coverage90: Floats
     seconds: float
 
 
 def compare(
     case: Case,
     table: Table,
-    estimators: dict[str, Estimator],
+    estimators: Mapping[str, Estimator],
     progress: Progress = lambda text, done, total: None,
     analytic_sets: int = ANALYTIC_SETS,
-) -> list[Line]:
-    """Score prior, models and analytic methods on single rows and on every size of run there is.
+) -> list[MethodScore]:
+    """Score the prior, model files and analytic methods on single readings and on whole runs.
 
-    `case` gives the analytic methods their model, priors and noise. They see the same columns as
-    the models (slip, torque, load); what a method needs beyond that is named in its line. Values
-    outside the prior are moved to its edge, and a failed fit counts as the prior's mean.
+    Every method sees the same readings: slip, torque and load; a method that reads more channels
+    lists them in `MethodScore.inputs`. Estimates outside the prior are clipped to it, and a failed
+    fit counts as the prior's median.
+
+    Parameters
+    ----------
+    case
+        Model, priors and noise that the analytic methods use.
+    table
+        Test data with the true soil in columns; runs of equal length are the sets.
+    estimators
+        Model files by label; all must estimate the same soil parameters.
+    progress
+        Called with a description, the number of estimates done, and their total.
+    analytic_sets
+        Number of sets of each size for the analytic methods.
+
+    Returns
+    -------
+    list of MethodScore
+        By size of set, then by method.
+
+    Raises
+    ------
+    InputError
+        Where estimators differ in their parameters, a parameter is not a soil parameter, or the
+        table lacks a column of true values.
     """
     first = next(iter(estimators.values()))
     names = first.names
+    _check_parameters(estimators)
+    prior = [case.prior.get(n) or Prior(lo, hi) for n, lo, hi in _prior_ranges(first)]
+    table = _scorable_rows(table, names)
+    fast = [prior_method(prior)]
     for label, estimator in estimators.items():
-        if estimator.names != names:
-            raise InputError(f"{label} estimates {estimator.names}, {first.path} {names}")
-    for name in names:
+        fast += model_file_methods(label, estimator)
+    slow = [analytic_method(case, name, names) for name in METHODS]
+    scores = []
+    for size, sets in _sets_by_size(table).items():
+        truth = _truth(sets, names)
+        for method in fast:
+            estimates = method.estimate_sets(sets, len(names))
+            scores.append(_score(size, method, truth, estimates, prior))
+        fewer = sets[:: max(len(sets) // analytic_sets, 1)][:analytic_sets]
+        truth = _truth(fewer, names)
+        for method in slow:
+            if all(column(c) in fewer[0] for c in method.channels):
+                report = partial(progress, f"{method.label}, {size} rows")
+                estimates = method.estimate_sets(fewer, len(names), report)
+                scores.append(_score(size, method, truth, estimates, prior))
+    return scores
+
+
+def _check_parameters(estimators: Mapping[str, Estimator]) -> None:
+    first = next(iter(estimators.values()))
+    for label, estimator in estimators.items():
+        if estimator.names != first.names:
+            raise InputError(
+                f"{label} estimates {', '.join(estimator.names)}, but {first.path} estimates "
+                f"{', '.join(first.names)}: compare files of the same parameters"
+            )
+    for name in first.names:
         if name not in declared(Soil):
             raise InputError(
-                f"{first.path} estimates {name}, which no analytic method finds; compare is for "
-                f"{', '.join(declared(Soil))}"
+                f"{first.path} estimates {name}, which no analytic method identifies; compare "
+                f"needs estimators of {', '.join(declared(Soil))}"
             )
-    prior = [case.prior.get(n) or Prior(lo, hi) for n, lo, hi in _ranges(first)]
-    table = _usable(table, names)
-    always = [prior_alone(prior)]
-    always += [m for label, estimator in estimators.items() for m in trained(label, estimator)]
-    slow = [analytic(case, method, names) for method in METHODS]
-    lines = []
-    for size, sets in _sets(table).items():
-        truth = np.asarray([[s[column(n)][0] for n in names] for s in sets])
-        for method in always:
-            answers = method.answers(sets, len(names))
-            lines.append(_line(size, method, truth, answers, prior))
-        few = sets[:: max(len(sets) // analytic_sets, 1)][:analytic_sets]
-        some = np.asarray([[s[column(n)][0] for n in names] for s in few])
-        for method in slow:
-            if all(column(c) in few[0] for c in method.channels):
-                told = partial(progress, f"{method.name}, {size} rows")
-                answers = method.answers(few, len(names), told)
-                lines.append(_line(size, method, some, answers, prior))
-    return lines
 
 
-def _ranges(estimator: Estimator) -> list[tuple[str, float, float]]:
+def _prior_ranges(estimator: Estimator) -> list[tuple[str, float, float]]:
     ends = zip(estimator.prior.lower, estimator.prior.upper, strict=True)
     return [(n, float(a), float(b)) for n, (a, b) in zip(estimator.names, ends, strict=True)]
 
 
-def _usable(table: Table, names: Sequence[str]) -> Table:
+def _scorable_rows(table: Table, names: Sequence[str]) -> Table:
+    """Rows with a torque and an equilibrium; raises `InputError` without true values."""
     for name in names:
         if column(name) not in table:
             raise InputError(
-                f"{table.source}: column {column(name)} is missing: no truth to compare"
+                f"{table.source}: column {column(name)} is missing; compare needs the true value"
             )
     return table.rows(np.isfinite(table["torque_Nm"]) & table.answered)
 
 
-def _sets(table: Table) -> dict[int, list[Table]]:
-    """Sets by size: single rows, one from each run, and all runs of a length that is common."""
+def _truth(sets: Sequence[Table], names: Sequence[str]) -> Floats:
+    return np.asarray([[s[column(n)][0] for n in names] for s in sets])
+
+
+def _sets_by_size(table: Table) -> dict[int, list[Table]]:
+    """Sets by size: single rows, one of each run, and all runs of a length that is frequent."""
     runs = [rows for _, rows in table.groups("run")]
-    step = max(len(runs) // MOST_SETS, 1)
-    found = {1: [rows.rows(np.asarray([i % len(rows)])) for i, rows in enumerate(runs[::step])]}
+    step = max(len(runs) // MAX_SETS, 1)
+    sets = {1: [rows.rows(np.asarray([i % len(rows)])) for i, rows in enumerate(runs[::step])]}
     for size in sorted({len(rows) for rows in runs} - {1}):
-        alike = [rows for rows in runs if len(rows) == size][:MOST_SETS]
-        if len(alike) >= LEAST_SETS:
-            found[size] = alike
-    return found
+        equal = [rows for rows in runs if len(rows) == size][:MAX_SETS]
+        if len(equal) >= MIN_SETS:
+            sets[size] = equal
+    return sets
 
 
-def _line(
-    size: int, method: Method, truth: Floats, answers: MethodAnswers, prior: Sequence[Prior]
-) -> Line:
+def _score(
+    size: int, method: Method, truth: Floats, estimates: MethodEstimates, prior: Sequence[Prior]
+) -> MethodScore:
     lower, upper = np.asarray([p.lower for p in prior]), np.asarray([p.upper for p in prior])
-    middle = np.asarray([float(p.at(np.asarray([0.5]))[0]) for p in prior])
-    width = np.asarray([p.std for p in prior])
-    failed = ~np.isfinite(answers.mean)
-    value = np.where(failed, middle, np.clip(answers.mean, lower, upper))
+    median = np.asarray([float(p.at(np.asarray([0.5]))[0]) for p in prior])
+    prior_std = np.asarray([p.std for p in prior])
+    failed = ~np.isfinite(estimates.mean)
+    value = np.where(failed, median, np.clip(estimates.mean, lower, upper))
     never = failed.all(axis=0)  # a parameter that the method does not estimate
     rmse = np.where(never, np.nan, np.sqrt(np.mean((truth - value) ** 2, axis=0)))
-    return Line(
+    return MethodScore(
         rows=size,
-        method=method.name,
+        method=method.label,
+        kind=method.kind,
         inputs=method.inputs,
         sets=len(truth),
         failed=int(failed[:, ~never].any(axis=1).sum()) if not never.all() else len(truth),
         rmse=rmse,
-        relative=rmse / width,
-        cover50=held(truth, answers.inner),
-        cover90=held(truth, answers.outer),
-        seconds=answers.seconds,
+        rmse_over_prior=rmse / prior_std,
+        coverage50=interval_coverage(truth, estimates.interval50),
+        coverage90=interval_coverage(truth, estimates.interval90),
+        seconds=estimates.seconds,
     )

@@ -1,1 +1,1 @@
-"""Sub-commands of `soilml` that come with training."""
+"""Sub-commands of `soilml` that the training package provides: `train` and `compare`."""

@@ -1,4 +1,4 @@
-"""`soilml compare`: trained models against analytic identification and the prior."""
+"""`soilml compare`: model files against analytic identification and the prior."""
 
 from __future__ import annotations
 
@@ -11,34 +11,40 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import made_folder, named, replacing_all
 from soilml.optional_imports import need
 
-#: What goes into the folder, on one's own test data and of the benchmark.
+#: Outputs of a comparison on the user's test data, and of the benchmark.
 FILES = ("compare.csv", "compare.png", "compare.md")
 BENCHMARK = ("benchmark.csv", "benchmark.png", "benchmark.md")
-#: Where the benchmark's go without --out, and the files that it is of without arguments.
+#: Output folder of the benchmark without --out, and its model files without arguments.
 FOLDER = "demo/benchmark"
 RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
-HELP = "models against analytic identification and the prior, on the same data"
+HELP = "score model files and analytic identification on sets of known soil"
 DESCRIPTION = """\
-Score model files and analytic identification on measured sets whose soil is known.
+Score model files, analytic identification and the prior on sets of readings whose soil is known:
+RMSE, coverage of 50 and 90 % intervals, failures, and time per estimate.
 
-  soilml compare
-  soilml compare mine.onnx other.onnx --sets 50 --out comparison
+1. On the fixed benchmark
 
-is the fixed benchmark: sets of 1 to 18 rows at one load and at three, made from the packaged recipe
-`benchmark`, with the Bayes limit of the same sets beside every method. Without a file it is of the
-released models, in a clone of the repository. Into the folder go benchmark.md, .csv and .png.
+     soilml compare
+     soilml compare mine.onnx other.onnx --sets 50 --out comparison
 
-  soilml compare MODEL.toml test.parquet wheel.onnx other.onnx --out comparison
+   Sets of 1 to 18 rows at one load and at three, simulated from the packaged recipe `benchmark`.
+   RMSE is also given relative to the Bayes limit: the exact posterior mean of the same sets, which
+   no estimator can beat on average. Without a model file, the released files are scored (in a clone
+   of the repository). Writes benchmark.md, benchmark.csv and benchmark.png.
 
-is on data of your own. TEST.parquet comes from soilml generate with a seed that was not trained on;
-its runs are the sets: single rows, and rows of one soil together. MODEL.toml gives the analytic
-methods their wheel, soil, priors and noise; its wheel, soil, effects and priors must be those of
-the test data. Into the folder go compare.md, compare.csv and compare.png.
+2. On your own test data
 
-  soilml compare --limit limit.parquet
+     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out comparison
 
-computes the Bayes limit of the benchmark anew, in two processes.
+   TEST.parquet comes from `soilml generate`, with a seed that no model was trained on. Its runs are
+   the sets; single rows are scored too. MODEL.toml gives the analytic methods their wheel, soil,
+   priors and noise; its wheel, soil, effects and priors must be those of the test data. Writes
+   compare.md, compare.csv and compare.png.
+
+3. To recompute the Bayes limit of the benchmark (minutes, two processes)
+
+     soilml compare --limit limit.parquet
 """
 
 
@@ -48,49 +54,53 @@ def add(parser: argparse.ArgumentParser) -> None:
         "files",
         metavar="FILE",
         nargs="*",
-        help="MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ...; else exported/wheel*.onnx",
+        help="MODEL.onnx ... (benchmark), or MODEL.toml TEST.parquet MODEL.onnx ... (test data); "
+        "default: the released files in exported/",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help=f"folder for table and picture; of the benchmark {FOLDER}"
+        "--out", metavar="DIR", help=f"output folder; default of the benchmark: {FOLDER}"
     )
     parser.add_argument(
-        "--sets", type=_sets, metavar="N", help="only the first N sets of each size"
+        "--sets", type=_sets, metavar="N", help="benchmark: the first N sets of each design only"
     )
     parser.add_argument(
         "--limit",
         metavar="FILE.parquet",
-        type=Path,  # an output: what is there already may be written over
-        help="write the benchmark's Bayes limit here, no more",
+        type=Path,  # an output: an existing file may be replaced
+        help="recompute the Bayes limit of the benchmark, write it here, and stop",
     )
     parser.add_argument(
-        "--against", metavar="FILE.parquet", help="the limit to use, of --limit; else the package's"
+        "--against",
+        metavar="FILE.parquet",
+        help="benchmark: Bayes limit from a file of --limit; default: the packaged one",
     )
     parser.add_argument(
         "--analytic-sets",
         type=_sets,
+        metavar="N",
         default=120,
-        help="on data of your own: sets of a size for analytic methods",
+        help="test data: sets of each size that the analytic methods are scored on; default: 120",
     )
 
 
 def _sets(text: str) -> int:
-    """A number of sets; raises `ArgumentTypeError` for none."""
+    """A number of sets; raises `ArgumentTypeError` for anything but a positive integer."""
     if not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
     return int(text)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes, where their folder is there already."""
+    """The files that the command writes, where their folder exists already."""
     if args.limit is not None:
         return named(str(args.limit), ".parquet")
     folder = Path(args.out or FOLDER)
-    names = FILES if _own_data(args) else BENCHMARK
+    names = FILES if _has_test_data(args) else BENCHMARK
     return [folder / name for name in names] if folder.is_dir() else []
 
 
-def _own_data(args: argparse.Namespace) -> bool:
-    """Whether a model file and test data are given; model files alone are for the benchmark."""
+def _has_test_data(args: argparse.Namespace) -> bool:
+    """Whether a file other than a model file is given: model files alone are for the benchmark."""
     return any(Path(file).suffix.lower() != ".onnx" for file in args.files)
 
 
@@ -98,11 +108,11 @@ def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
     need("training.benchmark.suite", "compare")
     if args.limit is not None:
-        return _limit(args)
-    return _compare(args) if _own_data(args) else _benchmark(args)
+        return _compute_limit(args)
+    return _compare_on_test_data(args) if _has_test_data(args) else _run_benchmark(args)
 
 
-def _benchmark(args: argparse.Namespace) -> int:
+def _run_benchmark(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
     from soilml.cli.progress import stages
     from soilml.identification.trained_estimator import for_simulated_case
@@ -112,11 +122,11 @@ def _benchmark(args: argparse.Namespace) -> int:
     from soilml.quantities import SHEAR
     from training.benchmark import report
     from training.benchmark.acceptance import goals
-    from training.benchmark.plot import draw
+    from training.benchmark.plot import plot_benchmark
     from training.benchmark.provenance import check_same_provenance
-    from training.benchmark.suite import LIMIT, RECIPE, benchmark
+    from training.benchmark.suite import RECIPE, benchmark
 
-    files = [Path(file) for file in args.files] or _released()
+    files = [Path(file) for file in args.files] or _released_files()
     case = read_recipe(RECIPE).case
     estimators = {file.stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
@@ -126,50 +136,52 @@ def _benchmark(args: argparse.Namespace) -> int:
         with stages() as progress:
             results = benchmark(estimators, None, args.sets, args.against, progress)
         with replacing_all([folder / name for name in BENCHMARK]) as (rows, picture, page):
-            rows.write_text(csv_text(report.columns(results)), encoding="utf-8")
-            draw(results, LIMIT, picture)
-            page.write_text(report.page(results, LIMIT), encoding="utf-8")
-    print(f"{report.tables(results)}\n\n{report.goal_table(goals(results, LIMIT))}")
-    print(f"\n{folder}/{', '.join(BENCHMARK)}", file=sys.stderr)
+            rows.write_text(csv_text(report.csv_columns(results)), encoding="utf-8")
+            plot_benchmark(results, picture)
+            page.write_text(report.benchmark_page(results), encoding="utf-8")
+    print(f"{report.format_tables(results)}\n\n{report.format_goals(goals(results))}")
+    print(f"\nwritten: {folder}/{', '.join(BENCHMARK)}", file=sys.stderr)
     return 0
 
 
-def _released() -> list[Path]:
+def _released_files() -> list[Path]:
     """The model files that the repository comes with."""
     files = [Path("exported") / f"{name}.onnx" for name in RELEASED]
     missing = [file for file in files if not file.is_file()]
     if missing:
         raise InputError(
-            f"no model file given, and there is no {missing[0]} here: run it in a clone of the "
+            f"no model file given, and {missing[0]} does not exist here: run it in a clone of the "
             "repository, or give one or more MODEL.onnx"
         )
     return files
 
 
-def _limit(args: argparse.Namespace) -> int:
+def _compute_limit(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
     from soilml.cli.progress import stages
     from soilml.quantities import SHEAR
-    from training.benchmark.bayes_limit import computed, jobs
-    from training.benchmark.bayes_limit_file import save
+    from training.benchmark.bayes_limit import benchmark_sets, compute_posteriors
+    from training.benchmark.bayes_limit_file import save_limit
     from training.benchmark.suite import RECIPE
 
     if args.files or args.out or args.against:
-        raise InputError("--limit writes its file and nothing else: leave the other arguments out")
-    wanted = jobs(read_recipe(RECIPE), SHEAR, args.sets)
+        raise InputError(
+            "--limit given with other arguments; it allows --sets alone: omit the rest"
+        )
+    sets = benchmark_sets(read_recipe(RECIPE), SHEAR, args.sets)
     with stages() as progress:
-        found = list(computed(wanted, progress))
-    save(args.limit, wanted, found)
-    print(f"{args.limit}: the Bayes limit of {len(wanted)} sets", file=sys.stderr)
+        summaries = list(compute_posteriors(sets, progress))
+    save_limit(args.limit, sets, summaries)
+    print(f"written: {args.limit}, the Bayes limit of {len(sets)} sets", file=sys.stderr)
     return 0
 
 
 def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> None:
     if len(estimators) != len(files):
-        raise InputError("two model files have the same name: rename one, names label the lines")
+        raise InputError("two model files have the same name, which labels their rows: rename one")
 
 
-def _compare(args: argparse.Namespace) -> int:
+def _compare_on_test_data(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stages
     from soilml.config.case import read_case
     from soilml.identification.trained_estimator import for_simulated_case
@@ -192,11 +204,12 @@ def _compare(args: argparse.Namespace) -> int:
         print(note, file=sys.stderr)
     with made_folder(args.out) as folder:
         with stages() as progress:
-            lines = compare(case, table, estimators, progress, args.analytic_sets)
+            scores = compare(case, table, estimators, progress, args.analytic_sets)
         with replacing_all([folder / name for name in FILES]) as (rows, picture, page):
-            rows.write_text(csv_text(report.columns(lines, names)), encoding="utf-8")
-            report.draw(lines, names, picture)
-            page.write_text(report.page(lines, names, Path(test).name), encoding="utf-8")
-    print(report.table(lines, names))
-    print(f"\n{folder}/compare.md, compare.csv, compare.png", file=sys.stderr)
+            rows.write_text(csv_text(report.csv_columns(scores, names)), encoding="utf-8")
+            report.plot_comparison(scores, names, picture)
+            text = report.comparison_page(scores, names, Path(test).name)
+            page.write_text(text, encoding="utf-8")
+    print(report.format_tables(scores, names))
+    print(f"\nwritten: {folder}/{', '.join(FILES)}", file=sys.stderr)
     return 0

@@ -1,4 +1,4 @@
-"""`soilml train`: from data to a model file that flies."""
+"""`soilml train`: from training data to a model file for the onboard runtime."""
 
 from __future__ import annotations
 
@@ -10,39 +10,45 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import named, replacing_all
 from soilml.optional_imports import need
 
-HELP = "fit regressors to data and export one ONNX file"
+HELP = "train an estimator and export it as one ONNX file"
 DESCRIPTION = """\
-Fit what SPEC.toml names to DATA.parquet, recalibrate it on rows it did not learn from, export it.
+Fit the regressors of SPEC.toml to DATA.parquet, recalibrate their uncertainty on held-out rows, and
+export the estimator as one ONNX file for `soilml estimate` and the onboard runtime.
 
   soilml train spec.toml data.parquet wheel.onnx
   soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip ...
-  soilml train any_wheel any.onnx                one file for wheels of any size; it needs no data
+  soilml train any_wheel any.onnx                one file for wheels of any size; takes no data
 
-Beside OUT.onnx stand OUT.md, its card, and OUT.png, its learning curves. A spec holds
+Writes OUT.onnx, its model card OUT.md, and its learning curves OUT.png. A spec contains
 
   features = ["slip", "torque/load", "load"]     # measured quantities, or ratios of them
-  targets = ["cohesion", "friction_angle", "shear_modulus"]        # what the recipe varies, or slip
-  rule = "best-linear"                           # or covariance-intersection, inverse-variance, ...
+  targets = ["cohesion", "friction_angle", "shear_modulus"]  # varied by the recipe, or "slip"
+  rule = "best-linear"                           # fusion rule: or covariance-intersection,
+                                                 # inverse-variance, pairwise
   seed = 0
   [[regressor]]                                  # one or more; several are fused
-  type = "fixed-size-lssvm"                      # centres, gamma, width (chosen where left out)
-  centres = 150                                  # features = [...]: some of the spec's alone
+  type = "fixed-size-lssvm"                      # centres, gamma, width (tuned where omitted)
+  centres = 150                                  # features = [...]: a subset of the spec's
   [[regressor]]
   type = "mlp"                                   # hidden = [64, 64], epochs, batch, patience, ...
   [[regressor]]
-  type = "linear"                                # or "lssvm", exact, for some thousand rows
-  [set_posterior]                                # optional: all readings of one soil together, by
-  designs = 4096                                 # their exact likelihood under a learned response
-  hidden = 64                                    # of the wheel to slip, load and soil
+  type = "linear"                                # or "lssvm": exact, for some thousand rows
+  [set_posterior]                                # optional: posterior of all readings of one soil,
+  designs = 4096                                 # by their exact joint likelihood under a learned
+  hidden = 64                                    # response of the wheel to slip, load and soil
   epochs = 500
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("spec", metavar="SPEC.toml", help="or the name of a packaged spec")
-    parser.add_argument("data", metavar="DATA.parquet", nargs="?", help="from soilml generate")
-    parser.add_argument("out", metavar="OUT.onnx")
+    parser.add_argument(
+        "spec", metavar="SPEC.toml", help="training spec, or the name of a packaged spec"
+    )
+    parser.add_argument(
+        "data", metavar="DATA.parquet", nargs="?", help="training data of `soilml generate`"
+    )
+    parser.add_argument("out", metavar="OUT.onnx", help="model file to write")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -58,17 +64,21 @@ def run(args: argparse.Namespace) -> int:
     if is_for_any_wheel(args.spec):
         return _any_wheel(args)
     if args.data is None:
-        raise InputError(f"DATA.parquet is missing; {args.spec} learns from data: soilml generate")
+        raise InputError(
+            f"DATA.parquet is missing; {args.spec} is trained on data: make them by soilml generate"
+        )
     return _from_data(args)
 
 
 def _any_wheel(args: argparse.Namespace) -> int:
-    """Train the file for wheels of any size."""
+    """Train the estimator for wheels of any size."""
     from soilml.cli.progress import stages
     from training.export.any_wheel_file import card, export, read_any_spec, trained
 
     if args.data is not None:
-        raise InputError(f"{args.data}: {args.spec} simulates its own rows; leave the data out")
+        raise InputError(
+            f"{args.data} given, but {args.spec} simulates its own rows; leave the data out"
+        )
     spec, out = read_any_spec(args.spec), Path(args.out)
     with stages() as progress:
         posterior, figures = trained(spec, progress)
@@ -76,12 +86,12 @@ def _any_wheel(args: argparse.Namespace) -> int:
             metadata = export(spec, posterior, figures, model)
             page.write_text(card(metadata, posterior, figures), encoding="utf-8")
     size = out.stat().st_size / 1e3
-    print(f"\n{out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
+    print(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
     return 0
 
 
 def _from_data(args: argparse.Namespace) -> int:
-    """Train what learns from data."""
+    """Train an estimator on a data file."""
     from soilml.cli.progress import stages
     from soilml.io.text_tables import aligned
     from training.data.dataset import read_dataset
@@ -107,12 +117,13 @@ def _from_data(args: argparse.Namespace) -> int:
         (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])
         for name, s in trained.scores.items()
     ]
-    short = [name.replace("_", " ") for name in spec.targets]
-    head = ("", *[f"RMSE/prior {n}" for n in short], *[f"90 % {n}" for n in short])
-    print(f"On {trained.scores['estimator'].rows} rows not learned from:\n", file=sys.stderr)
+    labels = [name.replace("_", " ") for name in spec.targets]
+    head = ("", *[f"RMSE/prior std, {n}" for n in labels], *[f"90 % coverage, {n}" for n in labels])
+    print(f"On {trained.scores['estimator'].rows} held-out rows:\n", file=sys.stderr)
     print(aligned(head, rows), file=sys.stderr)
     print(
-        f"\n{out} ({out.stat().st_size / 1e3:.0f} kB, parity {metadata['parity']} of the prior), "
+        f"\nwritten: {out} ({out.stat().st_size / 1e3:.0f} kB; largest difference of the float32 "
+        f"file {metadata['parity']} prior standard deviations), "
         f"{out.with_suffix('.md')}, {out.with_suffix('.png')}",
         file=sys.stderr,
     )

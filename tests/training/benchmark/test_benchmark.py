@@ -1,10 +1,10 @@
-"""The fixed benchmark: its sets, its limit, what is said of a method, and its goals."""
+"""The fixed benchmark: sets, Bayes limit, scores of methods, acceptance goals."""
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,13 +16,26 @@ from soilml.errors import InputError
 from soilml.identification import identify
 from soilml.quantities import SHEAR
 from training.benchmark.acceptance import goals
-from training.benchmark.bayes_limit import UNKNOWN, exact_posterior, jobs
-from training.benchmark.bayes_limit_file import load, save, shipped
-from training.benchmark.designs import design_of, fingerprint, sets_of, shown
-from training.benchmark.methods import ANALYTIC, gaussian, trained
-from training.benchmark.suite import ASKED, LIMIT, POSTERIOR, RECIPE, benchmark
+from training.benchmark.bayes_limit import UNMODELLED_EFFECTS, benchmark_sets, exact_posterior
+from training.benchmark.bayes_limit_file import load_limit, packaged_limit, save_limit
+from training.benchmark.designs import (
+    design_of,
+    generate_design_sets,
+    select_channels,
+    set_hash,
+)
+from training.benchmark.method_kind import MethodKind, classify_estimator
+from training.benchmark.methods import ANALYTIC_PREFIX, gaussian_estimate, model_file_methods
+from training.benchmark.suite import (
+    ANALYTIC_METHODS,
+    LIMIT_LABEL,
+    POSTERIOR_LABEL,
+    RECIPE,
+    benchmark,
+)
 
 FEW = 4
+EXPORTED = Path(__file__).parents[3] / "exported"
 
 
 @pytest.fixture(scope="module")
@@ -32,35 +45,35 @@ def recipe():
 
 @pytest.fixture(scope="module")
 def results(recipe):
-    found = jobs(recipe, SHEAR, 12)
-    limit = load(shipped(), found)
-    places = {job.table["torque_Nm"].tobytes(): i for i, job in enumerate(found)}
+    found = benchmark_sets(recipe, SHEAR, 12)
+    limit = load_limit(packaged_limit(), found)
+    positions = {job.table["torque_Nm"].tobytes(): i for i, job in enumerate(found)}
 
     def again(slip, torque, load):
-        i = places[torque.tobytes()]
+        i = positions[torque.tobytes()]
         return limit.mean[i], limit.covariance[i]
 
     def astray(slip, torque, load):
-        i = places[torque.tobytes()]
+        i = positions[torque.tobytes()]
         std = np.sqrt(np.diag(limit.covariance[i]))
         return limit.mean[i] + 0.8 * std * np.random.default_rng(i).normal(size=3), std
 
     def cheat(slip, torque, load):
-        truth = found[places[torque.tobytes()]].truth
+        truth = found[positions[torque.tobytes()]].truth
         return 1.0000001 * truth, 1e-6 * truth
 
-    own = {"limit again": again, "astray": astray, "cheat": cheat}
-    return benchmark(own=own, most=12, named=())
+    functions = {"limit again": again, "astray": astray, "cheat": cheat}
+    return benchmark(functions=functions, max_sets=12, analytic=())
 
 
-def picked(results, method, effect=""):
+def select(results, method, effect=""):
     return [r for r in results if r.method == method and r.effect == effect]
 
 
 def test_the_recipe_drives_the_sizes_and_loads_that_it_says(recipe):
     designs = [design_of(block) for block in recipe.blocks]
     assert [d.rows for d in designs] == [1, 3, 6, 8, 16, 3, 6, 8, 16, 18]
-    for sets in sets_of(recipe, SHEAR, FEW):
+    for sets in generate_design_sets(recipe, SHEAR, FEW):
         for table in sets.tables:
             assert len(table) == sets.design.rows
             assert len(np.unique(table["load_N"])) == sets.design.loads
@@ -70,32 +83,34 @@ def test_the_recipe_drives_the_sizes_and_loads_that_it_says(recipe):
 
 
 def test_no_released_model_was_trained_on_the_benchmark(recipe):
-    files = sorted((Path(__file__).parents[3] / "exported").glob("*.onnx"))
+    files = sorted(EXPORTED.glob("*.onnx"))
     seeds = [json.loads(Estimator.load(file).metadata["recipe"]).get("seed") for file in files]
     assert files and recipe.seed not in [*seeds, read_recipe("wheel_test").seed]
 
 
 def test_the_first_sets_stay_the_same_however_many_are_made(recipe):
-    few, more = sets_of(recipe, SHEAR, 2), sets_of(recipe, SHEAR, 5)
+    few, more = generate_design_sets(recipe, SHEAR, 2), generate_design_sets(recipe, SHEAR, 5)
     for one, other in zip(few, more, strict=True):
         for a, b in zip(one.tables, other.tables, strict=False):
-            assert fingerprint(a, recipe.case) == fingerprint(b, recipe.case)
+            assert set_hash(a, recipe.case) == set_hash(b, recipe.case)
 
 
 def test_the_limit_that_comes_with_the_package_is_the_exact_posterior(recipe):
     """A handful of sets again, by the model itself and not by its polynomial."""
-    every = jobs(recipe, SHEAR)
-    kept = load(shipped(), every)
+    every = benchmark_sets(recipe, SHEAR)
+    stored = load_limit(packaged_limit(), every)
     for i in np.flatnonzero([j.number == 7 and not j.effect for j in every])[[0, 1, 6, 9]]:
         job = every[i]
-        fit = identify(recipe.case, shown(job.table, ["torque"]), list(SHEAR), "posterior")
-        np.testing.assert_allclose((kept.mean[i] - fit.values) / fit.std, 0.0, atol=0.12)
-        std = np.sqrt(np.diag(kept.covariance[i]))
+        fit = identify(
+            recipe.case, select_channels(job.table, ["torque"]), list(SHEAR), "posterior"
+        )
+        np.testing.assert_allclose((stored.mean[i] - fit.values) / fit.std, 0.0, atol=0.12)
+        std = np.sqrt(np.diag(stored.covariance[i]))
         np.testing.assert_allclose(std / fit.std, 1.0, atol=0.1)
-        np.testing.assert_allclose((kept.quantiles[i, 0] - fit.low) / fit.std, 0.0, atol=0.25)
-        np.testing.assert_allclose((kept.quantiles[i, 3] - fit.high) / fit.std, 0.0, atol=0.25)
+        np.testing.assert_allclose((stored.quantiles[i, 0] - fit.low) / fit.std, 0.0, atol=0.25)
+        np.testing.assert_allclose((stored.quantiles[i, 3] - fit.high) / fit.std, 0.0, atol=0.25)
         again = exact_posterior(recipe.case, job.table, job.truth, SHEAR)
-        assert kept.density[i] == pytest.approx(again.density, abs=0.1)
+        assert stored.log_densities[i] == pytest.approx(again.log_density, abs=0.1)
 
 
 def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
@@ -104,8 +119,8 @@ def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
     from soilml.identification.observations import read_observations
     from soilml.identification.predictions import predicted
 
-    job = jobs(recipe, SHEAR, 1)[0]
-    data = read_observations(recipe.case, shown(job.table, ["torque"]))
+    job = benchmark_sets(recipe, SHEAR, 1)[0]
+    data = read_observations(recipe.case, select_channels(job.table, ["torque"]))
     free = select_free(recipe.case, SHEAR)
     side = (np.arange(24) + 0.5) / 24
     u = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
@@ -113,108 +128,144 @@ def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
     y = predicted(recipe.case, free, np.vstack([truth, u]), data.at)["torque"][:, 0]
     std = 0.02 * y
     density = np.exp(-0.5 * ((job.table["torque_Nm"][0] - y) / std) ** 2) / std
-    found = exact_posterior(recipe.case, job.table, job.truth, SHEAR).density
+    found = exact_posterior(recipe.case, job.table, job.truth, SHEAR).log_density
     assert found == pytest.approx(np.log(density[0] / density[1:].mean()), abs=0.05)
 
 
 def test_the_limit_holds_what_it_claims(recipe):
-    every = [j for j in jobs(recipe, SHEAR) if not j.effect]
-    kept = load(shipped(), every)
+    every = [j for j in benchmark_sets(recipe, SHEAR) if not j.effect]
+    stored = load_limit(packaged_limit(), every)
     truth = np.stack([j.truth for j in every])
-    inside = (truth > kept.quantiles[:, 0]) & (truth < kept.quantiles[:, 3])
+    inside = (truth > stored.quantiles[:, 0]) & (truth < stored.quantiles[:, 3])
     np.testing.assert_allclose(inside.mean(axis=0), 0.9, atol=0.02)
-    assert np.mean(kept.denser < 0.9) == pytest.approx(0.9, abs=0.02)
-    assert np.mean(kept.flagged) < 0.01
+    assert np.mean(stored.hpd_levels < 0.9) == pytest.approx(0.9, abs=0.02)
+    assert np.mean(stored.flagged) < 0.01
 
 
 def test_a_stale_limit_is_refused_with_the_way_out(recipe, tmp_path, capsys, monkeypatch):
-    wanted = jobs(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
+    wanted = benchmark_sets(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
     with pytest.raises(InputError, match=r"stale.*soilml compare --limit FILE\.parquet"):
-        load(shipped(), wanted)
-    some = jobs(recipe, SHEAR, 1)[:2]
-    save(
+        load_limit(packaged_limit(), wanted)
+    some = benchmark_sets(recipe, SHEAR, 1)[:2]
+    save_limit(
         tmp_path / "two.parquet",
         some,
         [exact_posterior(j.case, j.table, j.truth, SHEAR) for j in some],
     )
-    assert load(tmp_path / "two.parquet", some).mean.shape == (2, 3)
-    with pytest.raises(InputError, match="has no limit for set 0"):
-        load(tmp_path / "two.parquet", jobs(recipe, SHEAR, 1))
+    assert load_limit(tmp_path / "two.parquet", some).mean.shape == (2, 3)
+    with pytest.raises(InputError, match="has no posterior of set 0"):
+        load_limit(tmp_path / "two.parquet", benchmark_sets(recipe, SHEAR, 1))
     with pytest.raises(InputError, match="cannot be read"):
-        load(tmp_path / "none.parquet", some)
+        load_limit(tmp_path / "none.parquet", some)
 
 
 def test_what_answers_as_the_limit_scores_as_the_limit(results):
-    for again, least in zip(picked(results, "limit again"), picked(results, LIMIT), strict=True):
-        np.testing.assert_allclose(again.ratio, 1.0, rtol=1e-6)
-        np.testing.assert_allclose(again.ratio_std, 0.0, atol=1e-6)
-        assert again.joint90 == pytest.approx(least.joint90)
+    for again, least in zip(
+        select(results, "limit again"), select(results, LIMIT_LABEL), strict=True
+    ):
+        np.testing.assert_allclose(again.rmse_ratio, 1.0, rtol=1e-6)
+        np.testing.assert_allclose(again.rmse_ratio_std, 0.0, atol=1e-6)
+        assert again.joint_coverage90 == pytest.approx(least.joint_coverage90)
 
 
 def test_what_knows_the_soil_is_better_than_the_limit_and_what_knows_nothing_is_worse(results):
-    for cheat, prior in zip(picked(results, "cheat"), picked(results, "prior"), strict=True):
-        assert (cheat.ratio < 1e-4).all()
-        assert prior.log_density == 0.0
+    for cheat, prior in zip(select(results, "cheat"), select(results, "prior"), strict=True):
+        assert (cheat.rmse_ratio < 1e-4).all()
+        assert prior.log_score == 0.0
         if prior.design.rows > 3:
-            assert prior.ratio[2] > 1.0
+            assert prior.rmse_ratio[2] > 1.0
 
 
 def test_no_claim_gives_the_truth_more_density_than_the_limit_but_one_that_knows_it(results):
     for name in ("prior", "astray"):
-        for other, least in zip(picked(results, name), picked(results, LIMIT), strict=True):
-            assert other.log_density < least.log_density
-    for cheat, least in zip(picked(results, "cheat"), picked(results, LIMIT), strict=True):
-        assert cheat.log_density > least.log_density > 0.0
+        for other, least in zip(select(results, name), select(results, LIMIT_LABEL), strict=True):
+            assert other.log_score < least.log_score
+    for cheat, least in zip(select(results, "cheat"), select(results, LIMIT_LABEL), strict=True):
+        assert cheat.log_score > least.log_score > 0.0
 
 
 def test_the_standard_error_of_the_ratio_is_that_of_resampled_sets(results):
-    result = picked(results, "astray")[-1]
+    result = select(results, "astray")[-1]
     rng = np.random.default_rng(0)
-    own, least = result.error**2, (result.limit - result.truth) ** 2
+    own, least = result.error**2, (result.limit_mean - result.truth) ** 2
     drawn = rng.integers(0, result.sets, (4000, result.sets))
     ratios = np.sqrt(own[drawn].sum(axis=1) / least[drawn].sum(axis=1))
-    np.testing.assert_allclose(result.ratio_std, ratios.std(axis=0), rtol=0.6)
+    np.testing.assert_allclose(result.rmse_ratio_std, ratios.std(axis=0), rtol=0.6)
 
 
 def test_an_effect_that_no_method_knows_is_seen_in_the_figures(results):
-    for effect in UNKNOWN:
-        known, lacking = picked(results, LIMIT)[-1], picked(results, POSTERIOR, effect)[-1]
+    for effect in UNMODELLED_EFFECTS:
+        known, lacking = (
+            select(results, LIMIT_LABEL)[-1],
+            select(results, POSTERIOR_LABEL, effect)[-1],
+        )
         assert known.design == lacking.design
         assert (lacking.rmse > 1.5 * known.rmse).all()
-        assert lacking.flagged > known.flagged
+        assert lacking.flagged_fraction > known.flagged_fraction
 
 
 def test_goals_are_met_by_the_limit_s_equal_and_missed_by_the_prior_s(results):
-    said = {g.what: g for g in goals(results, LIMIT) if g.method == "limit again"}
-    assert said["every size: RMSE / limit <= 1.05"].met
-    prior = [replace(r, method="mine") if r.method == "prior" else r for r in results]
-    said = {g.what: g for g in goals(prior, LIMIT) if g.method == "mine"}
-    assert not said["every size: RMSE / limit <= 1.05"].met
-    assert not next(g for what, g in said.items() if what.startswith("18 rows")).met
+    by_criterion = {g.criterion: g for g in goals(results) if g.method == "limit again"}
+    assert by_criterion["every size: RMSE / limit <= 1.05"].met
+    function = {"method": "mine", "kind": MethodKind.USER_FUNCTION}
+    prior = [replace(r, **function) if r.kind is MethodKind.PRIOR else r for r in results]
+    by_criterion = {g.criterion: g for g in goals(prior) if g.method == "mine"}
+    assert not by_criterion["every size: RMSE / limit <= 1.05"].met
+    assert not next(g for what, g in by_criterion.items() if what.startswith("18 rows")).met
 
 
-def test_a_file_that_joins_rows_in_two_ways_gets_two_lines(small_model, recipe):
-    estimator = Estimator.load(small_model)
-    assert [m.name for m in trained("wheel", estimator)] == ["wheel"]
+def test_a_set_posterior_with_single_row_estimates_is_two_methods(small_model, recipe):
+    (only,) = model_file_methods("small", Estimator.load(small_model))
+    assert (only.label, only.kind) == ("small", MethodKind.REGRESSION)
+    both = model_file_methods("wheel", Estimator.load(EXPORTED / "wheel.onnx"))
+    assert [m.label for m in both] == ["wheel, pooled", "wheel"]
+    assert [m.kind for m in both] == [MethodKind.POOLED, MethodKind.SET_POSTERIOR]
 
-    class Both:
-        inputs, joined, run = estimator.inputs, estimator.run, estimator.run
-        sets = SimpleNamespace(alone=False)
 
-        def __call__(self, **readings):
-            return estimator(**readings)
+@pytest.mark.parametrize(
+    ("file", "kind"),
+    [
+        ("wheel", MethodKind.SET_POSTERIOR),
+        ("any_wheel", MethodKind.SET_POSTERIOR),
+        ("kls1_wheel", MethodKind.SET_POSTERIOR),
+        ("wheel_lssvm", MethodKind.REGRESSION),
+        ("wheel_mlp", MethodKind.REGRESSION),
+        ("wheel_linear", MethodKind.LINEAR_REGRESSION),
+    ],
+)
+def test_the_kind_of_a_file_is_read_from_its_metadata(tmp_path, file, kind):
+    for name in (file, "my_mlp", "prior", "linear, pooled"):
+        copied = shutil.copy(EXPORTED / f"{file}.onnx", tmp_path / f"{name}.onnx")
+        assert classify_estimator(Estimator.load(copied)) is kind
 
-    both = trained("wheel", Both())
-    assert [m.name for m in both] == ["wheel, joined", "wheel"]
-    for sets in sets_of(recipe, SHEAR, 1)[:3]:
-        one, other = (method.ask(sets.tables[0]) for method in both)
-        np.testing.assert_array_equal(one.mean, np.squeeze(other.mean))
+
+def test_goals_do_not_depend_on_the_name_of_a_file(tmp_path):
+    names = {"wheel": "my_mlp", "wheel_mlp": "wheel", "wheel_linear": "best_lssvm"}
+    copies = {
+        name: Estimator.load(shutil.copy(EXPORTED / f"{file}.onnx", tmp_path / f"{name}.onnx"))
+        for file, name in names.items()
+    }
+    released = {file: Estimator.load(EXPORTED / f"{file}.onnx") for file in names}
+    found = goals(benchmark(released, max_sets=3, analytic=()))
+    again = goals(benchmark(copies, max_sets=3, analytic=()))
+    assert [replace(g, method=names.get(g.method, g.method)) for g in found] == again
+    assert {g.method for g in found} == {LIMIT_LABEL, "wheel", "wheel_mlp"}
+    criteria = [g.criterion for g in found if g.method == "wheel"]
+    assert len(criteria) == 6 and criteria[0] == "every size: RMSE / limit <= 1.05"
+    assert [g.criterion for g in found if g.method == "wheel_mlp"] == [
+        "1 row: RMSE / limit <= 1.01"
+    ]
+
+
+def test_two_methods_of_one_name_are_refused():
+    with pytest.raises(InputError, match="two methods are called 'prior'"):
+        benchmark({"prior": Estimator.load(EXPORTED / "wheel_linear.onnx")}, max_sets=1)
 
 
 def test_a_gaussian_s_intervals_hold_what_they_say():
-    answer = gaussian(np.zeros(2), np.diag([1.0, 4.0]))
+    estimate = gaussian_estimate(np.zeros(2), np.diag([1.0, 4.0]))
     draws = np.random.default_rng(1).normal(size=(20000, 2)) * [1.0, 2.0]
-    for ends, share in ((answer.inner, 0.5), (answer.outer, 0.9)):
+    for ends, share in ((estimate.interval50, 0.5), (estimate.interval90, 0.9)):
         inside = (draws > ends[0]) & (draws < ends[1])
         np.testing.assert_allclose(inside.mean(axis=0), share, atol=0.01)
 
@@ -222,15 +273,19 @@ def test_a_gaussian_s_intervals_hold_what_they_say():
 def test_the_command_writes_tables_picture_and_goals(small_model, tmp_path, capsys):
     out = tmp_path / "found"
     assert main(["compare", str(small_model), "--sets", "3", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "18 rows, three loads, slips in a grid" in said and "limit's own" in said
+    printed = capsys.readouterr().out
+    assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
     rows = list(csv.DictReader((out / "benchmark.csv").open()))
     assert {r["method"] for r in rows} == {
-        LIMIT, POSTERIOR, "prior", "small", *(f"{ANALYTIC}{name}" for name in ASKED),
-    }  # fmt: skip
-    assert {r["unknown_effect"] for r in rows} == {"", *UNKNOWN}
+        LIMIT_LABEL,
+        POSTERIOR_LABEL,
+        "prior",
+        "small",
+        *(f"{ANALYTIC_PREFIX}{name}" for name in ANALYTIC_METHODS),
+    }
+    assert {r["unknown_effect"] for r in rows} == {"", *UNMODELLED_EFFECTS}
     assert (out / "benchmark.png").stat().st_size > 20_000
-    assert "## Goals" in (out / "benchmark.md").read_text()
+    assert "## Acceptance goals" in (out / "benchmark.md").read_text()
 
 
 def test_without_the_released_models_the_command_says_where_they_are(tmp_path, monkeypatch, capsys):
@@ -250,5 +305,5 @@ def test_the_limit_is_computed_anew_over_what_was_there_and_used(small_model, tm
     assert main(["compare", "--limit", str(file), "--sets", "1"]) == 0
     command = ["compare", str(small_model), "--out", str(out), "--against", str(file), "--sets"]
     assert main([*command, "2"]) == 2
-    assert "has no limit for set 1" in capsys.readouterr().err
+    assert "has no posterior of set 1" in capsys.readouterr().err
     assert not out.exists()

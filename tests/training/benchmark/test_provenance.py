@@ -1,4 +1,4 @@
-"""A comparison of what belongs together, and what is said of the rest."""
+"""Provenance of test data and model files in a comparison."""
 
 import json
 from dataclasses import replace
@@ -37,33 +37,33 @@ def case_of(tmp_path, text):
     return read_case(tmp_path / "m.toml")
 
 
-def test_what_belongs_together_is_passed_without_a_word(tmp_path, parts):
+def test_files_of_one_recipe_give_no_notes(tmp_path, parts):
     assert check_same_provenance(case_of(tmp_path, MODEL), *parts, NAMES) == []
     cohesion = MODEL.replace("[soil.prior]", "cohesion = 7.0\n[soil.prior]")
     assert (
         check_same_provenance(case_of(tmp_path, cohesion), *parts, NAMES) == []
-    )  # the data vary it
+    )  # varied in the data
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_another_model_file_than_the_data_s_is_refused(tmp_path, parts, what):
-    text, said = OTHERS[what]
+def test_test_data_of_another_model_file_are_refused(tmp_path, parts, what):
+    text, fragment = OTHERS[what]
     with pytest.raises(InputError) as caught:
         check_same_provenance(case_of(tmp_path, text), *parts, NAMES)
-    assert said in str(caught.value)
+    assert fragment in str(caught.value)
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_without_the_data_s_recipe_a_model_trained_otherwise_is_named(tmp_path, parts, what):
-    text, said = OTHERS[what]
+def test_without_a_recipe_of_the_data_the_training_differences_are_noted(tmp_path, parts, what):
+    text, fragment = OTHERS[what]
     table, estimators = parts
     case, table = case_of(tmp_path, text), replace(table, metadata={})
     if what in ("gear", "wheel"):
-        with pytest.raises(InputError, match="compare what belongs to one wheel"):
+        with pytest.raises(InputError, match="compare data and models of one wheel"):
             check_same_provenance(case, table, estimators, NAMES)
     else:
         (note, *_) = check_same_provenance(case, table, estimators, NAMES)
-        assert note.startswith("small was trained with") and said in note
+        assert note.startswith("small was trained with") and fragment in note
 
 
 def test_a_damaged_recipe_is_one_line(tmp_path, parts):
@@ -79,7 +79,9 @@ def test_a_damaged_recipe_is_one_line(tmp_path, parts):
 
 
 @pytest.mark.parametrize("sets", ["0", "-5", "many", "9" * 5000])
-def test_a_number_of_sets_that_is_none_is_refused(tmp_path, small_data, small_model, capsys, sets):
+def test_a_number_of_sets_that_is_not_positive_is_refused(
+    tmp_path, small_data, small_model, capsys, sets
+):
     (tmp_path / "m.toml").write_text(MODEL)
     command = ["compare", str(tmp_path / "m.toml"), str(small_data), str(small_model)]
     with pytest.raises(SystemExit) as done:

@@ -1,4 +1,4 @@
-"""The comparison: every method on the same sets, scored alike."""
+"""The comparison on test data: every method scored on the same sets."""
 
 import csv
 
@@ -27,42 +27,42 @@ def test_data(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def lines(test_data, small_model):
+def scores(test_data, small_model):
     case = read_case(test_data / "model.toml")
     table = read_table(test_data / "test.parquet")
     return compare(case, table, {"small": Estimator.load(small_model)}, analytic_sets=25)
 
 
-def line(lines, rows, method):
-    return next(x for x in lines if x.rows == rows and x.method == method)
+def score(scores, rows, method):
+    return next(x for x in scores if x.rows == rows and x.method == method)
 
 
-def test_every_method_is_scored_on_every_size_of_set(lines):
+def test_every_method_is_scored_on_every_size_of_set(scores):
     methods = {"prior", "small", *(f"analytic {method}" for method in METHODS)}
     for rows in (1, 12):
-        assert {x.method for x in lines if x.rows == rows} == methods
+        assert {x.method for x in scores if x.rows == rows} == methods
 
 
-def test_the_prior_scores_itself(lines):
-    prior = line(lines, 1, "prior")
-    np.testing.assert_allclose(prior.relative, 1.0, rtol=0.06)
-    np.testing.assert_allclose(prior.cover90, 0.9, atol=0.05)
-    np.testing.assert_allclose(prior.cover50, 0.5, atol=0.08)
+def test_the_prior_scores_itself(scores):
+    prior = score(scores, 1, "prior")
+    np.testing.assert_allclose(prior.rmse_over_prior, 1.0, rtol=0.06)
+    np.testing.assert_allclose(prior.coverage90, 0.9, atol=0.05)
+    np.testing.assert_allclose(prior.coverage50, 0.5, atol=0.08)
 
 
-def test_one_reading_says_little_and_twelve_say_much(lines):
-    one, twelve = line(lines, 1, "small"), line(lines, 12, "small")
-    assert 0.8 < one.relative[0] < 1.02
-    assert (twelve.relative < one.relative).all()
-    assert (line(lines, 12, "analytic nonlinear").relative < 0.5).all()
-    assert (np.abs(one.cover90 - 0.9) < 0.05).all()
+def test_twelve_readings_reduce_the_error_that_one_leaves(scores):
+    one, twelve = score(scores, 1, "small"), score(scores, 12, "small")
+    assert 0.8 < one.rmse_over_prior[0] < 1.02
+    assert (twelve.rmse_over_prior < one.rmse_over_prior).all()
+    assert (score(scores, 12, "analytic nonlinear").rmse_over_prior < 0.5).all()
+    assert (np.abs(one.coverage90 - 0.9) < 0.05).all()
 
 
-def test_methods_that_cannot_answer_from_one_row_say_so(lines):
+def test_methods_that_need_several_rows_fail_on_one(scores):
     for method in ("analytic linear", "analytic newton"):
-        assert line(lines, 1, method).failed == line(lines, 1, method).sets
-        assert line(lines, 12, method).failed < line(lines, 12, method).sets
-    assert np.isnan(line(lines, 12, "analytic linear").rmse[2])  # K is given, not found
+        assert score(scores, 1, method).failed == score(scores, 1, method).sets
+        assert score(scores, 12, method).failed < score(scores, 12, method).sets
+    assert np.isnan(score(scores, 12, "analytic linear").rmse[2])  # K is fixed, not estimated
 
 
 def test_the_command_writes_table_picture_and_page(test_data, small_model, capsys):
@@ -70,7 +70,7 @@ def test_the_command_writes_table_picture_and_page(test_data, small_model, capsy
     command = ["compare", str(test_data / "model.toml"), str(test_data / "test.parquet")]
     command += [str(small_model), "--out", str(out), "--analytic-sets", "4"]
     assert main(command) == 0
-    assert "one reading alone" in capsys.readouterr().out
+    assert "single readings" in capsys.readouterr().out
     rows = list(csv.DictReader((out / "compare.csv").open()))
     assert {r["parameter"] for r in rows} == {
         "cohesion_Pa",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from training.benchmark.bayes_limit import FRACTIONS
+from training.benchmark.posterior_summary import FRACTIONS
 from training.benchmark.sets.stream_posterior import posterior_of_memory
 from training.set_posterior.posterior_summary import ENDS
 from training.set_posterior.validation import graph_outputs, opened

@@ -1,1 +1,1 @@
-"""Set posteriors of files beside the exact posteriors of the same sets."""
+"""Set posteriors of model files, compared with the exact posteriors of the same reference sets."""

@@ -1,4 +1,4 @@
-"""The exact posterior of a simulated set: true physics, and the noise that the set truly has."""
+"""The exact posterior of a simulated set: the wheel's own physics and the set's true noise."""
 
 from __future__ import annotations
 
@@ -9,92 +9,89 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from training.benchmark.sets.posterior_summary import ExactSetPosterior, Unknowns, posterior
+from training.benchmark.posterior_summary import systematic_resample
+from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
 from training.set_posterior.monomials import monomials, terms
 from training.set_posterior.response_surface import NEAR
 from training.set_posterior.wheel_family import ABSENT, CHANNELS, SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 
-#: Degree of the polynomial through the physics of a set's rows, by the number of unknowns.
+#: Total degree of the polynomial surrogate, by the number of unknowns: as high as keeps the number
+#: of terms, and so of physics evaluations, below some hundreds.
 DEGREES = {1: 10, 2: 8, 3: 6, 4: 5, 5: 5}
-#: Points that it is fitted to, for each of its terms, and samples that it is checked at.
-POINTS, CHECKED = 2.0, 32
-#: A set is flagged whose polynomial is off by more than this share of a reading's noise, rms.
+#: Fitting points per term of the polynomial, and posterior draws that it is verified at.
+POINTS_PER_TERM, CHECK_POINTS = 2.0, 32
+#: A set is flagged where the rms error of its surrogate exceeds this share of the reading noise.
 TOLERANCE = 0.05
+#: Points per evaluation of the physics, which bounds its memory.
+BATCH = 4096
 
 
-def exact_posterior(family: WheelFamily, sets: SimulatedSets, index: int) -> ExactSetPosterior:
-    r"""The posterior of one set by the sampler that analytic identification has.
+def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) -> RankedPosterior:
+    r"""The posterior of one set, by the importance sampler of the analytic `posterior` method.
 
-    The likelihood is that of the noise that the set was made with: a share of the *true* value, not
-    of its reading. With T_i(x) the torques of the wheel's own physics, sigma_i their noise, tau_i
-    the bias that all rows share,
+    The likelihood has the noise that the set was simulated with: proportional to the *true* value,
+    not to its reading. With T_i(x) the torques of the wheel's physics, sigma_i their noise, and
+    tau_i the standard deviation of the bias that all rows share,
 
     .. math:: r_i = \frac{y_i - T_i}{\sigma_i}, \quad g_i = \frac{\tau_i}{\sigma_i}, \qquad
         \log p(y | x) = -\frac12 \left(r^T r - \frac{(g^T r)^2}{1 + g^T g}\right)
         - \sum_i \log \sigma_i - \frac12 \log(1 + g^T g)
 
-    The physics of the rows is taken by a polynomial of the unknowns, fitted to this set alone and
-    checked at samples of the posterior: a set is flagged where it is not exact to a small share of
-    the noise. Physics itself is asked where some soils of the prior do not carry the load.
+    The physics is replaced by a polynomial of the unknowns, fitted to this set alone and verified
+    at posterior draws; the set is flagged where the error exceeds `TOLERANCE`. Where some soils of
+    the prior do not carry the load, no polynomial fits, and the physics itself is evaluated.
     """
     unknowns = Unknowns.of(family, sets, index)
     designs, truth = sets.origin.designs[index], sets.origin.x[index]
-    answers = _fitted(unknowns, designs)
 
     def physics(x: Floats) -> Floats:
-        return np.concatenate(
-            [
-                family.answers(designs, piece[None])
-                for piece in np.split(x, range(4096, len(x), 4096))
-            ],
-            axis=1,
-        )
+        batches = np.split(x, range(BATCH, len(x), BATCH))
+        return np.concatenate([family.answers(designs, batch[None]) for batch in batches], axis=1)
 
-    likelihood = log_likelihood(sets, index, answers or physics)
-    found, samples = posterior(unknowns, likelihood, truth)
-    if answers is None:
-        return found
-    places = (np.arange(CHECKED) + 0.5) / CHECKED
-    drawn = np.searchsorted(np.cumsum(samples.weights), places).clip(max=len(samples.u) - 1)
-    x = np.vstack([truth, unknowns.x(samples.u[drawn])])
-    off = _apart(sets, index, answers(x), physics(x))
-    return replace(found, flagged=found.flagged or not off < TOLERANCE)
+    surrogate = _fit_surrogate(unknowns, designs)
+    likelihood = log_likelihood(sets, index, surrogate or physics)
+    summary, sample = sample_posterior(unknowns, likelihood, truth)
+    if surrogate is None:
+        return summary
+    x = np.vstack([truth, unknowns.x(systematic_resample(sample, CHECK_POINTS))])
+    error = _rms_error_over_noise(sets, index, surrogate(x), physics(x))
+    return replace(summary, flagged=summary.flagged or not error < TOLERANCE)
 
 
 def log_likelihood(
-    sets: SimulatedSets, index: int, answers: Callable[[Floats], Floats]
+    sets: SimulatedSets, index: int, response: Callable[[Floats], Floats]
 ) -> Callable[[Floats], Floats]:
-    """Log density (n,) of a set's readings at coordinates (n, axes), -inf without equilibrium.
+    """Log likelihood (n,) of a set's readings at coordinates (n, axes), -inf without equilibrium.
 
-    `answers` gives channels (rows, n, 3) as `Family.answers` does. The factor (2 pi)^(-k / 2) of k
-    readings is left out.
+    `response` gives channels (rows, n, 3) as `WheelFamily.answers` does. The factor
+    (2 pi)^(-k / 2) of k readings is left out.
     """
     rows = sets.rows(index)
 
-    def logs(x: Floats) -> Floats:
-        values = _values(sets, index, answers(x))
+    def evaluate(x: Floats) -> Floats:
+        values = _si_values(sets, index, response(x))
         total = np.zeros(values.shape[1])
         for k, name in enumerate(CHANNELS):
             read = rows[f"{name}_std"] < ABSENT
             if not read.any():
                 continue
             value, y = values[read, :, k], rows[name][read, None]
-            std = _std(sets, index, name, read, value)
+            std = _noise_std(sets, index, name, read, value)
             r = (y - value) / std
             total -= np.log(std).sum(axis=0) + 0.5 * (r**2).sum(axis=0)
             if name == "torque":
-                g = _std(sets, index, "torque_bias", read, value) / std
+                g = _noise_std(sets, index, "torque_bias", read, value) / std
                 size = 1.0 + (g**2).sum(axis=0)
                 total += 0.5 * ((g * r).sum(axis=0) ** 2 / size - np.log(size))
         return np.where(np.isfinite(total), total, -np.inf)
 
-    return logs
+    return evaluate
 
 
-def _values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
-    """Torque, sinkage and drawbar pull (rows, n, 3) in SI units from a family's answers."""
+def _si_values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
+    """Torque, sinkage and drawbar pull (rows, n, 3) in SI units from a family's channels."""
     length, load = sets.origin.length[index], sets.rows(index)["load"][:, None]
     with np.errstate(over="ignore"):
         return np.stack(
@@ -103,47 +100,46 @@ def _values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
         )
 
 
-def _std(
+def _noise_std(
     sets: SimulatedSets, index: int, name: str, read: NDArray[np.bool_], value: Floats
 ) -> Floats:
-    """Noise of values (rows, n); nil where the sets have none of this name."""
+    """Noise of values (rows, n); zero where the sets have none of this name."""
     if name not in sets.origin.noise:
         return np.zeros_like(value)
     constant, share = (part[index][read, None] for part in sets.origin.noise[name])
     return np.asarray(np.hypot(constant, share * value))
 
 
-def _fitted(unknowns: Unknowns, designs: Floats) -> Callable[[Floats], Floats] | None:
+def _fit_surrogate(unknowns: Unknowns, designs: Floats) -> Callable[[Floats], Floats] | None:
     """Channels (rows, n, 3) as polynomials of coordinates; None where a soil carries no load."""
     family, p = unknowns.family, unknowns.count
     these = terms(p, DEGREES[p])
-    reach = np.ones(p)
+    half_width = np.ones(p)
     if p > family.free:
-        reach[family.free :] = NEAR * unknowns.near
-    count = int(POINTS * len(these))
+        half_width[family.free :] = NEAR * unknowns.near
+    count = int(POINTS_PER_TERM * len(these))
     u = qmc.Sobol(p, rng=1).random(1 << (count - 1).bit_length())[:count]
-    nodes = -np.cos(np.pi * u)  # denser at the ends, as Chebyshev's are
+    nodes = -np.cos(np.pi * u)  # arcsine density: denser at the ends, as Chebyshev nodes are
     x = np.zeros((count, len(family.axes)))
-    x[:, :p] = nodes * reach
+    x[:, :p] = nodes * half_width
     y = family.answers(designs, x[None])
     if not np.isfinite(y).all():
         return None
-    project = np.linalg.pinv(monomials(nodes, these))
-    coefficients = project @ y
+    coefficients = np.linalg.pinv(monomials(nodes, these)) @ y
 
-    def answers(x: Floats) -> Floats:
-        return np.asarray(monomials(x[:, :p] / reach, these) @ coefficients)
+    def response(x: Floats) -> Floats:
+        return np.asarray(monomials(x[:, :p] / half_width, these) @ coefficients)
 
-    return answers
+    return response
 
 
-def _apart(sets: SimulatedSets, index: int, y: Floats, true: Floats) -> float:
-    """Rms difference of two answers over the noise, of the channels that are read."""
-    a, b = _values(sets, index, y), _values(sets, index, true)
+def _rms_error_over_noise(sets: SimulatedSets, index: int, y: Floats, true: Floats) -> float:
+    """Rms difference of two responses over the noise, of the channels that are read."""
+    a, b = _si_values(sets, index, y), _si_values(sets, index, true)
     rows, squares = sets.rows(index), []
     for k, name in enumerate(CHANNELS):
         read = rows[f"{name}_std"] < ABSENT
         if read.any():
-            std = _std(sets, index, name, read, b[read, :, k])
+            std = _noise_std(sets, index, name, read, b[read, :, k])
             squares.append(((a[read, :, k] - b[read, :, k]) / std) ** 2)
     return float(np.sqrt(np.mean(np.concatenate(squares))))

@@ -1,4 +1,4 @@
-"""Reference sets: the same for every file, with their exact posteriors kept beside them."""
+"""Reference sets: fixed simulated sets whose exact posteriors are stored with the package."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ import numpy as np
 from datagen.recipe import read_recipe
 from soilml.physics.gears import Wheel
 from soilml.quantities import SHEAR
-from training.benchmark.designs import DIGITS
-from training.benchmark.sets.exact_posterior import exact_posterior
-from training.benchmark.sets.posterior_summary import ExactSetPosterior
+from training.benchmark.designs import HASHED_DIGITS
+from training.benchmark.sets.exact_posterior import exact_set_posterior
+from training.benchmark.sets.set_unknowns import RankedPosterior
 from training.export.any_wheel_file import read_any_spec
 from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.wheel_family import ABSENT, SimulatedSets, WheelFamily
 
 Progress = Callable[[str, int, int], None]
 
-#: Rows of a set, sets of each size, and the seed, which nothing is trained or settled with.
+#: Rows per set, number of sets of each size, and a seed that no training or tuning uses.
 SIZES = (1, 3, 6, 8, 16, 32)
 COUNT = 170
 SEED = 4711
-#: Drawn for each set that is kept, for some leave the range.
-DRAWN = 3
-#: Whose sets they are.
-ONE, ANY = "reference wheel", "any wheel"
+#: Candidates simulated for each set that is used: some lie outside the range of the file.
+CANDIDATES = 3
+#: Labels of the two families; they are part of the stored design keys.
+ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
 PROCESSES = 2
 
 
 @dataclass(frozen=True)
-class Reference:
-    """One set whose exact posterior is wanted."""
+class ReferenceSet:
+    """One reference set; `sets` holds this one set alone."""
 
     label: str
     number: int
     family: WheelFamily
-    sets: SimulatedSets  # this one alone
+    sets: SimulatedSets
     effect: str = ""
     names: tuple[str, ...] = SHEAR
 
@@ -53,100 +53,105 @@ class Reference:
 
     @property
     def design(self) -> str:
-        """Whose set it is, and its size."""
+        """Key of the design: the family's label and the number of rows."""
         return f"{self.label}, {self.rows} rows"
 
     @property
     def hash(self) -> str:
-        """What the stored posterior is recognised by: readings, context, and their noise."""
-        own = self.sets
-        named = sorted((own.readings | own.context).items())
-        noise = [(name, np.stack(parts)) for name, parts in sorted(own.origin.noise.items())]
+        """Identifies the set that a stored posterior belongs to: readings, context, noise."""
+        sets = self.sets
+        inputs = sorted((sets.readings | sets.context).items())
+        noise = [(name, np.stack(parts)) for name, parts in sorted(sets.origin.noise.items())]
         text = [
-            name + " ".join(f"{value:.{DIGITS}g}" for value in np.ravel(values))
-            for name, values in [*named, *noise]
+            name + " ".join(f"{value:.{HASHED_DIGITS}g}" for value in np.ravel(values))
+            for name, values in [*inputs, *noise]
         ]
-        ends = [f"{end:.{DIGITS}g}" for axis in self.family.axes for end in axis.ends]
+        ends = [f"{end:.{HASHED_DIGITS}g}" for axis in self.family.axes for end in axis.ends]
         return hashlib.sha256("\n".join(text + ends).encode()).hexdigest()[:12]
 
 
 def families() -> dict[str, WheelFamily]:
     """Wheels and soils of the reference sets, by label."""
     return {
-        ONE: RecipeFamily.of(read_recipe("wheel"), SHEAR),
-        ANY: read_any_spec("any_wheel").family,
+        ONE_WHEEL: RecipeFamily.of(read_recipe("wheel"), SHEAR),
+        ANY_WHEEL: read_any_spec("any_wheel").family,
     }
 
 
-def references(most: int = COUNT) -> list[Reference]:
-    """Every reference set, the first `most` of each size."""
-    found = []
+def generate_reference_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
+    """Every reference set, the first `max_sets` of each size."""
+    references = []
     for label, family in families().items():
         for rows in SIZES:
-            sets = family.sets(DRAWN * COUNT, rows, SEED)
-            places = [i for i in range(len(sets.truth)) if _may_be_given(family, sets.given(i))]
-            found += [Reference(label, i, family, sets.only(i)) for i in places[:most]]
-    return found
+            sets = family.sets(CANDIDATES * COUNT, rows, SEED)
+            accepted = [i for i in range(len(sets.truth)) if _in_range(family, sets.given(i))]
+            references += [
+                ReferenceSet(label, i, family, sets.only(i)) for i in accepted[:max_sets]
+            ]
+    return references
 
 
-def _may_be_given(family: WheelFamily, context: Mapping[str, float]) -> bool:
-    """Whether a file takes this context: sets are drawn a little beyond the ends of its range."""
+def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
+    """Whether a file accepts this context: candidates exceed the ends of its range slightly."""
     ends = family.limits()
     return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
 
 
-def computed(wanted: Sequence[Reference], progress: Progress) -> Iterator[ExactSetPosterior]:
-    """The exact posterior of each, in order, from two processes."""
+def compute_reference_posteriors(
+    references: Sequence[ReferenceSet], progress: Progress
+) -> Iterator[RankedPosterior]:
+    """The exact posterior of each set, in order, computed by two processes."""
     with ProcessPoolExecutor(min(PROCESSES, os.cpu_count() or 1)) as pool:
-        for done, found in enumerate(pool.map(_exact, wanted, chunksize=4), 1):
-            progress("exact posteriors", done, len(wanted))
-            yield found
+        for done, summary in enumerate(pool.map(_exact, references, chunksize=4), 1):
+            progress("exact posteriors", done, len(references))
+            yield summary
 
 
-def kept() -> Path:
-    """The file that the exact posteriors are kept in."""
+def packaged_posteriors() -> Path:
+    """The file with the exact posteriors of the reference sets."""
     return Path(str(resources.files("training.benchmark.sets").joinpath("sets_limit.parquet")))
 
 
-def _exact(reference: Reference) -> ExactSetPosterior:
-    return exact_posterior(reference.family, reference.sets, 0)
+def _exact(reference: ReferenceSet) -> RankedPosterior:
+    return exact_set_posterior(reference.family, reference.sets, 0)
 
 
-def on_one_wheel(references: Sequence[Reference]) -> list[Reference]:
-    """Sets of the reference wheel as a file for wheels of any size is to answer them.
+def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
+    """Sets of the reference wheel with the context that a file for any wheel needs.
 
-    The bearing curve is known, and the prior the same: coordinates of both families agree.
+    The bearing curve is known exactly, and the prior is the same: the coordinates of both families
+    agree.
     """
-    own, other = (families()[label] for label in (ONE, ANY))
+    own, other = (families()[label] for label in (ONE_WHEEL, ANY_WHEEL))
     assert isinstance(own, RecipeFamily)
-    case, found = own.recipe.case, []
+    case, converted = own.recipe.case, []
     gear = case.model.gear
     assert isinstance(gear, Wheel)
-    most = {axis.name: axis.ends[1] for axis in own.axes}
-    given = {
+    upper = {axis.name: axis.ends[1] for axis in own.axes}
+    values = {
         "wheel_radius": gear.radius,
         "wheel_width": gear.width,
         "bearing_modulus": case.soil.kc / gear.width + case.soil.kphi,
         "n": case.soil.n,
         "bearing_std": 0.0,
-        "cohesion_max": most["cohesion"],
-        "shear_modulus_max": most["shear_modulus"],
+        "cohesion_max": upper["cohesion"],
+        "shear_modulus_max": upper["shear_modulus"],
     }
+    context = {name: np.asarray([value]) for name, value in values.items()}
     for reference in references:
         sets = reference.sets
         x = np.pad(sets.origin.x, ((0, 0), (0, len(other.axes) - len(own.axes))))
-        context = {name: np.asarray([value]) for name, value in given.items()}
         sets = replace(sets, context=context, origin=replace(sets.origin, x=x))
-        found.append(replace(reference, family=other, sets=sets))
-    return found
+        converted.append(replace(reference, family=other, sets=sets))
+    return converted
 
 
-def with_noise_of_reading(references: Sequence[Reference]) -> list[Reference]:
-    """The same sets, told the noise that their sensors have at the reading, as a file takes it.
+def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
+    """The same sets, with standard deviations computed from the reading, as a rover must.
 
-    The sets themselves tell the noise at the true value, which no rover knows.
+    The sets themselves have the standard deviation at the true value, which no rover can compute.
     """
-    found = []
+    converted = []
     for reference in references:
         sets = reference.sets
         readings = dict(sets.readings)
@@ -155,5 +160,5 @@ def with_noise_of_reading(references: Sequence[Reference]) -> list[Reference]:
             key = name if name == "torque_bias" else f"{name}_std"
             std = np.hypot(constant, share * np.abs(readings[channel]))
             readings[key] = np.where(readings[key] < ABSENT, std, ABSENT)
-        found.append(replace(reference, sets=replace(sets, readings=readings)))
-    return found
+        converted.append(replace(reference, sets=replace(sets, readings=readings)))
+    return converted

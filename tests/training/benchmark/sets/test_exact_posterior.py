@@ -10,7 +10,7 @@ from datagen.recipe import read_recipe
 from soilml.config.measurement_noise import Noise
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
-from training.benchmark.sets.exact_posterior import exact_posterior
+from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.export.any_wheel_file import read_any_spec
 from training.set_posterior.dimensionless_family import DimensionlessFamily
 from training.set_posterior.recipe_family import RecipeFamily
@@ -26,36 +26,36 @@ def of_one_wheel(noise, bias=0.0) -> RecipeFamily:
 
 
 def on_a_grid(family, sets, index):
-    """Weights, values and log evidence over cells of equal chance, with full covariances."""
+    """Weights, values and log evidence on a grid of equal prior probability."""
     case, rows = family.recipe.case, sets.rows(index)
     u = (np.arange(STEPS) + 0.5) / STEPS
     grid = np.stack(np.meshgrid(u, u, u, indexing="ij"), axis=-1).reshape(-1, 3)
     values = np.stack([case.prior[n].at(grid[:, i]) for i, n in enumerate(SHEAR)], axis=1)
     soil = case.with_values({n: values[None, :, i] for i, n in enumerate(SHEAR)}).soil
-    driven = Operating(slip=rows["slip"][:, None], load=rows["load"][:, None])
-    torque = case.model(soil, driven).torque.T
+    operating = Operating(slip=rows["slip"][:, None], load=rows["load"][:, None])
+    torque = case.model(soil, operating).torque.T
     noise, bias = case.noise["torque_Nm"].share, family.recipe.bias.get("torque_Nm", Noise()).share
     m = torque.shape[1]
     shape = noise**2 * np.eye(m) + bias**2
-    # readings over true torques stray alike for all soils
+    # readings over true torques have the same distribution for all soils
     off = multivariate_normal(np.ones(m), shape).logpdf(rows["torque"] / torque)
     logs = off - np.log(torque).sum(axis=1)
-    logs += 0.5 * m * np.log(2.0 * np.pi)  # which the likelihood leaves out
+    logs += 0.5 * m * np.log(2.0 * np.pi)  # left out of the likelihood
     weights = np.exp(logs - logs.max())
     return weights / weights.sum(), values, np.log(np.mean(np.exp(logs - logs.max()))) + logs.max()
 
 
-def alone(family, rows):
-    """A set of which torque alone was read."""
+def torque_only(family, rows):
+    """A set in which only torque was read."""
     sets = family.sets(20, rows, 9)
     return sets, int(np.flatnonzero(sets.readings["sinkage_std"][:, 0] > 1.0)[0])
 
 
 @pytest.mark.parametrize(("rows", "noise", "bias"), [(1, 0.06, 0.0), (2, 0.08, 0.04)])
-def test_it_is_what_a_grid_of_soils_gives(rows, noise, bias):
+def test_it_agrees_with_integration_on_a_grid(rows, noise, bias):
     family = of_one_wheel(noise, bias)
-    sets, index = alone(family, rows)
-    found = exact_posterior(family, sets, index)
+    sets, index = torque_only(family, rows)
+    found = exact_set_posterior(family, sets, index)
     weights, values, evidence = on_a_grid(family, sets, index)
     mean = weights @ values
     off = values - mean
@@ -65,20 +65,20 @@ def test_it_is_what_a_grid_of_soils_gives(rows, noise, bias):
     assert np.all(np.abs(found.mean - mean) < 0.08 * std)
     apart = (found.covariance - covariance) / np.outer(std, std)
     assert np.all(np.abs(apart) < 0.08)
-    assert found.evidence == pytest.approx(evidence, abs=0.06)
+    assert found.log_evidence == pytest.approx(evidence, abs=0.06)
     below = weights @ (values < sets.truth[index])
-    assert np.all(np.abs(found.below - below) < 0.05)
+    assert np.all(np.abs(found.rank - below) < 0.05)
 
 
-def test_bearing_that_is_nearly_known_is_marginalised_over():
+def test_uncertain_bearing_is_marginalised():
     family = read_any_spec("any_wheel").family
     assert isinstance(family, DimensionlessFamily)
     sets = family.sets(300, 1, 9)
     o = sets.origin
-    told = sets.readings["sinkage_std"][:, 0] < 1.0
-    vague = (o.noise["torque"][1][:, 0] > 0.06) & (o.near > 0.2) & ~told
-    index = int(np.flatnonzero(vague)[0])
-    found = exact_posterior(family, sets, index)
+    more = sets.readings["sinkage_std"][:, 0] < 1.0
+    uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.near > 0.2) & ~more
+    index = int(np.flatnonzero(uncertain)[0])
+    found = exact_set_posterior(family, sets, index)
     rng = np.random.default_rng(2)
     n = 30_000
     x = np.stack([a.drawn(rng.random(n)) for a in family.axes[:3]], axis=1)
@@ -96,10 +96,10 @@ def test_bearing_that_is_nearly_known_is_marginalised_over():
     assert np.all(np.abs(np.sqrt(np.diag(found.covariance)) / std - 1.0) < 0.06)
 
 
-def test_the_truth_is_anywhere_in_it_alike():
+def test_ranks_of_the_truth_are_uniform():
     family = of_one_wheel(0.02)
     sets = family.sets(40, 1, 12)
-    found = [exact_posterior(family, sets, i) for i in range(len(sets.truth))]
-    for below in np.stack([f.below for f in found]).T:
-        assert kstest(below, "uniform").pvalue > 1e-3
-    assert kstest([f.denser for f in found], "uniform").pvalue > 1e-3
+    found = [exact_set_posterior(family, sets, i) for i in range(len(sets.truth))]
+    for rank in np.stack([f.rank for f in found]).T:
+        assert kstest(rank, "uniform").pvalue > 1e-3
+    assert kstest([f.hpd_level for f in found], "uniform").pvalue > 1e-3

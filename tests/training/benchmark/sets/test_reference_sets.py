@@ -1,4 +1,4 @@
-"""The reference sets and what is kept of them."""
+"""The reference sets and their stored posteriors."""
 
 from dataclasses import replace
 
@@ -6,34 +6,34 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError
-from training.benchmark.bayes_limit_file import load, save
-from training.benchmark.sets.exact_posterior import exact_posterior
+from training.benchmark.bayes_limit_file import load_limit, save_limit
+from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.reference_sets import (
-    ANY,
-    ONE,
-    kept,
-    on_one_wheel,
-    references,
+    ANY_WHEEL,
+    ONE_WHEEL,
+    as_any_wheel_sets,
+    generate_reference_sets,
+    packaged_posteriors,
     with_noise_of_reading,
 )
 
 
 @pytest.fixture(scope="module")
 def some():
-    return references(2)
+    return generate_reference_sets(2)
 
 
-def test_the_kept_posteriors_are_of_these_sets(some):
-    limit = load(kept(), some)
+def test_the_stored_posteriors_are_of_these_sets(some):
+    limit = load_limit(packaged_posteriors(), some)
     truth = np.concatenate([r.sets.truth for r in some])
     std = np.sqrt(np.diagonal(limit.covariance, axis1=1, axis2=2))
     assert np.sqrt(np.mean(((limit.mean - truth) / std) ** 2)) < 2.0
 
 
-def test_the_kept_posterior_of_a_set_is_found_again(some):
-    limit = load(kept(), some)
+def test_the_stored_posterior_of_a_set_is_reproduced(some):
+    limit = load_limit(packaged_posteriors(), some)
     for i in (0, 3, len(some) // 2):
-        again = exact_posterior(some[i].family, some[i].sets, 0)
+        again = exact_set_posterior(some[i].family, some[i].sets, 0)
         std = np.sqrt(np.diag(again.covariance))
         assert np.all(np.abs(again.mean - limit.mean[i]) < 0.1 * std)
 
@@ -41,17 +41,17 @@ def test_the_kept_posterior_of_a_set_is_found_again(some):
 def test_posteriors_of_other_rows_are_refused(some, tmp_path):
     one = some[0]
     path = tmp_path / "limit.parquet"
-    save(path, [one], [exact_posterior(one.family, one.sets, 0)])
-    assert load(path, [one]).mean.shape == (1, 3)
+    save_limit(path, [one], [exact_set_posterior(one.family, one.sets, 0)])
+    assert load_limit(path, [one]).mean.shape == (1, 3)
     torque = 1.01 * one.sets.readings["torque"]
     other = replace(one, sets=replace(one.sets, readings=one.sets.readings | {"torque": torque}))
     with pytest.raises(InputError, match=r"stale.*make limit"):
-        load(path, [other], "compute it anew: make limit")
+        load_limit(path, [other], "compute it again: make limit")
 
 
-def test_a_wheel_among_all_wheels_answers_as_it_does_alone(some):
-    own = [r for r in some if r.label == ONE]
-    for one, other in zip(own, on_one_wheel(own), strict=True):
+def test_both_families_have_the_same_response_of_the_reference_wheel(some):
+    own = [r for r in some if r.label == ONE_WHEEL]
+    for one, other in zip(own, as_any_wheel_sets(own), strict=True):
         design = np.broadcast_to(
             [
                 other.sets.given(0)[k]
@@ -76,12 +76,12 @@ def test_a_wheel_among_all_wheels_answers_as_it_does_alone(some):
         assert np.allclose(as_any + shift, alone, atol=1e-9)
 
 
-def test_sets_of_any_wheel_are_of_many_kinds(some):
-    near = [r.sets.origin.near[0] > 0.0 for r in some if r.label == ANY]
+def test_bearing_is_known_in_some_sets_of_any_wheel_only(some):
+    near = [r.sets.origin.near[0] > 0.0 for r in some if r.label == ANY_WHEEL]
     assert any(near) and not all(near)
 
 
-def test_noise_told_by_the_reading_is_the_same_share_of_it(some):
+def test_noise_of_the_reading_is_the_same_share_of_it(some):
     for one, other in zip(some, with_noise_of_reading(some), strict=True):
         before, after = one.sets.readings, other.sets.readings
         assert np.array_equal(after["torque"], before["torque"])

@@ -1,11 +1,11 @@
-"""What a set posterior answers, beside the exact posterior of the same sets."""
+"""Estimates of a set posterior against the exact posterior of the same sets."""
 
 import numpy as np
 import pytest
 
 from datagen.recipe import read_recipe
 from soilml.quantities import SHEAR
-from training.benchmark.sets.exact_posterior import exact_posterior
+from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.posterior_summary import Limits
@@ -15,41 +15,41 @@ from training.set_posterior.validation import graph_outputs, opened
 
 
 @pytest.fixture(scope="module")
-def beside():
-    """(answers of the graph, what they stand for, exact) of some sets, by a small response."""
+def triples():
+    """(output of the graph, posterior of its memory, exact posterior) of sets; small response."""
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
-    response = fit_response(family, ResponseSettings(1024, 32, 250, 0), lambda *told: None)
+    response = fit_response(family, ResponseSettings(1024, 32, 250, 0), lambda *args: None)
     free = Limits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
     session = opened(SetPosteriorGraph(family, response, free))
     found = []
     for rows in (1, 6):
         sets = family.sets(14, rows, 21)
         for i in range(len(sets.truth)):
-            said = graph_outputs(session, response, sets, i)
-            system = said["memory_out"].astype(float)
+            output = graph_outputs(session, response, sets, i)
+            system = output["memory_out"].astype(float)
             found.append(
                 (
-                    said,
+                    output,
                     posterior_of_memory(family, system, sets, i),
-                    exact_posterior(family, sets, i),
+                    exact_set_posterior(family, sets, i),
                 )
             )
     return found
 
 
-def test_the_answer_is_the_mean_of_what_the_memory_stands_for(beside):
-    off = [(s["set_mean"] - m.mean) / np.sqrt(np.diag(m.covariance)) for s, m, _ in beside]
+def test_the_estimate_is_the_mean_of_the_memory_s_posterior(triples):
+    off = [(s["set_mean"] - m.mean) / np.sqrt(np.diag(m.covariance)) for s, m, _ in triples]
     assert np.sqrt(np.mean(np.square(off))) < 0.2
 
 
-def test_the_answer_is_close_to_the_exact_posterior(beside):
-    off = [(s["set_mean"] - e.mean) / np.sqrt(np.diag(e.covariance)) for s, _, e in beside]
+def test_the_estimate_is_close_to_the_exact_posterior(triples):
+    off = [(s["set_mean"] - e.mean) / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
     assert np.sqrt(np.mean(np.square(off))) < 0.3
-    wide = [s["set_std"] / np.sqrt(np.diag(e.covariance)) for s, _, e in beside]
+    wide = [s["set_std"] / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
     assert 0.85 < np.median(wide) < 1.15
 
 
-def test_the_truth_is_as_dense_as_in_the_exact_posterior(beside):
-    gap = [e.density - m.density for _, m, e in beside]
+def test_the_log_density_at_the_truth_is_that_of_the_exact_posterior(triples):
+    gap = [e.log_density - m.log_density for _, m, e in triples]
     assert abs(np.mean(gap)) < 0.2
-    assert np.mean([e.density for _, _, e in beside]) > 1.0  # both tell far more than the prior
+    assert np.mean([e.log_density for _, _, e in triples]) > 1.0  # both are far above the prior
