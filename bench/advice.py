@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from place import ROOT
+from benchmarks_file import ROOT
 
 from soilml import Case, Estimator, Operating, identify, read_case
 from soilml.experiment_design import (

@@ -1,4 +1,4 @@
-"""The board: latency of an estimate, cold start, and what it weighs."""
+"""On board: latency of an estimate, time from import to the first estimate, memory."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ print(t, int(status["VmRSS"].split()[0]) / 1024)
 
 
 def latency() -> str:
-    """Median and 99th percentile: the runtime alone, and through `Estimator`; sets of 16."""
+    """Median and 99th percentile (us): onnxruntime, and through `Estimator`; sets of 16."""
     lines = [
-        "| file | kB | one reading, runtime alone, us | p99 | `Estimator`, us | p99 | 16 readings, "
-        "runtime alone, us | `run`, us | `step` after 16, us |",
+        "| file | kB | 1 reading, onnxruntime | p99 | 1 reading, `Estimator` | p99 "
+        "| 16 readings, onnxruntime | 16 readings, `run` | 1 more reading, `step` |",
         "|---|---:|" + "---:|" * 7,
     ]
     case = read_recipe("wheel").case
@@ -41,19 +41,19 @@ def latency() -> str:
         alone = estimator.sets is not None and estimator.sets.alone
         whole = _timed(lambda e=estimator: e(**_reading()))
         if alone:
-            lines.append(f"{size}| | | {whole[0]:.0f} | {whole[1]:.0f} {_joint(estimator)}")
+            lines.append(f"{size}| | | {whole[0]:.0f} | {whole[1]:.0f} {_set_latency(estimator)}")
             continue
         feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
         raw = _timed(lambda e=estimator, f=feed: e.session.run(OUTPUTS, f))
         lines.append(
             f"{size}| {raw[0]:.0f} | {raw[1]:.0f} | {whole[0]:.0f} | {whole[1]:.0f} "
-            f"{_joint(estimator)}"
+            f"{_set_latency(estimator)}"
         )
     return "\n".join(lines)
 
 
-def _joint(estimator: Estimator) -> str:
-    """Cells for 16 readings: the runtime alone, `run`, and one more by `step`."""
+def _set_latency(estimator: Estimator) -> str:
+    """Cells for 16 readings: onnxruntime, `run`, and one more reading by `step`."""
     many = _readings()
     run = _timed(lambda: estimator.run(**many), CALLS // 8)
     if estimator.sets is None:
@@ -68,9 +68,9 @@ def _joint(estimator: Estimator) -> str:
 
 
 def cold_start() -> str:
-    """Import, load, check and first estimate in a fresh process."""
+    """Import, load, verification and first estimate in a new process."""
     path = str(ROOT / "exported" / "wheel.onnx")
-    found = []
+    runs = []
     for _ in range(5):
         done = subprocess.run(
             [sys.executable, "-c", COLD.format(path=path)],
@@ -78,11 +78,11 @@ def cold_start() -> str:
             text=True,
             check=True,
         )
-        found.append([float(x) for x in done.stdout.split()])
-    seconds, memory = np.min(found, axis=0)
+        runs.append([float(x) for x in done.stdout.split()])
+    seconds, memory = np.min(runs, axis=0)
     return (
-        f"Import, load, checksums, probe and first estimate: {seconds:.3f} s (best of 5), "
-        f"{memory:.0f} MB resident."
+        f"From import to the first estimate, load, checksums and self-test included: "
+        f"{seconds:.3f} s (best of 5); resident memory {memory:.0f} MB."
     )
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
+from benchmarks_file import FILE, MARK
 from gap_case import judged
-from place import FILE, MARK
 
 from datagen.blind_sets.factorial_plan import matrix
 from soilml.cli.progress import bar

@@ -1,4 +1,4 @@
-"""The regressors: errors against the prior, centres needed, closed-form leave-one-out."""
+"""Learned estimators: benchmark, calibration, fusion rules, number of centres, leave-one-out."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import SHEAR
 from training.benchmark.acceptance import goals
-from training.benchmark.report import goal_table, tables
-from training.benchmark.suite import LIMIT, RECIPE, benchmark
+from training.benchmark.report import LEGEND, format_goals, format_tables
+from training.benchmark.suite import RECIPE, benchmark
 from training.calibration.scores import scored
 from training.data.dataset import read_dataset, split
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
@@ -28,50 +28,48 @@ FEATURES = ("slip", "torque/load", "load")
 
 
 def comparison() -> str:
-    """The released models and the analytic methods on the fixed benchmark, and their goals."""
+    """Released models and analytic methods on the fixed benchmark, with acceptance goals."""
     case = read_recipe(RECIPE).case
     names = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
     models = {
         n: for_simulated_case(Estimator.load(ROOT / "exported" / f"{n}.onnx"), case) for n in names
     }
     results = benchmark(models)
-    return f"```\n{goal_table(goals(results, LIMIT))}\n\n{tables(results)}\n```"
+    text = f"{format_goals(goals(results))}\n\n{format_tables(results)}"
+    return f"{LEGEND}\n\n```\n{text}\n```"
 
 
 def sets(folder: Path) -> str:
-    """The released files beside the exact posterior of the same sets."""
-    from sets import calibration, coverage, densities, errors
+    """The released files against the exact posterior of the same sets."""
+    from sets import all_tables
 
-    released = ROOT / "exported"
-    return "\n\n".join(
-        f"### {table.__doc__}\n\n{table(released)}"
-        for table in (errors, densities, coverage, calibration)
-    )
+    return all_tables(ROOT / "exported")
 
 
 def flagged() -> str:
-    """Foreign readings: what is flagged beside what could be."""
+    """Detection of faults by the released files, and by statistical tests."""
     import flags
 
-    return flags.table()
+    return flags.tables()
 
 
 def rules() -> str:
-    """Fusion rules on the same held-out rows, from the released model's own figures."""
+    """Fusion rules on the same held-out rows, from the metadata of the released model."""
     metrics = json.loads(Estimator.load(ROOT / "exported" / "wheel.onnx").metadata["metrics"])
     lines = [
-        "| | RMSE / prior c | phi | K | -log p c | phi | K | 90 % holds c | phi | K |",
+        "| | RMSE / prior std, c | phi | K | negative log density, c | phi | K "
+        "| 90 % coverage, c | phi | K |",
         "|---|" + "---:|" * 9,
     ]
     for name, m in metrics.items():
         cells = [f"{v:.3f}" for v in (*m["rmse_share_of_prior"], *m["nll"])]
         cells += [f"{v:.1%}" for v in m["cover90"]]
         lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines) + f"\n\nOn {metrics['estimator']['rows']} rows."
+    return "\n".join(lines) + f"\n\nOn {metrics['estimator']['rows']} held-out rows."
 
 
 def parity() -> str:
-    """Float32 files against their float64 originals; a set posterior has none but its graph."""
+    """Float32 files against their float64 originals; a set posterior exists as a graph only."""
     lines = ["| file | kB | largest difference / prior std |", "|---|---:|---:|"]
     for file in sorted((ROOT / "exported").glob("*.onnx")):
         metadata = Estimator.load(file).metadata
@@ -81,34 +79,35 @@ def parity() -> str:
 
 
 def centres(folder: Path) -> str:
-    """How many centres the inverse problem of one reading needs."""
+    """Error of regressors of one reading against the number of support vectors (centres)."""
     generate(read_recipe("wheel"), folder / "data.parquet")
     parts = split(read_dataset(folder / "data.parquet", FEATURES, SHEAR), seed=0)
     train, check = parts.train, parts.calibrate.thinned()
     spread = train.targets.std(axis=0)
-    machines = {
+    regressors = {
         f"fixed-size LS-SVM, {m} centres": (FixedSizeLSSVM(centres=m), len(train))
         for m in (25, 50, 100, 150, 200, 400)
     }
-    machines["exact LS-SVM"] = (LSSVM(), 1500)
-    machines["MLP, 64 x 64"] = (GaussianMLP(), len(train))
+    regressors["exact LS-SVM"] = (LSSVM(), 1500)
+    regressors["MLP, 64 x 64"] = (GaussianMLP(), len(train))
     lines = [
-        "| machine | rows | RMSE / prior c | phi | K | -log p, sum | seconds to fit |",
+        "| regressor | training rows | RMSE / prior std, c | phi | K | negative log density, sum "
+        "| training time, s |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
-    for label, (machine, rows) in machines.items():
+    for label, (regressor, rows) in regressors.items():
         started = time.perf_counter()
-        machine.fit(train.features[:rows], train.targets[:rows])
+        regressor.fit(train.features[:rows], train.targets[:rows])
         seconds = time.perf_counter() - started
-        mean, std = machine.predict(check.features, return_std=True)
+        mean, std = regressor.predict(check.features, return_std=True)
         s = scored(check.targets, mean, std, spread)
         errors = " | ".join(f"{v:.4f}" for v in s.relative)
         lines.append(f"| {label} | {rows} | {errors} | {s.nll.sum():.3f} | {seconds:.1f} |")
-    return "\n".join(lines) + f"\n\nOn {len(check)} rows not learned from."
+    return "\n".join(lines) + f"\n\nOn {len(check)} held-out rows."
 
 
 def leave_one_out() -> str:
-    """The whole grid of gammas from one factorisation against refitting every fold."""
+    """Leave-one-out errors for a grid of gammas: one factorisation against refitting all folds."""
     rng = np.random.default_rng(0)
     x, y = rng.normal(size=(300, 3)), rng.normal(size=(300, 3))
     kernel = rbf(x, x, 1.0)
@@ -127,6 +126,6 @@ def leave_one_out() -> str:
     off = abs(np.mean(np.square(errors)) / closed[8] - 1.0)
     return (
         f"300 rows, 3 outputs, {len(GAMMAS)} gammas: closed form {fast * 1e3:.0f} ms, refitting "
-        f"every fold {slow:.0f} s (one gamma measured), ratio {slow / fast:,.0f}; the errors agree "
-        f"to {off:.0e}."
+        f"every fold {slow:.0f} s (extrapolated from one gamma), ratio {slow / fast:,.0f}; "
+        f"relative difference of the mean squared errors: {off:.0e}."
     )

@@ -1,4 +1,4 @@
-"""The forward model: accuracy against adaptive quadrature, and solves per second."""
+"""The forward model: accuracy against adaptive quadrature, and throughput."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ BASELINE_ROWS = 40
 
 
 def accuracy() -> str:
-    """Largest and median relative error over the whole input box."""
+    """Largest and median relative error over the input box."""
     lines = [
-        "| slip | rows compared | entry angle, worst | torque, worst | drawbar pull / load, worst |"
-        " torque, median |",
+        "| slip | rows | entry angle, maximum | torque, maximum | drawbar pull / load, maximum "
+        "| torque, median |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for label, sign in (("driving, 0 to 0.95", 1), ("braking, -0.9 to 0", -1)):
@@ -51,7 +51,7 @@ def accuracy() -> str:
 
 
 def speed() -> str:
-    """Solves per second, and the ratio to a loop over scalar quadrature and bracketing."""
+    """Solutions per second, and the ratio to a loop of scalar quadrature and bracketing."""
     rng = np.random.default_rng(0)
     sand = soil(
         "wong1989/dry_sand",
@@ -80,7 +80,7 @@ def speed() -> str:
         equilibrium(row)
     baseline = BASELINE_ROWS / (time.perf_counter() - started)
     lines = [
-        "| case | solves per second, one core | times the scalar loop |",
+        "| case | solutions per second, one core | ratio to the scalar loop |",
         "|---|---:|---:|",
         f"| adaptive quadrature and bracketing, row by row | {baseline:.1f} | 1 |",
     ]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
-from place import ROOT
+from benchmarks_file import ROOT
 from scipy.stats import binom
 
 from soilml import Estimator, SlipSinkage, read_case

@@ -1,8 +1,9 @@
-"""Set posteriors beside the exact posterior of the same sets: `python bench/sets.py`.
+"""Set posteriors of the released files against the exact posteriors of the same sets.
 
-With --limit the exact posteriors are computed anew, six minutes on two cores, and kept. Noise is a
-share of the true value, and sets tell its standard deviation there; a file's own noise is a share
-of the reading, which is measured beside it.
+`python bench/sets.py [FOLDER]` prints the tables; with --limit the exact posteriors are recomputed
+and stored (six minutes on two cores). The simulated noise is a share of the true value, and the
+standard deviations of the sets are those at the true value; a rover computes them from the reading,
+which is measured as a case of its own.
 """
 
 from __future__ import annotations
@@ -14,222 +15,258 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from place import ROOT
+from benchmarks_file import ROOT
 
 from soilml.quantities import SHEAR
-from training.benchmark.bayes_limit_file import load, save
-from training.benchmark.sets.agreement import Agreement, agreement, combined, uniform
+from training.benchmark.acceptance import COVERAGE_RANGE
+from training.benchmark.bayes_limit_file import load_limit, save_limit
+from training.benchmark.sets.compare_files import compare_with_exact
+from training.benchmark.sets.posterior_comparison import (
+    PosteriorComparison,
+    pool_comparisons,
+    uniformity_p_values,
+)
 from training.benchmark.sets.reference_sets import (
-    ANY,
-    ONE,
-    computed,
-    kept,
-    on_one_wheel,
-    references,
+    ANY_WHEEL,
+    ONE_WHEEL,
+    as_any_wheel_sets,
+    compute_reference_posteriors,
+    generate_reference_sets,
+    packaged_posteriors,
     with_noise_of_reading,
 )
+from training.benchmark.table_format import SHEAR_SYMBOLS
 
-#: Goals: RMSE over the exact posterior's, log density lacking (nat), what 90 % intervals hold, and
-#: the least chance of ranks as uneven.
-RATIO, GAP, HELD, CHANCE = 1.05, 0.1, (0.88, 0.92), 0.01
-#: A figure that misses its goal by less than so many of its standard errors does not settle it.
-DOUBT = 2.0
-SYMBOLS = ("c", "phi", "K")
-HINT = "compute it anew: make limit"
-#: Ends of bins for the ranks of what the file stands for, of its interval, of exact quantiles.
-RANKS, INTERVAL, QUARTERS = np.linspace(0.1, 0.9, 9), (0.05, 0.95), (0.05, 0.25, 0.75, 0.95)
+#: Goals: largest RMSE ratio, largest gap in log density (nat), smallest p-value of uniformity.
+MAX_RATIO, MAX_GAP, MIN_P_VALUE = 1.05, 0.1, 0.01
+#: A figure that misses its goal by less than this many standard errors is not a clear miss.
+STANDARD_ERRORS = 2.0
+#: Fewest sets of a measurement condition that is shown.
+MIN_SETS = 30
+#: Torque noise is split into thirds where its upper third exceeds the lower by this factor.
+NOISE_SPREAD = 1.2
+HINT = "compute it again: make limit"
+#: Interior edges of bins: of ranks, of the 90 % interval, and of the stored exact quantiles.
+RANK_EDGES, INTERVAL_EDGES = np.linspace(0.1, 0.9, 9), (0.05, 0.95)
+QUANTILE_EDGES = (0.05, 0.25, 0.75, 0.95)
 
 
 @cache
-def measured(folder: Path) -> dict[str, list[Agreement]]:
-    """Every file on its sets, by design."""
-    wanted = references()
-    limit = load(kept(), wanted, HINT)
-    first = sum(r.label == ONE for r in wanted)
-    one, every = slice(0, first), slice(first, len(wanted))
-    assert all(r.label == ANY for r in wanted[every])
-    any_wheel = folder / "any_wheel.onnx"
+def measured(folder: Path) -> dict[str, list[PosteriorComparison]]:
+    """Every file on its reference sets, by design."""
+    references = generate_reference_sets()
+    limit = load_limit(packaged_posteriors(), references, HINT)
+    first = sum(r.label == ONE_WHEEL for r in references)
+    one, any_ = slice(0, first), slice(first, len(references))
+    assert all(r.label == ANY_WHEEL for r in references[any_])
+    wheel, any_wheel = folder / "wheel.onnx", folder / "any_wheel.onnx"
+    from_reading = with_noise_of_reading(references[any_])
+    cases = {
+        "wheel, reference wheel": (wheel, references[one], one),
+        "any_wheel, reference wheel": (any_wheel, as_any_wheel_sets(references[one]), one),
+        "any_wheel, any wheel": (any_wheel, references[any_], any_),
+        "any_wheel, any wheel, noise from reading": (any_wheel, from_reading, any_),
+    }
     return {
-        "wheel, reference wheel": agreement(folder / "wheel.onnx", wanted[one], limit.rows(one)),
-        "any_wheel, reference wheel": agreement(
-            any_wheel, on_one_wheel(wanted[one]), limit.rows(one)
-        ),
-        "any_wheel, any wheel": agreement(any_wheel, wanted[every], limit.rows(every)),
-        "any_wheel, any wheel, noise told by reading": agreement(
-            any_wheel, with_noise_of_reading(wanted[every]), limit.rows(every)
-        ),
+        name: compare_with_exact(file, sets, limit.subset(part))
+        for name, (file, sets, part) in cases.items()
     }
 
 
-def errors(folder: Path) -> str:
-    """RMSE over that of the exact posterior on the same sets, by size."""
-    head = " | ".join(f"{s} | +-" for s in SYMBOLS)
+def rmse_table(folder: Path) -> str:
+    """RMSE relative to the exact posterior, by set size"""
+    head = " | ".join(f"{s} | s.e." for s in SHEAR_SYMBOLS)
     lines = [
-        f"Goal: at most {RATIO:g} at every size. Of the sets that the file answers.",
+        f"RMSE over that of the exact posterior mean on the same sets, with its standard error; of "
+        f"the sets that the file answers. Goal: at most {MAX_RATIO:g} at every size.",
         "",
         f"| file, sets | rows | sets | refused | {head} | goal |",
         "|---|---:|---:|---:|" + "---:|" * 6 + "---|",
     ]
     for name, parts in measured(folder).items():
         for part in parts:
-            ratio, error = part.ratio
+            ratio, error = part.rmse_ratio
             cells = " | ".join(f"{r:.3f} | {e:.3f}" for r, e in zip(ratio, error, strict=True))
-            met = _met(bool(np.all(ratio <= RATIO)), bool(np.all(ratio - DOUBT * error <= RATIO)))
-            refused = 1.0 - part.own.given.mean()
+            near = np.all(ratio - STANDARD_ERRORS * error <= MAX_RATIO)
+            result = _result(bool(np.all(ratio <= MAX_RATIO)), bool(near))
+            refused = 1.0 - part.estimates.answered.mean()
             lines.append(
-                f"| {name} | {_rows(part)} | {len(part.truth)} | {refused:.1%} | {cells} | {met} |"
+                f"| {name} | {_rows(part)} | {len(part.truth)} | {refused:.1%} | {cells} "
+                f"| {result} |"
             )
     return "\n".join(lines)
 
 
-def densities(folder: Path) -> str:
-    """Log density at the truth that a file lacks, of all unknowns together."""
+def log_density_table(folder: Path) -> str:
+    """Log posterior density at the truth"""
     lines = [
-        f"Goal: at most {GAP:g} nat. Of all unknowns together, bearing too where it is not known.",
+        "Mean log density at the truth of all unknowns jointly (uncertain bearing included): that "
+        "of the exact posterior, and the gap by which the posterior of the file is below it. Goal: "
+        f"a gap of at most {MAX_GAP:g} nat.",
         "",
-        "| file, sets | of which | sets | gap, nat | +- | exact, nat | goal |",
+        "| file, sets | subset | sets | gap, nat | s.e. | exact, nat | goal |",
         "|---|---|---:|---:|---:|---:|---|",
     ]
     for name, parts in measured(folder).items():
-        for part, label in _split(parts):
-            gap, error = part.gap
-            met = _met(gap <= GAP, gap - DOUBT * error <= GAP)
+        for part, label in _subsets(parts):
+            gap, error = part.log_density_gap
+            result = _result(gap <= MAX_GAP, gap - STANDARD_ERRORS * error <= MAX_GAP)
             lines.append(
                 f"| {name} | {label} | {len(part.truth)} | {gap:.3f} | {error:.3f} "
-                f"| {part.dense.mean():.2f} | {met} |"
+                f"| {part.exact_log_density.mean():.2f} | {result} |"
             )
     return "\n".join(lines)
 
 
-def coverage(folder: Path) -> str:
-    """What intervals and ellipsoids hold, beside what those of the exact posterior hold."""
+def coverage_table(folder: Path) -> str:
+    """Coverage of intervals and ellipsoids"""
+    low, high = COVERAGE_RANGE
     lines = [
-        f"Goal: 90 % intervals hold {HELD[0]:.0%} to {HELD[1]:.0%}. Each cell is the file's "
-        "figure, and the exact posterior's on the same sets. Among soils of one third of the prior "
-        "even the exact posterior does not hold 90 %: it leans to the middle, and only over all of "
-        "the prior does it hold what it says. Nor does the ellipsoid, for a posterior is no "
-        "Gaussian. The file gives 90 % intervals only: 50 % is of the posterior it stands for.",
+        "Coverage of 90 % intervals, and of the joint 90 % ellipsoid of mean and covariance: of "
+        "the file / of the exact posterior on the same sets. Goal: 90 % intervals cover "
+        f"{low:.0%} to {high:.0%}. Coverage of an exact posterior is 90 % on average over the "
+        "prior, not among soils of one third of the prior, where the posterior mean is shrunk "
+        "towards the middle; nor need a Gaussian ellipsoid cover 90 % of a posterior that is not "
+        "Gaussian. A file reports 90 % intervals only: 50 % figures are of the posterior that its "
+        "likelihood defines.",
         "",
-        f"| file, sets | of which | sets | {' | '.join(SYMBOLS)} | joint | goal |",
+        f"| file, sets | subset | sets | {' | '.join(SHEAR_SYMBOLS)} | joint | goal |",
         "|---|---|---:|" + "---:|" * 4 + "---|",
     ]
     for name, parts in measured(folder).items():
-        whole = combined(parts)
-        thirds = _thirds(whole)
-        for part, label in _split(parts):
-            lines.append(_covered(name, label, part, *part.cover90(), part.joint90, goal=True))
-        lines.append(_covered(name, "all, 50 %", whole, *whole.cover50, None, goal=False))
-        for label, index in thirds.items():
-            lines.append(_covered(name, label, whole, *whole.cover90(index), None, goal=False))
+        whole = pool_comparisons(parts)
+        for part, label in _subsets(parts):
+            lines.append(_coverage_row(name, label, part, part.coverage90(), with_goal=True))
+        lines.append(_coverage_row(name, "all, 50 %", whole, whole.coverage50, with_goal=False))
+        for label, index in _thirds(whole).items():
+            coverage = whole.coverage90(index)
+            lines.append(_coverage_row(name, label, whole, coverage, with_goal=False))
     return "\n".join(lines)
 
 
-def calibration(folder: Path) -> str:
-    """Whether the truth's rank in the posterior is uniform: simulation-based calibration."""
+def calibration_table(folder: Path) -> str:
+    """Simulation-based calibration"""
     lines = [
-        f"Goal: a chance of at least {CHANCE:g} that right posteriors would fall into bins as "
-        f"unevenly (chi-square). `ranks`: {len(RANKS) + 1} bins of the truth's rank in the "
-        "posterior that the file stands for; `interval`: below, inside and above the file's own "
-        "interval; `exact`: the exact posterior, in the bins of its kept quantiles. Reference: "
-        "Talts et al., arXiv:1804.06788, 2018.",
+        "Chi-square test of the truth's posterior rank against uniformity (Talts et al., "
+        "arXiv:1804.06788, 2018), p-values. `ranks`: 10 bins of the rank in the posterior that the "
+        "file's likelihood defines; `interval`: below, inside and above the file's own 90 % "
+        "interval; `exact`: the exact posterior, in the bins of its stored quantiles. Goal: p at "
+        f"least {MIN_P_VALUE:g}.",
         "",
-        "| file, sets | sets | which | " + " | ".join(SYMBOLS) + " | goal |",
-        "|---|---:|---|" + "---:|" * len(SYMBOLS) + "---|",
+        "| file, sets | sets | test | " + " | ".join(SHEAR_SYMBOLS) + " | goal |",
+        "|---|---:|---|" + "---:|" * len(SHEAR_SYMBOLS) + "---|",
     ]
     for name, parts in measured(folder).items():
-        whole = combined(parts)
-        there = whole.own.given
-        answered = whole.where(there)
-        truth = answered.truth
-        edges = np.stack([answered.own.low, answered.own.high])
-        exact = np.stack(
-            [answered.exact.low, *answered.least_inner.swapaxes(0, 1), answered.exact.high]
-        )
-        found = {
-            "ranks": uniform(answered.below, RANKS),
-            "interval": uniform(_binned(truth, edges, INTERVAL), INTERVAL),
-            "exact": uniform(_binned(truth, exact, QUARTERS), QUARTERS),
+        whole = pool_comparisons(parts)
+        answered = whole.subset(whole.estimates.answered)
+        truth, exact = answered.truth, answered.exact
+        interval = np.stack([answered.estimates.low, answered.estimates.high])
+        quantiles = np.stack([exact.low, *answered.exact_interval50.swapaxes(0, 1), exact.high])
+        ranks = {
+            "ranks": (answered.rank, RANK_EDGES),
+            "interval": (_binned_ranks(truth, interval, INTERVAL_EDGES), INTERVAL_EDGES),
+            "exact": (_binned_ranks(truth, quantiles, QUANTILE_EDGES), QUANTILE_EDGES),
         }
-        for which, chance in found.items():
-            cells = " | ".join(f"{p:.2g}" for p in chance)
-            met = "" if which == "exact" else _met(bool(np.all(chance >= CHANCE)), False)
-            lines.append(f"| {name} | {len(truth)} | {which} | {cells} | {met} |")
+        for test, (rank, edges) in ranks.items():
+            p_values = uniformity_p_values(rank, edges)
+            cells = " | ".join(f"{p:.2g}" for p in p_values)
+            result = (
+                "" if test == "exact" else _result(bool(np.all(p_values >= MIN_P_VALUE)), False)
+            )
+            lines.append(f"| {name} | {len(truth)} | {test} | {cells} | {result} |")
     return "\n".join(lines)
 
 
-def _binned(truth: np.ndarray, edges: np.ndarray, ends: Sequence[float]) -> np.ndarray:
-    """A share inside the bin of each truth (n, q) among ascending edges (k, n, q)."""
+TABLES = (rmse_table, log_density_table, coverage_table, calibration_table)
+
+
+def all_tables(folder: Path) -> str:
+    """All tables, each under its heading."""
+    return "\n\n".join(f"### {table.__doc__}\n\n{table(folder)}" for table in TABLES)
+
+
+def _binned_ranks(truth: np.ndarray, edges: np.ndarray, ends: Sequence[float]) -> np.ndarray:
+    """Ranks (n, q): the middle of the bin of each truth among ascending edges (k, n, q)."""
     middles = 0.5 * (np.asarray([0.0, *ends]) + np.asarray([*ends, 1.0]))
     return middles[(truth > edges).sum(axis=0)]
 
 
-def _split(parts: Sequence[Agreement]) -> list[tuple[Agreement, str]]:
-    """All sets, those of each size, of each kind, and of each third of the noise."""
-    whole = combined(parts)
-    found = [(whole, "all"), *((part, f"{_rows(part)} rows") for part in parts)]
-    found += [(whole.where(m), k) for k, m in whole.kinds.items() if 30 <= m.sum() < len(m)]
+def _subsets(parts: Sequence[PosteriorComparison]) -> list[tuple[PosteriorComparison, str]]:
+    """All sets, those of each size, of each condition, and of low and high torque noise."""
+    whole = pool_comparisons(parts)
+    subsets = [(whole, "all")]
+    subsets += [(part, f"{_rows(part)} row{'s' if _rows(part) > 1 else ''}") for part in parts]
+    subsets += [
+        (whole.subset(index), condition)
+        for condition, index in whole.conditions.items()
+        if MIN_SETS <= index.sum() < len(index)
+    ]
     low, high = np.quantile(whole.noise, [1.0 / 3.0, 2.0 / 3.0])
-    if high > 1.2 * low:
-        found.append((whole.where(whole.noise < low), f"torque noise below {low:.1%}"))
-        found.append((whole.where(whole.noise > high), f"torque noise above {high:.1%}"))
-    return found
+    if high > NOISE_SPREAD * low:
+        subsets.append((whole.subset(whole.noise < low), f"torque noise below {low:.1%}"))
+        subsets.append((whole.subset(whole.noise > high), f"torque noise above {high:.1%}"))
+    return subsets
 
 
-def _thirds(whole: Agreement) -> dict[str, np.ndarray]:
+def _thirds(whole: PosteriorComparison) -> dict[str, np.ndarray]:
     """Sets (n, q) whose truth is in each third of the prior."""
-    share = (whole.truth - whole.lower) / (whole.upper - whole.lower)
-    names = ("truth in the lower third", "in the middle third", "in the upper third")
-    return {name: np.minimum((3.0 * share).astype(int), 2) == k for k, name in enumerate(names)}
+    fraction = (whole.truth - whole.lower) / (whole.upper - whole.lower)
+    third = np.minimum((3.0 * fraction).astype(int), 2)
+    names = ("truth in lower third", "truth in middle third", "truth in upper third")
+    return {name: third == k for k, name in enumerate(names)}
 
 
-def _covered(
+def _coverage_row(
     name: str,
     label: str,
-    part: Agreement,
-    own: np.ndarray,
-    least: np.ndarray,
-    joint: tuple[float, float] | None,
-    goal: bool,
+    part: PosteriorComparison,
+    coverage: tuple[np.ndarray, np.ndarray],
+    with_goal: bool,
 ) -> str:
-    cells = " | ".join(f"{a:.1%} / {b:.1%}" for a, b in zip(own, least, strict=True))
-    both = "" if joint is None else f"{joint[0]:.1%} / {joint[1]:.1%}"
-    doubt = DOUBT * np.sqrt(0.09 / len(part.truth))
-    inside = np.all((own >= HELD[0]) & (own <= HELD[1]))
-    near = np.all((own >= HELD[0] - doubt) & (own <= HELD[1] + doubt))
-    met = _met(bool(inside), bool(near)) if goal else ""
-    return f"| {name} | {label} | {len(part.truth)} | {cells} | {both} | {met} |"
+    own, exact = coverage
+    cells = " | ".join(f"{a:.1%} / {b:.1%}" for a, b in zip(own, exact, strict=True))
+    joint, result = "", ""
+    if with_goal:
+        joint = " / ".join(f"{share:.1%}" for share in part.joint_coverage90)
+        (low, high), margin = COVERAGE_RANGE, STANDARD_ERRORS * np.sqrt(0.09 / len(part.truth))
+        inside = np.all((own >= low) & (own <= high))
+        near = np.all((own >= low - margin) & (own <= high + margin))
+        result = _result(bool(inside), bool(near))
+    return f"| {name} | {label} | {len(part.truth)} | {cells} | {joint} | {result} |"
 
 
-def _met(met: bool, near: bool) -> str:
-    return "met" if met else "missed, within its error" if near else "MISSED"
+def _result(met: bool, near: bool) -> str:
+    return "met" if met else f"missed, within {STANDARD_ERRORS:g} s.e." if near else "MISSED"
 
 
-def _rows(part: Agreement) -> int:
+def _rows(part: PosteriorComparison) -> int:
     return int(part.design.split()[-2])
 
 
-def limit() -> None:
-    """Compute and keep the exact posteriors of all reference sets."""
-    wanted = references()
+def recompute() -> None:
+    """Compute and store the exact posteriors of all reference sets."""
+    references = generate_reference_sets()
 
-    def told(text: str, done: int, total: int) -> None:
+    def report(text: str, done: int, total: int) -> None:
         if done % 200 == 0 or done == total:
             print(f"{text} {done} of {total}", file=sys.stderr, flush=True)
 
-    found = list(computed(wanted, told))
-    save(kept(), wanted, found)
-    flagged = sum(f.flagged for f in found)
-    print(f"{kept()}: {len(found)} sets of {', '.join(SHEAR)}, {flagged} flagged", file=sys.stderr)
+    summaries = list(compute_reference_posteriors(references, report))
+    file = packaged_posteriors()
+    save_limit(file, references, summaries)
+    flagged = sum(s.flagged for s in summaries)
+    print(
+        f"written: {file}, {len(summaries)} sets of {', '.join(SHEAR)}, {flagged} flagged",
+        file=sys.stderr,
+    )
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Print all tables, of the files in a folder, else of the released ones."""
+    """Print all tables, of the files in a folder; of the released ones without an argument."""
     if "--limit" in arguments:
-        limit()
+        recompute()
         return
-    folder = Path(arguments[0] if arguments else ROOT / "exported")
-    for table in (errors, densities, coverage, calibration):
-        print(f"### {table.__doc__}\n\n{table(folder)}\n", flush=True)
+    print(all_tables(Path(arguments[0] if arguments else ROOT / "exported")))
 
 
 if __name__ == "__main__":

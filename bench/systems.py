@@ -1,4 +1,4 @@
-"""The other gears and the systems of the source papers: speed, agreement, and honest bands."""
+"""Other gears and the systems of the source papers: speed, accuracy, and coverage of bands."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.walk import walk
 
 ROWS = 50_000
-#: The paper's step, 1e-4 s, at 0.3 rad/s, and a speed below which motion's direction fades: none.
+#: Steps per turn of the paper (1e-4 s at 0.3 rad/s), and a vanishing speed of regularisation.
 FINE, SHARP = round(2.0 * math.pi / 0.3 / 1e-4), 1e-9
-#: Rovers that nothing in the method was settled with.
+#: Seeds of rovers that were not used to tune the method.
 SEEDS = range(1000, 1060)
 LINES = (
     ("0, 4", ("cohesion", "friction_angle"), True),
@@ -28,11 +28,11 @@ LINES = (
     ("0, 4, 8, 10", ("cohesion",), True),
     ("0, 4, 8, 10", (), False),
 )
-SOUGHT = {"cohesion": "c", "friction_angle": "phi", "shear_modulus": "k_x"}
+SYMBOLS = {"cohesion": "c", "friction_angle": "phi", "shear_modulus": "k_x"}
 
 
 def gears() -> str:
-    """Solves per second of every gear, side by side."""
+    """Solutions per second of every gear."""
     rng = np.random.default_rng(0)
     slip = rng.uniform(0.0, 0.6, ROWS)
     sand = soil("wong1989/dry_sand", friction_angle=rng.uniform(0.44, 0.79, ROWS))
@@ -42,7 +42,10 @@ def gears() -> str:
         "foot of a wheel-leg": (foot, rng.uniform(4.0, 12.0, ROWS)),
         "flexible track": (WANG2018.track, rng.uniform(400.0, 800.0, ROWS)),
     }
-    lines = ["| gear | solves per second, one core | of the wheel's |", "|---|---:|---:|"]
+    lines = [
+        "| gear | solutions per second, one core | ratio to the rigid wheel |",
+        "|---|---:|---:|",
+    ]
     first = 0.0
     for name, (gear, load) in cases.items():
         started = time.perf_counter()
@@ -54,12 +57,13 @@ def gears() -> str:
 
 
 def walking() -> str:
-    """Seconds for a turn, and the difference to the paper's step of 1e-4 s."""
+    """Seconds per turn, and the difference from the paper's step of 1e-4 s."""
     ground = LinearGround(stiffness=0.7e6)
     cases = [wheel_leg(foot) for foot in ("none", "LTF", "SRF", "CIF")]
     cases += [wheel_leg("none", legs=legs) for legs in (2, 3, 6)]
     lines = [
-        "| steps to a turn | cases | seconds | hub height, rms | largest sinkage | rms slip |",
+        "| steps per turn | cases | seconds | hub height, rms difference | largest sinkage, "
+        "difference | rms slip, difference |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     started = time.perf_counter()
@@ -90,8 +94,17 @@ def _rms(slip: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def climbing() -> str:
-    """Share of rovers whose truth lies in the 90 % band, and root mean square of error / std."""
-    header = ("slopes, deg", "sought", "loads", "phi", "k_x", "pull", "steepest", "its rms, deg")
+    """Coverage of 90 % bands over rovers, and rms of error over reported standard deviation."""
+    header = (
+        "slopes, deg",
+        "estimated",
+        "loads",
+        "phi",
+        "k_x",
+        "pull",
+        "steepest",
+        "steepest, rms error, deg",
+    )
     table = []
     for slopes, given, known in LINES:
         angles = np.deg2rad([float(s) for s in slopes.split(",")])
@@ -101,8 +114,8 @@ def climbing() -> str:
             for n in ("friction_angle", "shear_modulus", "pull", "steepest")
         ]
         rms = math.degrees(float(np.sqrt(np.mean(found["steepest"].error ** 2))))
-        what = ", ".join(short for name, short in SOUGHT.items() if name not in given)
-        table.append((slopes, what, "known" if known else "found", *cells, f"{rms:.2f}"))
+        what = ", ".join(short for name, short in SYMBOLS.items() if name not in given)
+        table.append((slopes, what, "known" if known else "estimated", *cells, f"{rms:.2f}"))
     return f"```\n{aligned(header, table, text_columns=3)}\n```"
 
 

@@ -1,4 +1,4 @@
-"""Where the benchmarks are written."""
+"""Where the measured figures are written."""
 
 from __future__ import annotations
 
@@ -6,5 +6,5 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 FILE = ROOT / "BENCHMARKS.md"
-#: In front of the part that `make bench-gap` writes; what stands before is that of `make bench`.
+#: Separates the part that `make bench` writes (before) from that of `make bench-gap` (after).
 MARK = "\n<!-- written by make bench-gap -->\n"
