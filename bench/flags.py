@@ -30,7 +30,7 @@ from flags_page import (
 
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.cli.progress import bar
+from soilml.cli.progress import progress_bar
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.quantities import SHEAR
@@ -232,7 +232,7 @@ def measured(
     axes = [Coordinate.of(name, case.prior[name]) for name in SHEAR]
     estimators, rates = load_files(case, *files), {}
     studied = [Fault("-", "no fault"), *filter(only, faults(case))]
-    with bar("simulating", len(studied)) as done:
+    with progress_bar("simulating", len(studied)) as done:
         for i, fault in enumerate(studied):
             simulation = simulate_fault(fault, case, axes, 100 + i)
             for all_channels in (False, True):

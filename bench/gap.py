@@ -16,7 +16,7 @@ from benchmarks_file import FILE, MARK
 from gap_case import judged
 
 from datagen.blind_sets.factorial_plan import matrix
-from soilml.cli.progress import bar
+from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
 
@@ -31,7 +31,7 @@ def run() -> None:
     plans = matrix(not args.few, args.seed)[:: args.every]
     jobs = list(enumerate(plans))
     sets = []
-    with ProcessPoolExecutor(os.cpu_count()) as pool, bar("analysing", len(jobs)) as done:
+    with ProcessPoolExecutor(os.cpu_count()) as pool, progress_bar("analysing", len(jobs)) as done:
         for found in pool.map(judged, jobs, chunksize=4):
             sets.append(found)
             done(len(sets))

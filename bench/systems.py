@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml import Midstance, Model, Operating, Wheel, soil
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.systems.climbing.coverage_study import simulate_coverage
 from soilml.systems.tracked_robot.robot import WANG2018
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg
@@ -116,7 +116,7 @@ def climbing() -> str:
         rms = math.degrees(float(np.sqrt(np.mean(found["steepest"].error ** 2))))
         what = ", ".join(short for name, short in SYMBOLS.items() if name not in given)
         table.append((slopes, what, "known" if known else "estimated", *cells, f"{rms:.2f}"))
-    return f"```\n{aligned(header, table, text_columns=3)}\n```"
+    return f"```\n{format_table(header, table, text_columns=3)}\n```"
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from datagen.recipe import VIBRATION, Recipe
 from datagen.sensor_noise import reported, true_values
 from datagen.wheel_leg_vibration import HIDDEN, normal_stiffness
 from soilml.errors import InputError
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.physics.soils import Soil
 from soilml.quantities import COLUMNS, QUANTITIES
@@ -47,7 +47,7 @@ def generate(
     schema = _schema(recipe)
     total = failed = 0
     settings = {"compression": "zstd", "write_page_checksum": True}
-    with replacing(path) as part, pq.ParquetWriter(part, schema, **settings) as writer:
+    with atomic_output(path) as part, pq.ParquetWriter(part, schema, **settings) as writer:
         for columns in pieces(recipe):
             bad = int(np.count_nonzero(columns["status"] != Status.OK.reason))
             total, failed = total + len(columns["status"]), failed + bad

@@ -90,7 +90,7 @@ class Recipe:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
-def located(path: str | os.PathLike[str], package: str, folder: str) -> Path:
+def packaged_file(path: str | os.PathLike[str], package: str, folder: str) -> Path:
     """The file at `path`, or one that comes with the package, by its bare name.
 
     Raises `InputError` naming those that there are.
@@ -110,14 +110,14 @@ def read_recipe(
     path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS
 ) -> Recipe:
     """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
-    file = located(path, "datagen", "recipes")
+    file = packaged_file(path, "datagen", "recipes")
     settings = read_settings(file)
     recipe = _take_recipe(settings, effects)
     settings.finish()
     return recipe
 
 
-def recipe_of(text: str, where: str) -> Recipe:
+def parse_recipe(text: str, where: str) -> Recipe:
     """The recipe of which this is the `text`."""
     settings = Settings(json.loads(text), where, Path())
     recipe = _take_recipe(settings, EFFECTS)

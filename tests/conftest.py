@@ -154,14 +154,14 @@ def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) ->
 @pytest.fixture(scope="session")
 def any_posterior():
     """The set posterior of wheels of any size, learned from so few designs that it is coarse."""
-    from datagen.recipe import located
+    from datagen.recipe import packaged_file
     from soilml.io.toml_settings import read_settings
     from training.set_posterior.dimensionless_family import DimensionlessFamily
     from training.set_posterior.graph import SetPosteriorGraph
     from training.set_posterior.posterior_summary import Limits
     from training.set_posterior.response_surface import ResponseSettings, fit_response
 
-    settings = read_settings(located("any_wheel", "training", "specs"))
+    settings = read_settings(packaged_file("any_wheel", "training", "specs"))
     family = DimensionlessFamily.take(settings.table("any_wheel"))
     response = fit_response(family, ResponseSettings(768, 32, 60, 0), lambda *_: None)
     return SetPosteriorGraph(family, response, Limits(*map(np.asarray, LENIENT)))

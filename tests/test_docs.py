@@ -8,7 +8,7 @@ import pytest
 
 from soilml import read_case, read_table
 from soilml.cli import main
-from soilml.cli.main import ORDER
+from soilml.cli.main import COMMANDS
 from soilml.io.read_table import RUNS
 
 ROOT = Path(__file__).parents[1]
@@ -91,7 +91,7 @@ def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
     assert without - with_drag == pytest.approx(2.0)
 
 
-@pytest.mark.parametrize("command", ORDER)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_is_on_the_page(command):
     assert f"\nsoilml {command} " in (ROOT / "docs/command-line.md").read_text()
 

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from datagen.recipe import located
+from datagen.recipe import packaged_file
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.estimate_fusion import RULES
@@ -58,7 +58,7 @@ class Spec:
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:
     """The spec in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
-    file = located(path, "training", "specs")
+    file = packaged_file(path, "training", "specs")
     settings = read_settings(file)
     features = _words(settings, "features", ["slip", "torque/load", "load"])
     inputs_of(features)  # names the first that cannot be read

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.recipe import recipe_of
+from datagen.recipe import parse_recipe
 from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.estimate import (
@@ -121,7 +121,7 @@ def train(
     )
     posterior, figures = None, {}
     if spec.set_posterior is not None:
-        family = RecipeFamily.of(recipe_of(data.recipe, "recipe of the data"), spec.targets)
+        family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
         posterior = with_limits(
             family, fit_response(family, spec.set_posterior, progress), progress
         )

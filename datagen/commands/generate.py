@@ -6,40 +6,58 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.effects_option import add_effects_option, chosen_effects
-from soilml.io.atomic_files import named
+from soilml.cli.options import InputFile, add_effects_option, available_effects
+from soilml.io.atomic_files import output_files
 
-HELP = "synthetic measurements from a recipe, as Parquet"
+HELP = "simulate measurements from a recipe, as a Parquet file"
 DESCRIPTION = """\
-Simulate RECIPE.toml and write what the rover's sensors would report, with the true soil beside it.
+Simulate the rover of RECIPE.toml and write what its sensors would measure,
+with the true soil parameters in further columns.
 
   soilml generate recipe.toml data.parquet
-  soilml generate wheel data.parquet --rows 20000 --seed 7    a recipe of the package
+  soilml generate wheel data.parquet --rows 20000 --seed 7
 
-A recipe is a model file (see README) with, at the top, rows and seed, and
+`wheel` is a packaged recipe, like wheel_test, wheel_leg and benchmark.
 
-  [operating]             [bias]                    [[runs]]
-  slip = [0.05, 0.6]      torque_Nm = "1 %"         rows = 8      # rows on one soil
-  load_N = [30, 120]      # one draw for each run   share = 1.0   # of all rows
+A recipe is a model file (see README) with rows and seed at the top, and
 
-[soil.prior] says which parameters vary, and where. [stick_slip] adds the vibration of a wheel-leg:
-ranges of stiffness (N/m) and of drop (share of the friction angle that sliding soil loses), turning
-(rad/s), foot_mass, ...; or law = "line" alone. Same recipe and seed, same bytes.
+  [operating]                ranges of slip (ratio) and load (N)
+  slip = [0.05, 0.6]
+  load_N = [30, 120]
+
+  [bias]                     sensor biases, one random value for each run
+  torque_Nm = "1 %"
+
+  [[runs]]                   rows measured on one soil, share of all rows
+  rows = 8
+  share = 1.0
+
+[soil.prior] gives the ranges of the parameters that vary. [stick_slip] adds
+the vibration of a wheel-leg: ranges of stiffness (N/m) and of drop (fraction
+of the friction angle that sliding soil loses), turning (rad/s), foot_mass
+(kg), ...; or law = "line" alone. The same recipe and seed give the same bytes.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("recipe", metavar="RECIPE.toml", help="or the name of a packaged recipe")
-    parser.add_argument("out", metavar="OUT.parquet")
-    parser.add_argument("--rows", type=int, help="how many, instead of the recipe's")
-    parser.add_argument("--seed", type=int, help="instead of the recipe's")
+    parser.add_argument(
+        "recipe",
+        type=InputFile,
+        metavar="RECIPE.toml",
+        help="recipe file, or the name of a packaged recipe",
+    )
+    parser.add_argument("out", metavar="OUT.parquet", help="file to write")
+    parser.add_argument("--rows", type=int, help="number of rows (default: that of the recipe)")
+    parser.add_argument(
+        "--seed", type=int, help="seed of the random numbers (default: that of the recipe)"
+    )
     add_effects_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return named(args.out, ".parquet")
+    return output_files(args.out, ".parquet")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,11 +67,11 @@ def run(args: argparse.Namespace) -> int:
     need("datagen.generate", "generate")
     from datagen.generate import generate
     from datagen.recipe import read_recipe
-    from soilml.cli.progress import bar
+    from soilml.cli.progress import progress_bar
 
-    recipe = read_recipe(args.recipe, chosen_effects(args)).sized(args.rows, args.seed)
-    with bar("simulating", recipe.rows) as progress:
-        made = generate(recipe, args.out, progress)
-    note = f", {made.failed} without equilibrium" if made.failed else ""
-    print(f"{made.rows} rows{note} written to {args.out}", file=sys.stderr)
+    recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
+    with progress_bar("simulating", recipe.rows) as progress:
+        result = generate(recipe, args.out, progress)
+    note = f", {result.failed} without equilibrium" if result.failed else ""
+    print(f"{result.rows} rows{note} written to {args.out}", file=sys.stderr)
     return 0

@@ -14,7 +14,7 @@ import numpy as np
 from datagen.blind_sets.blind_set import Drawn, draw
 from datagen.blind_sets.factorial_plan import Plan
 from soilml.cli import main
-from soilml.io.text_tables import aligned, csv_text
+from soilml.io.text_tables import csv_text, format_table
 
 #: The plans of the stories; the truth stays in this file and never reaches the analyst.
 PLANS = {
@@ -176,7 +176,7 @@ def run() -> None:
     """Tell all stories and print how they ended."""
     folder = Path("demo/gap")
     header = ("hidden", "status", "causes", "held-out region", "phi error, deg")
-    print(aligned(header, [line(told) for told in tell(folder)], text_columns=3))
+    print(format_table(header, [line(told) for told in tell(folder)], text_columns=3))
     print(f"\nreports: {folder}/*/gap/report.html", file=sys.stderr)
 
 

@@ -12,7 +12,7 @@ from soilml import Model, Operating, StressShift, Table, Wheel, soil
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.gap import gap
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.numerics.prior import Prior
 from soilml.systems.force_sensor_wheel import (
     SensingWheel,
@@ -86,7 +86,7 @@ def main() -> None:
         for s, a, arc, g, t in zip(SLIPS, SLOPES, arcs, grips, TABLE_I, strict=True)
     ]  # fmt: skip
     header = ("slip", "slope deg", "true from", "to deg", "found from", "to deg")
-    print(aligned((*header, "k_x mm", "90 % from", "to", "Table I mm"), rows, text_columns=0))
+    print(format_table((*header, "k_x mm", "90 % from", "to", "Table I mm"), rows, text_columns=0))
     print(f"\nThe arc looks {np.rad2deg(np.ptp(raw)):.0f} degrees long to sensors of 9.5 mm.")
 
     print("\nDrawbar pull in N with the k_x found on level ground, and the conventional model's")
@@ -96,7 +96,7 @@ def main() -> None:
         for s, n, p, k, c in zip(SLIPS[1:], NEEDED[1:], pulls, known[1:], tuned[1:], strict=True)
     ]  # fmt: skip
     header = ("slip", "needed", "measured stress", "90 % from", "to")
-    print(aligned((*header, "conventional", "its own k_x"), rows, text_columns=0))
+    print(format_table((*header, "conventional", "its own k_x"), rows, text_columns=0))
     print(
         f"\nThe conventional model's own k_x on level ground is {1e3 * refitted:.1f} mm. With "
         f"{1e3 * TRUE:.1f} mm it has\nthe wheel pull {known[0]:.2f} N there, which pulls nothing."

@@ -20,7 +20,7 @@ from lunar.sweep import Floats, bounds, driven, noisy, soils, table, three_loads
 
 from soilml import Case, Estimator, identify, read_case
 from soilml.cli import main
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.quantities import SHEAR
 
 HERE = Path(__file__).parent.relative_to(Path.cwd()) / "lunar"
@@ -89,7 +89,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         lines.append((f"{name.replace('_', ' ')} {unit}", f"{truth[k] * factor:.3g}", *said))
     print(f"\nA soil of the prior, slip swept from 0.2 to 0.6 at {LOAD:g} N in {SLIPS} readings;")
     print("one of them, at slip 0.4, and all together:\n")
-    print(aligned(header, lines))
+    print(format_table(header, lines))
     width = ", ".join(f"{100 * w:.0f} %" for w in joint.std / joint.prior_std)
     print(
         "\nAll have one load: cohesion and friction angle cannot be told apart. Joined, the LS-SVM"
@@ -115,7 +115,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         error = np.sqrt(np.mean((mean - force.drawbar_pull) ** 2))
         lines.append((said, f"{error:.2f}", f"{np.mean(high - low):.2f}"))
     print("\nDrawbar pull along the sweep, foretold from what was found:\n")
-    print(aligned(("from", "RMS error N", "90 % band N"), lines))
+    print(format_table(("from", "RMS error N", "90 % band N"), lines))
     sweep = Sweep(
         slip, single, joint, (least.values, least.std), exact, truth, bounds(case),
         force.drawbar_pull, found,
@@ -140,7 +140,7 @@ def show_told(case: Case, estimator: Estimator, truth: Floats, rng: np.random.Ge
         lines.append((title.split(":")[0], *(f"{100 * share:.0f} %" for share in left)))
     print("\nOne reading is one equation for three unknowns; other slips tell K, loads the rest.")
     print("Width left of the prior, by the exact posterior and by the LS-SVM:\n")
-    print(aligned(("", "c exact", "phi exact", "K exact", "c", "phi", "K"), lines))
+    print(format_table(("", "c exact", "phi exact", "K exact", "c", "phi", "K"), lines))
     draw_told(told, truth, bounds(case), OUT / "lunar_single_triple.png")
 
 

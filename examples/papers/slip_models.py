@@ -14,10 +14,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from datagen.generate import generate
-from datagen.recipe import located, read_recipe
+from datagen.recipe import packaged_file, read_recipe
 from soilml import Estimator, read_table
-from soilml.io.atomic_files import replacing
-from soilml.io.text_tables import aligned
+from soilml.io.atomic_files import atomic_output
+from soilml.io.text_tables import format_table
 from soilml.onboard.multi_sensor import ACROSS_FILES, fused_estimates
 from soilml.quantities import column
 from training.data.dataset import read_dataset
@@ -27,7 +27,7 @@ from training.train import Trained, train
 
 OUT = Path("demo/papers/slip_models.png")
 ROWS, TEST_ROWS = 5000, 2500
-RECIPE = located("wheel_leg", "datagen", "recipes").read_text().partition("[[runs]]")[0]
+RECIPE = packaged_file("wheel_leg", "datagen", "recipes").read_text().partition("[[runs]]")[0]
 #: What is changed in the recipe of the package, by the name of the case.
 UNKNOWN: dict[str, str] = {}
 KNOWN = {
@@ -195,7 +195,7 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
     axes[1][2].set_ylim(len(soil) + 0.2, -0.6)
     axes[1][2].legend(fontsize=7, loc="lower left", ncols=2, columnspacing=0.8)
     OUT.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(OUT) as part:
+    with atomic_output(OUT) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 
@@ -229,12 +229,12 @@ def run() -> None:
         groups = zip(*(figures[case] for case in some), strict=True)
         rows = [(group[0][0], *(cell for line in group for cell in line[1:])) for group in groups]
         head = ("", *(text for case in some for text in (case, "90 % holds")))
-        print(aligned(head, rows), end="\n\n")
+        print(format_table(head, rows), end="\n\n")
     print("The soil from one stride whose slip is measured (unknown soil):\n")
     rows = [
         (k, *(f"{x:.2f}" for x in v[:2]), *(f"{x:.0%}" for x in v[2:])) for k, v in soil.items()
     ]
-    print(aligned(("read", "friction angle", "stiffness", "90 % holds", "90 % holds"), rows))
+    print(format_table(("read", "friction angle", "stiffness", "90 % holds", "90 % holds"), rows))
     draw(unknown, shares, soil)
     print(f"\npicture: {OUT}")
 

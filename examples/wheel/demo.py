@@ -12,9 +12,9 @@ import numpy as np
 
 from soilml import Estimator, read_table
 from soilml.cli import main
-from soilml.io.atomic_files import replacing, save_text
+from soilml.io.atomic_files import atomic_output, save_text
 from soilml.io.table import Table
-from soilml.io.text_tables import aligned, csv_text
+from soilml.io.text_tables import csv_text, format_table
 from soilml.quantities import QUANTITIES, SHEAR, column
 
 HERE = Path(__file__).parent.relative_to(Path.cwd())
@@ -117,7 +117,8 @@ def show(log: Table, truth: dict[str, float], estimator: Estimator) -> None:
         "newton",
     )
     print(
-        f"\nThe drive of {len(log)} readings, never seen in training:\n\n{aligned(header, lines)}"
+        f"\nThe drive of {len(log)} readings, never seen in training:\n\n"
+        f"{format_table(header, lines)}"
     )
     draw(rows, joint, truth, found["nonlinear"], estimator)
 
@@ -179,7 +180,7 @@ def draw(rows, joint, truth, nonlinear, estimator) -> None:  # type: ignore[no-u
         "What one reading of slip, torque and load tells of the soil, and what 18 tell (90 % bars)",
         fontsize=10,
     )
-    with replacing(OUT / "log.png") as part:
+    with atomic_output(OUT / "log.png") as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 

@@ -45,7 +45,9 @@ HELD = {"gear", "soil", "effect", "noise", "operating", "rows", "seed", "runs"}
 ALONG = 4
 
 
-def after_fit(case: Case, table: Table, free: Sequence[str] | None, fit: Fit) -> Advice | None:
+def advice_after_fit(
+    case: Case, table: Table, free: Sequence[str] | None, fit: Fit
+) -> Advice | None:
     """Advice after rows that the posterior method answered with `fit`; None where there is none.
 
     That is where [noise] names no channel, or no row that could be driven is known to be possible.
@@ -59,7 +61,7 @@ def after_fit(case: Case, table: Table, free: Sequence[str] | None, fit: Fit) ->
         return None
 
 
-def after_estimate(
+def advice_after_estimate(
     estimator: Estimator,
     mean: Floats,
     covariance: Floats,
@@ -106,18 +108,18 @@ def _shares(estimate: Estimate) -> NDArray[np.float64]:
     return np.where(estimate.in_range, shares, np.nan)
 
 
-def typical(estimate: Estimate) -> int:
+def median_row(estimate: Estimate) -> int:
     """The row in range that stands in the middle by its width."""
     shares = _shares(estimate)
     return int(np.argsort(shares)[(int(estimate.in_range.sum()) - 1) // 2])
 
 
-def vaguest(estimate: Estimate) -> int:
+def widest_row(estimate: Estimate) -> int:
     """The row in range that is widest."""
     return int(np.nanargmax(_shares(estimate)))
 
 
-def covariates(at: Operating) -> dict[str, float]:
+def mean_covariates(at: Operating) -> dict[str, float]:
     """Further fields of how rows were driven, at their means: the next row is driven so too."""
     given = {field: getattr(at, field) for field in COVARIATES}
     return {field: float(np.mean(value)) for field, value in given.items() if value is not None}
@@ -139,7 +141,7 @@ def _quick(
         ranges,
         driven=driven,
         count=AHEAD,
-        covariates=covariates(driven),
+        covariates=mean_covariates(driven),
         reads=reads,
         wanted=wanted,
         now=now,

@@ -1,4 +1,4 @@
-"""What `estimate` hands to a model file of the rows of one soil."""
+"""Readings that `estimate` passes to a model file."""
 
 from __future__ import annotations
 
@@ -13,38 +13,40 @@ from soilml.quantities import CHANNELS, column
 
 
 def row_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
-    """What single readings are estimated from, (rows,) by name."""
+    """Inputs for the estimates of single rows, (rows,) by name."""
     return {name: table[column(name)] for name in estimator.inputs}
 
 
 def joint_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
-    """What rows of one soil are estimated from together, (rows,) by name.
+    """Inputs for the pooled estimate of all rows of one soil, (rows,) by name.
 
-    Beside what the file needs, sinkage and drawbar pull where the table has them and the file knows
-    their noise, and columns of standard deviations, which stand for the file's own noise.
+    In addition to the required readings: sinkage and drawbar pull where the table has them and
+    their noise is known, and columns of standard deviations, which replace the noise of the file.
     """
-    found = row_readings(estimator, table)
+    readings = row_readings(estimator, table)
     if estimator.sets is None:
-        return found
+        return readings
     for name in CHANNELS:
         key, spread = column(name), f"{column(name)}_std"
         known = name in estimator.sets.noise or spread in table
         if name in OPTIONAL and key in table and known:
-            found[name] = table[key]
-        if name in found and spread in table:
-            found[f"{name}_std"] = _filled(table[spread], estimator, name, found[name])
-    return found
+            readings[name] = table[key]
+        if name in readings and spread in table:
+            readings[f"{name}_std"] = _fill_blank_std(
+                table[spread], estimator, name, readings[name]
+            )
+    return readings
 
 
-def _filled(spread: Any, estimator: Estimator, name: str, reading: Any) -> Any:
-    """Standard deviations with the file's own where the table leaves one blank."""
+def _fill_blank_std(spread: Any, estimator: Estimator, name: str, reading: Any) -> Any:
+    """Standard deviations of the table, and those of the model file where one is blank."""
     constant, share = estimator.sets.noise.get(name, (0.0, 0.0)) if estimator.sets else (0.0, 0.0)
     own = np.hypot(constant, share * np.abs(reading))
     return np.where(np.isfinite(spread) & (spread > 0.0), spread, own)
 
 
-def channels_said(estimator: Estimator, readings: dict[str, Any]) -> list[str]:
-    """Which channels took part, where the file reads more than it needs."""
+def channel_note(estimator: Estimator, readings: dict[str, Any]) -> list[str]:
+    """A note on the channels used, for a file that can use more than it requires."""
     if estimator.sets is None:
         return []
     used = [
@@ -52,4 +54,4 @@ def channels_said(estimator: Estimator, readings: dict[str, Any]) -> list[str]:
         for name in CHANNELS
         if name in readings and np.isfinite(readings[name]).any()
     ]
-    return [f"reads slip, load and {', '.join(used)}"]
+    return [f"uses slip, load and {', '.join(used)}"]

@@ -1,7 +1,9 @@
-"""Where a command's table goes: a file, a pipe as CSV, or a person as an aligned table."""
+"""Output of a command: a file, CSV or JSON into a pipe, or an aligned table on a terminal."""
 
 from __future__ import annotations
 
+import json
+import math
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -10,37 +12,52 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import save_text
-from soilml.io.text_tables import aligned, csv_text
+from soilml.io.text_tables import csv_text, format_table
 
 
-def deliver(columns: Mapping[str, Any], out: str | None) -> None:
-    """Write the columns to `out`; without one, print them."""
+def write_columns(columns: Mapping[str, Any], out: str | None) -> None:
+    """Write the columns to the CSV file `out`; without one, print them."""
     if out is not None:
         save_text(out, csv_text(columns))
         count = len(next(iter(columns.values())))
         print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
     else:
-        put(f"{for_people(columns)}\n" if watched() else csv_text(columns))
+        write_stdout(f"{format_columns(columns)}\n" if is_terminal() else csv_text(columns))
 
 
-def watched() -> bool:
-    """Whether a person looks at standard output."""
+def is_terminal() -> bool:
+    """Whether standard output is a terminal."""
     return sys.stdout is not None and sys.stdout.isatty()
 
 
-def put(text: str) -> None:
-    """Write an answer to standard output; raises `InputError` where that is closed."""
+def write_stdout(text: str) -> None:
+    """Write text to standard output; raises `InputError` where that is closed."""
     if sys.stdout is None:
         raise InputError("standard output is closed: open it, or give --out where there is one")
     sys.stdout.write(text)
 
 
-def for_people(columns: Mapping[str, Any]) -> str:
-    """The columns as an aligned table with four significant digits."""
+def json_text(content: Any) -> str:
+    """The content as indented JSON; numbers that are not finite become null, as JSON has none."""
+    return json.dumps(_with_null(content), indent=2, allow_nan=False) + "\n"
+
+
+def _with_null(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_null(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_with_null(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def format_columns(columns: Mapping[str, Any]) -> str:
+    """The columns as an aligned table with four significant digits, text columns first."""
     text = [name for name, values in columns.items() if np.asarray(values).dtype.kind in "US"]
     order = [*text, *[name for name in columns if name not in text]]
     rows = zip(*[[_short(v) for v in columns[name]] for name in order], strict=True)
-    return aligned(order, list(rows), text_columns=len(text))
+    return format_table(order, list(rows), text_columns=len(text))
 
 
 def _short(value: Any) -> str:

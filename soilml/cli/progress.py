@@ -1,4 +1,4 @@
-"""Progress bars on standard error, for anything over two seconds."""
+"""Progress on standard error, for everything that takes more than about two seconds."""
 
 from __future__ import annotations
 
@@ -8,56 +8,55 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def bar(text: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar that is told how much is done so far; silent where nobody looks."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
+def progress_bar(text: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A function of the number of items done, which draws a bar where stderr is a terminal."""
     if not sys.stderr.isatty():
         yield lambda done: None
         return
-    shown = Progress(
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TextColumn("{task.completed}/{task.total}"),
         TimeElapsedColumn(),
-        console=console,
+        console=Console(stderr=True),
         transient=True,
     )
-    with shown:
-        task = shown.add_task(text, total=total)
-        yield lambda done: shown.update(task, completed=done)
+    with progress:
+        task = progress.add_task(text, total=total)
+        yield lambda done: progress.update(task, completed=done)
 
 
 @contextmanager
-def stages() -> Iterator[Callable[[str, int, int], None]]:
-    """A line for each named stage, told (name, done, total); plain lines where nobody looks."""
+def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
+    """A function (stage, done, total): a bar for each stage on a terminal, otherwise a line."""
+    if not sys.stderr.isatty():
+        started: set[str] = set()
+
+        def announce(text: str, done: int, total: int) -> None:
+            if text not in started:
+                started.add(text)
+                print(f"{text} ...", file=sys.stderr, flush=True)
+
+        yield announce
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    if not sys.stderr.isatty():
-        seen: set[str] = set()
-
-        def say(text: str, done: int, total: int) -> None:
-            if text not in seen:
-                seen.add(text)
-                print(f"{text} ...", file=sys.stderr, flush=True)
-
-        yield say
-        return
-    shown = Progress(
+    progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         TimeElapsedColumn(),
         console=Console(stderr=True),
     )
     tasks: dict[str, object] = {}
-    with shown:
+    with progress:
 
-        def step(text: str, done: int, total: int) -> None:
+        def update(text: str, done: int, total: int) -> None:
             if text not in tasks:
-                tasks[text] = shown.add_task(text, total=total)
-            shown.update(tasks[text], completed=done, total=total)  # type: ignore[arg-type]
+                tasks[text] = progress.add_task(text, total=total)
+            progress.update(tasks[text], completed=done, total=total)  # type: ignore[arg-type]
 
-        yield step
+        yield update

@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from soilml.experiment_design.design import Advice
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
 
 #: Most cells in which the width is written, and most ticks of an axis.
@@ -60,6 +60,6 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, driven: Operating | 
     axes[0, 0].set_ylabel("load of the next row, N")
     figure.supxlabel("slip of the next row (frame: best, rings: driven)", fontsize=10)
     figure.colorbar(image, ax=axes[0], label="expected width left of the prior")
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=110)
     pyplot.close(figure)

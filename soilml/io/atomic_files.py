@@ -1,4 +1,4 @@
-"""Files that are whole or not there, written to places that are checked first."""
+"""Output files, written atomically to targets that are checked before any work."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pathlib import Path
 from soilml.errors import InputError
 
 
-def checked(path: str | os.PathLike[str]) -> Path:
-    """The file that `path` means, symbolic links followed; there need not be one yet.
+def check_writable(path: str | os.PathLike[str]) -> Path:
+    """The file at `path` with symbolic links resolved; it need not exist yet.
 
-    Raises `InputError` where it cannot be written to: a folder stands there, a device, a pipe or a
-    socket, or its own folder is missing or locked.
+    Raises `InputError` where it cannot be written: the path is a folder, a device, a pipe or a
+    socket, or the folder of the file is missing or not writable.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -27,47 +27,49 @@ def checked(path: str | os.PathLike[str]) -> Path:
     if kind is not None and stat.S_ISDIR(kind):
         raise InputError(f"{path} is a folder; needed is a file name to write to")
     if kind is not None and not stat.S_ISREG(kind):
-        raise InputError(f"{path} is no file but a device, pipe or socket; needed is a file name")
+        raise InputError(f"{path} is a device, pipe or socket; needed is a file name")
     if folder is None or not stat.S_ISDIR(folder):
-        raise InputError(f"{path}: there is no folder {Path(path).parent}; create it first")
+        raise InputError(f"{path}: the folder {Path(path).parent} does not exist; create it first")
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        raise InputError(f"{path} cannot be written: no permission to write into its folder")
+        raise InputError(f"{path} cannot be written: no permission to write to its folder")
     return target
 
 
-def check_apart(outputs: Iterable[str | os.PathLike[str]], inputs: Iterable[str]) -> None:
-    """Check every output as `checked` does; raise `InputError` too where one is also an input."""
-    given = list(inputs)
+def check_outputs(outputs: Iterable[str | os.PathLike[str]], inputs: Iterable[str]) -> None:
+    """Check that every output can be written and is none of the inputs; raises `InputError`."""
+    read = list(inputs)
     for output in outputs:
-        target = checked(output)
-        if any(_same(target, path) for path in given):
+        target = check_writable(output)
+        if any(_same(target, path) for path in read):
             raise InputError(
-                f"{output} is read and would be written over; give the output another name"
+                f"{output} is an input and would be overwritten; give the output another name"
             )
 
 
-def named(path: str | None, *suffixes: str) -> list[Path]:
-    """The files of one name and these endings; `path` has the first. None where it is None.
+def output_files(path: str | None, *suffixes: str) -> list[Path]:
+    """The output files of one name with these suffixes; an empty list where `path` is None.
 
-    Raises `InputError` where `path` ends otherwise: the name would promise something else.
+    Raises `InputError` where `path` does not have the first suffix, which names its format.
     """
     if path is None:
         return []
     file = Path(path)
     if file.suffix.lower() != suffixes[0]:
-        raise InputError(f"{path}: the output is a {suffixes[0]} file, name it ...{suffixes[0]}")
+        raise InputError(
+            f"{path}: the output is a {suffixes[0]} file; its name must end in {suffixes[0]}"
+        )
     return [file, *(file.with_suffix(suffix) for suffix in suffixes[1:])]
 
 
 @contextmanager
-def replacing_all(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]]:
-    """Paths to write to, which become `paths` when the block ends well and vanish when not.
+def atomic_outputs(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+    """Temporary paths that are renamed to `paths` when the block succeeds, and deleted otherwise.
 
-    All are checked before the block, and none is replaced before all are written. The parts lie
-    beside their targets as `.NAME.RANDOM.part`, so that two processes do not share one. Raises
-    `InputError` as `checked` does and where the disk is full.
+    All targets are checked before the block, and none is replaced before all files are written.
+    A temporary file lies in the folder of its target as `.NAME.RANDOM.part`, so that two processes
+    do not share one. Raises `InputError` as `check_writable` does, and where the disk is full.
     """
-    targets = [checked(path) for path in paths]
+    targets = [check_writable(path) for path in paths]
     parts = [t.parent / f".{t.name[:40]}.{secrets.token_hex(4)}.part" for t in targets]
     try:
         yield parts
@@ -75,7 +77,7 @@ def replacing_all(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path
             with part.open("rb+") as written:
                 os.fsync(written.fileno())
         for path in paths:
-            checked(path)  # it may have become something else meanwhile
+            check_writable(path)  # it may have changed since the first check
         for part, target in zip(parts, targets, strict=True):
             part.replace(target)
     except OSError as error:
@@ -87,44 +89,44 @@ def replacing_all(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """`replacing_all` for one file."""
-    with replacing_all([path]) as parts:
+def atomic_output(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Like `atomic_outputs`, for one file."""
+    with atomic_outputs([path]) as parts:
         yield parts[0]
 
 
 def save_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write a whole text file, or none."""
-    with replacing(path) as part:
+    """Write a text file atomically."""
+    with atomic_output(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 @contextmanager
-def made_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """The folder `path`, made with its parents where missing; those made go if the block fails.
+def create_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Create the folder `path` and its missing parents; if the block fails, remove those created.
 
-    Raises `InputError` where it cannot be made.
+    Raises `InputError` where the folder cannot be created.
     """
     folder = Path(path)
-    new = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
+    missing = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
     with ExitStack() as undo:
-        for place in reversed(new):
-            undo.callback(_removed, place)
+        for new in reversed(missing):
+            undo.callback(_remove_if_empty, new)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{folder} cannot be made: {_why(error)}") from None
+            raise InputError(f"{folder} cannot be created: {_why(error)}") from None
         yield folder
         undo.pop_all()
 
 
-def _removed(folder: Path) -> None:
+def _remove_if_empty(folder: Path) -> None:
     with suppress(OSError):
         folder.rmdir()
 
 
 def _kind(path: Path) -> int | None:
-    """Mode of what stands at a path; None where nothing does."""
+    """File mode of a path; None where it does not exist."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

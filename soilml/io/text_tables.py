@@ -28,7 +28,7 @@ def _cell(value: Any) -> str:
     return str(value)
 
 
-def aligned(
+def format_table(
     header: Sequence[str],
     rows: Sequence[Sequence[str]],
     text_columns: int = 1,

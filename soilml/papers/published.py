@@ -29,7 +29,7 @@ class PrintedNumber:
     what: str
     source: str
     unit: str
-    printed_numbers: float
+    published: float
     tolerance: float
     relative: bool
     reason: str

@@ -16,7 +16,7 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.cli.advice_text import _trained_for, after_estimate
+from soilml.cli.advice_text import _trained_for, advice_after_estimate
 
 ROOT = Path(__file__).parents[2]
 RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,2.9\na,0.2,60,2.95\n"
@@ -79,8 +79,8 @@ def test_every_candidate_can_be_had_the_best_first(folder, capsys):
         (["model.toml", "none.csv"], "none.csv: there is no such file"),
         (["silent.toml", "--loads", "60"], "declare it in [noise]"),
         (["silent.toml", "runs.csv"], "declare it in [noise]"),
-        (["model.toml", "runs.csv", "--picture", "o.svg"], "name it ....png"),
-        (["model.toml", "runs.csv", "--out", "runs.csv"], "would be written over"),
+        (["model.toml", "runs.csv", "--picture", "o.svg"], "must end in .png"),
+        (["model.toml", "runs.csv", "--out", "runs.csv"], "would be overwritten"),
         (["speed.toml", "--loads", "60"], "speed"),
     ],
 )
@@ -158,10 +158,10 @@ def test_a_recipe_that_a_case_cannot_hold_gets_no_advice(small_model, more):
     whole = Estimator.load(small_model)
     one = whole(slip=0.2, torque=2.9, load=60.0)
     readings = {"slip": 0.2, "load": 60.0, "torque": 2.9}
-    assert after_estimate(whole, one.mean, one.covariance, readings)
+    assert advice_after_estimate(whole, one.mean, one.covariance, readings)
     recipe = json.dumps(json.loads(whole.metadata["recipe"]) | more)
     other = replace(whole, metadata=whole.metadata | {"recipe": recipe})
-    assert after_estimate(other, one.mean, one.covariance, readings) == []
+    assert advice_after_estimate(other, one.mean, one.covariance, readings) == []
 
 
 @pytest.mark.parametrize("rows", [1, 4, 6])
@@ -170,7 +170,7 @@ def test_short_and_long_runs_at_one_load_ask_for_another(small_model, rows):
     readings = {"slip": [0.2] * rows, "load": [60.0] * rows, "torque": [2.9] * rows}
     one = estimator.run(**readings)
     arrays = {name: np.asarray(values) for name, values in readings.items()}
-    said = after_estimate(estimator, one.mean, one.covariance, arrays)
+    said = advice_after_estimate(estimator, one.mean, one.covariance, arrays)
     cohesion = next(line for line in said if line.startswith("cohesion"))
     left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
     assert left < again - 20 and " at 60 N" not in cohesion

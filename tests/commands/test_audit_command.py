@@ -135,7 +135,7 @@ def test_no_reading_is_looked_at_and_people_are_told_what_could_be_named(usual, 
         (line,) = [line for line in said.splitlines() if line.split()[:1] == [name]]
         assert line.split()[1] == ("yes" if e["nameable"] else "no")
     assert "rate: needs the column speed_m_s" in said
-    assert "runs to add, and what they would make nameable:" in said
+    assert "runs to add, and the effects that could then be named:" in said
 
 
 def test_without_out_nothing_is_written(tmp_path, capsys):

@@ -82,7 +82,7 @@ OTHERS = {
     "unknown command": (["simulat"], "simulat"),
     "table under another name": (
         ["simulate", "model.toml", "--slip", "0.1", "--load", "9", "--out", "o.parquet"],
-        "name it ....csv",
+        "must end in .csv",
     ),
     "no such spec": (
         ["train", "fusd", "good.parquet", "o.onnx"],
@@ -95,7 +95,7 @@ OTHERS = {
     ),
     "out into nowhere": (
         ["simulate", "model.toml", "--slip", "0.1", "--load", "9", "--out", "no/o.csv"],
-        "no folder",
+        "does not exist",
     ),
     "unknown parameter": (["identify", "model.toml", "runs.csv", "--free", "phi"], "phi"),
     "unknown method": (["identify", "model.toml", "runs.csv", "--method", "best"], "best"),
@@ -103,10 +103,10 @@ OTHERS = {
     "where without value": (["identify", "model.toml", "runs.csv", "--where", "run"], "COLUMN="),
     "truncated data": (["train", "spec.toml", "cut.parquet", "o.onnx"], "not a whole Parquet"),
     "data that is no data": (["train", "spec.toml", "runs.csv", "o.onnx"], "cohesion_Pa"),
-    "out that is no ONNX": (["train", "spec.toml", "good.parquet", "o.pkl"], "name it ....onnx"),
+    "out that is no ONNX": (["train", "spec.toml", "good.parquet", "o.pkl"], "must end in .onnx"),
     "recipe that is none": (["generate", "model.toml", "o.parquet"], "is missing"),
     "rows of nothing": (["generate", "recipe.toml", "o.parquet", "--rows", "0"], "rows is 0"),
-    "out that is no Parquet": (["generate", "recipe.toml", "o.csv"], "name it ....parquet"),
+    "out that is no Parquet": (["generate", "recipe.toml", "o.csv"], "must end in .parquet"),
     "model that is text": (["estimate", "runs.csv", "runs.csv"], "not a whole ONNX model"),
     "truncated model": (["estimate", "cut.onnx", "runs.csv", "--out", "o.csv"], "cut.onnx"),
     "by no column": (["estimate", "good.onnx", "runs.csv", "--by", "soil"], "column soil"),
@@ -132,7 +132,7 @@ def test_other_faults(folder, capsys, monkeypatch, what):
 def test_a_table_without_any_reading_that_the_model_needs_is_refused(folder, capsys, monkeypatch):
     (folder / "blank.csv").write_text(RUNS.replace("3.0", "").replace("1.5", ""))
     command = ["estimate", "good.onnx", "blank.csv", "--out", "o.csv"]
-    refused(folder, command, capsys, monkeypatch, "no row has all that this model reads")
+    refused(folder, command, capsys, monkeypatch, "no row has all readings that the model needs")
 
 
 def test_a_log_of_another_wheel_is_refused(folder, capsys, monkeypatch):

@@ -140,15 +140,18 @@ OTHERS = {
         ["gap", "model.toml", "runs.csv", "--out", "file"],
         "is a file; needed is a folder",
     ),
-    "folder in a file": (["gap", "model.toml", "runs.csv", "--out", "file/out"], "cannot be made"),
+    "folder in a file": (
+        ["gap", "model.toml", "runs.csv", "--out", "file/out"],
+        "cannot be created",
+    ),
     "file that is a folder": (["gap", "model.toml", "runs.csv", "--out", "taken"], "gap.json"),
     "over the model": (
         ["gap", "same/model.toml", "runs.csv", "--out", "same"],
-        "same/model.toml is read and would be written over",
+        "same/model.toml is an input and would be overwritten",
     ),
     "over the runs": (
         ["gap", "model.toml", "same/next_runs.csv", "--out", "same"],
-        "same/next_runs.csv is read and would be written over",
+        "same/next_runs.csv is an input and would be overwritten",
     ),
     "no folder": (["gap", "model.toml", "runs.csv"], "--out"),
     "no model": (["gap", "none.toml", "runs.csv", "--out", "out"], "no such file"),
@@ -165,9 +168,12 @@ OTHERS = {
     "audit of no design": (["audit", "model.toml", "none.csv"], "no such file"),
     "audit into a table": (
         ["audit", "model.toml", "runs.csv", "--out", "a.csv"],
-        "name it ....json",
+        "must end in .json",
     ),
-    "audit into nowhere": (["audit", "model.toml", "runs.csv", "--out", "no/a.json"], "no folder"),
+    "audit into nowhere": (
+        ["audit", "model.toml", "runs.csv", "--out", "no/a.json"],
+        "does not exist",
+    ),
     "audit of no parameter": (["audit", "model.toml", "runs.csv", "--free", "phi"], "phi"),
     "audit without its covariate": (
         ["audit", "rate.toml", "runs.csv"],

@@ -38,7 +38,7 @@ def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(fo
     content = json.loads((folder / "o.json").read_text())
     assert set(content["runs"]) == {"a", "c"} and set(content["failed"]) == {"b"}
     assert content["runs"]["c"]["rows_used"] == 1
-    assert "run b has no answer" in capsys.readouterr().err
+    assert "run b has no result" in capsys.readouterr().err
     (folder / "none.csv").write_text("run,slip,load_N,torque_Nm\nx,0.1,60,\ny,0.1,60,\n")
     assert main(["identify", "model.toml", "none.csv", "--by", "run", "--out", "n.json"]) == 2
     error = capsys.readouterr().err

@@ -51,10 +51,12 @@ def test_no_command_writes_over_what_it_reads(folder, capsys, small_model, small
         ["train", "spec.toml", "o.md", "o.onnx"],
         ["compare", "model.toml", "compare.csv", model, "--out", "."],
     ):
-        refused(command, capsys, "is read and would be written over")
-    refused(["identify", "model.toml", "runs.csv", "--out", "model.toml"], capsys, "....json")
-    refused(["generate", "recipe.toml", "recipe.toml"], capsys, "....parquet")
-    refused(["compare", "model.toml", data, model, "--out", "m.csv"], capsys, "cannot be made")
+        refused(command, capsys, "is an input and would be overwritten")
+    refused(
+        ["identify", "model.toml", "runs.csv", "--out", "model.toml"], capsys, "must end in .json"
+    )
+    refused(["generate", "recipe.toml", "recipe.toml"], capsys, "must end in .parquet")
+    refused(["compare", "model.toml", data, model, "--out", "m.csv"], capsys, "cannot be created")
     assert {p: p.read_bytes() for p in folder.iterdir()} == before
 
 
@@ -66,7 +68,7 @@ def test_a_target_in_the_way_is_found_before_any_work_and_nothing_is_replaced(
     refused(["train", "spec.toml", str(small_data), "o.onnx"], capsys, "o.png is a folder")
     assert (folder / "o.onnx").read_text() == "good"
     os.mkfifo(folder / "o.csv")
-    refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv is no file but a device, pipe")
+    refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv is a device, pipe")
 
 
 def run_soilml(folder, *words, **options):
@@ -172,3 +174,30 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
     assert main(command) == 0
     one = capsys.readouterr().out.splitlines()[1].split(",")
     assert float(fused[5]) == pytest.approx(float(one[5]), rel=1e-4)
+
+
+def test_only_arguments_that_are_files_count_as_inputs(folder, capsys):
+    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0
+    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0  # overwrites it, as asked
+    assert (folder / "o.csv").read_text().splitlines()[1].startswith("o.csv,0.1,60")
+    capsys.readouterr()
+    (folder / "effects.csv").write_text("")
+    command = [*SIMULATE, "--effects", "effects.csv", "--out", "effects.csv"]
+    refused(command, capsys, "is an input and would be overwritten")
+
+
+def test_every_argument_that_names_an_input_file_is_declared_as_one():
+    import argparse
+
+    from soilml.cli.main import parser
+    from soilml.cli.options import InputFile
+
+    (commands,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    outputs = {"out", "picture", "limit"}
+    for name, command in commands.choices.items():
+        for action in command._actions:
+            is_file = "." in str(action.metavar) or action.dest == "files"
+            if "..." in str(action.metavar):
+                continue
+            expected = is_file and action.dest not in outputs
+            assert (action.type is InputFile) == expected, f"{name} {action.dest}"

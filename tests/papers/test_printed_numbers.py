@@ -46,7 +46,7 @@ def test_an_input_that_is_kept_counts_as_no_result():
 
 
 def test_a_person_sees_what_is_computed_and_the_rest_by_reason(monkeypatch, capsys):
-    monkeypatch.setattr("soilml.cli.commands.papers.watched", lambda: True)
+    monkeypatch.setattr("soilml.cli.commands.papers.is_terminal", lambda: True)
     assert main(["papers", "nagatani2009"]) == 0
     short = capsys.readouterr()
     assert main(["papers", "nagatani2009", "--all"]) == 0
@@ -57,4 +57,4 @@ def test_a_person_sees_what_is_computed_and_the_rest_by_reason(monkeypatch, caps
     assert all(f"{row.what} ({row.source})" in short.out for row in computed)
     kept, rest = sum(row.given for row in rows), sum(row.compute is None for row in rows)
     assert f"{kept} given, kept as printed: wheel radius, " in short.out
-    assert f"{kept} inputs kept as printed; {rest} that nothing computes" in short.err
+    assert f"{kept} inputs kept as printed; {rest} not computed" in short.err

@@ -176,7 +176,7 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     assert std[0] < std[1] < std[2]
     assert found[4][4:8] == ["", "", "", ""]
     for extra, said in (
-        (["--by", "run"], "leave out --by"),
+        (["--by", "run"], "omit --by"),
         (["--rule", "best-linear"], "rule is 'best-linear'"),
     ):
         assert main([*command, *extra]) == 2

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from soilml.io.parquet import read_parquet
 from soilml.quantities import column
 from training.benchmark.posterior_summary import FRACTIONS, PosteriorSummary
@@ -105,7 +105,7 @@ def save_limit(
     columns = dict(zip(KEY_COLUMNS, keys, strict=True))
     for name, values in _to_columns(sets[0].names, summaries).items():
         columns[name] = pa.array(np.asarray(values, np.float32))
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         pq.write_table(pa.table(columns), part, compression="zstd", write_page_checksum=True)
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.method_kind import MethodKind
 from training.benchmark.paired_results import PairedResult
@@ -61,7 +61,7 @@ def plot_benchmark(results: Sequence[PairedResult], path: str | os.PathLike[str]
         a.set_xlabel("rows per set (18: 6 slips x 3 loads)")
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=100, metadata={"Software": "soilml"})
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES, SHEAR
 from training.benchmark.acceptance import COHESION_RANGE, LARGEST_SET, Goal, goals
 from training.benchmark.paired_results import PairedResult
@@ -82,7 +82,7 @@ def format_goals(found: Sequence[Goal]) -> str:
         [g.criterion, g.method, g.measured, g.standard_error, g.limit, "met" if g.met else "MISSED"]
         for g in found
     ]
-    return aligned(header, rows, text_columns=len(header))
+    return format_table(header, rows, text_columns=len(header))
 
 
 def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
@@ -112,7 +112,7 @@ def _full_table(same: Sequence[PairedResult]) -> str:
         row += [format_number(r.joint_coverage90, ".0%"), format_number(r.log_score, ".3g")]
         row += [str(r.failed or ""), f"{r.flagged_fraction:.1%}" if r.flagged_fraction else ""]
         rows.append([*row, format_number(1e3 * r.estimates.seconds, ".2g")])
-    return aligned(header, rows)
+    return format_table(header, rows)
 
 
 def _short_table(same: Sequence[PairedResult]) -> str:
@@ -129,7 +129,7 @@ def _short_table(same: Sequence[PairedResult]) -> str:
             ]
         row += [format_number(r.joint_coverage90, ".0%"), str(r.failed or "")]
         rows.append([*row, f"{r.flagged_fraction:.0%}"])
-    return aligned([*header, "joint", "failed", "flagged"], rows)
+    return format_table([*header, "joint", "failed", "flagged"], rows)
 
 
 LEGEND = """\

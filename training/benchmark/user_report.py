@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from soilml.io.atomic_files import replacing
-from soilml.io.text_tables import aligned
+from soilml.io.atomic_files import atomic_output
+from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.method_kind import MethodKind
@@ -49,7 +49,7 @@ def format_tables(scores: Sequence[MethodScore], names: Sequence[str]) -> str:
     for size in sorted({score.rows for score in scores}):
         rows = [_cells(score, names) for score in scores if score.rows == size]
         title = "single readings" if size == 1 else f"{size} readings of one soil"
-        blocks.append(f"{title}\n\n{aligned(header, rows, text_columns=2)}")
+        blocks.append(f"{title}\n\n{format_table(header, rows, text_columns=2)}")
     return "\n\n".join(blocks)
 
 
@@ -99,7 +99,7 @@ def plot_comparison(
     axes[0][0].set_ylabel("RMSE / prior standard deviation")
     axes[1][0].set_ylabel("coverage of 90 % interval")
     axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 

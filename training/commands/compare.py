@@ -7,8 +7,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from soilml.cli.options import InputFile
 from soilml.errors import InputError
-from soilml.io.atomic_files import made_folder, named, replacing_all
+from soilml.io.atomic_files import atomic_outputs, create_folder, output_files
 from soilml.optional_imports import need
 
 #: Outputs of a comparison on the user's test data, and of the benchmark.
@@ -20,27 +21,29 @@ RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
 HELP = "score model files and analytic identification on sets of known soil"
 DESCRIPTION = """\
-Score model files, analytic identification and the prior on sets of readings whose soil is known:
-RMSE, coverage of 50 and 90 % intervals, failures, and time per estimate.
+Score model files, analytic identification and the prior on sets of readings
+whose soil is known: RMSE, coverage of 50 and 90 % intervals, failures, and
+time per estimate.
 
 1. On the fixed benchmark
 
      soilml compare
      soilml compare mine.onnx other.onnx --sets 50 --out comparison
 
-   Sets of 1 to 18 rows at one load and at three, simulated from the packaged recipe `benchmark`.
-   RMSE is also given relative to the Bayes limit: the exact posterior mean of the same sets, which
-   no estimator can beat on average. Without a model file, the released files are scored (in a clone
-   of the repository). Writes benchmark.md, benchmark.csv and benchmark.png.
+   Sets of 1 to 18 rows at one load and at three loads, simulated from the
+   packaged recipe `benchmark`. RMSE is also given relative to the Bayes limit:
+   the exact posterior mean of the same sets, which no estimator can beat on
+   average. Without a model file, the released files are scored (in a clone of
+   the repository). Writes benchmark.md, benchmark.csv and benchmark.png.
 
-2. On your own test data
+2. On test data of your own
 
-     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out comparison
+     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out DIR
 
-   TEST.parquet comes from `soilml generate`, with a seed that no model was trained on. Its runs are
-   the sets; single rows are scored too. MODEL.toml gives the analytic methods their wheel, soil,
-   priors and noise; its wheel, soil, effects and priors must be those of the test data. Writes
-   compare.md, compare.csv and compare.png.
+   TEST.parquet comes from `soilml generate`, with a seed that was not used in
+   training. Its runs are the sets; single rows are scored too. MODEL.toml
+   gives the analytic methods their wheel, soil, priors and noise, which must
+   equal those of the test data. Writes compare.md, compare.csv, compare.png.
 
 3. To recompute the Bayes limit of the benchmark (minutes, two processes)
 
@@ -52,34 +55,35 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "files",
+        type=InputFile,
         metavar="FILE",
         nargs="*",
-        help="MODEL.onnx ... (benchmark), or MODEL.toml TEST.parquet MODEL.onnx ... (test data); "
-        "default: the released files in exported/",
+        help="MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ... "
+        "(default: the released models)",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help=f"output folder; default of the benchmark: {FOLDER}"
+        "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
-        "--sets", type=_sets, metavar="N", help="benchmark: the first N sets of each design only"
+        "--sets", type=_sets, metavar="N", help="use only the first N sets of each size"
     )
     parser.add_argument(
         "--limit",
         metavar="FILE.parquet",
-        type=Path,  # an output: an existing file may be replaced
-        help="recompute the Bayes limit of the benchmark, write it here, and stop",
+        help="compute the Bayes limit of the benchmark and write it to this file, nothing else",
     )
     parser.add_argument(
         "--against",
+        type=InputFile,
         metavar="FILE.parquet",
-        help="benchmark: Bayes limit from a file of --limit; default: the packaged one",
+        help="Bayes limit to use, written by --limit (default: the packaged one)",
     )
     parser.add_argument(
         "--analytic-sets",
         type=_sets,
         metavar="N",
         default=120,
-        help="test data: sets of each size that the analytic methods are scored on; default: 120",
+        help="own data: number of sets of each size for the analytic methods (default: 120)",
     )
 
 
@@ -93,7 +97,7 @@ def _sets(text: str) -> int:
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder exists already."""
     if args.limit is not None:
-        return named(str(args.limit), ".parquet")
+        return output_files(args.limit, ".parquet")
     folder = Path(args.out or FOLDER)
     names = FILES if _has_test_data(args) else BENCHMARK
     return [folder / name for name in names] if folder.is_dir() else []
@@ -114,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_benchmark(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
-    from soilml.cli.progress import stages
+    from soilml.cli.progress import stage_progress
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.io.table import Table
     from soilml.io.text_tables import csv_text
@@ -132,10 +136,10 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     _check_labels(estimators, files)
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         print(note, file=sys.stderr)
-    with made_folder(args.out or FOLDER) as folder:
-        with stages() as progress:
+    with create_folder(args.out or FOLDER) as folder:
+        with stage_progress() as progress:
             results = benchmark(estimators, None, args.sets, args.against, progress)
-        with replacing_all([folder / name for name in BENCHMARK]) as (rows, picture, page):
+        with atomic_outputs([folder / name for name in BENCHMARK]) as (rows, picture, page):
             rows.write_text(csv_text(report.csv_columns(results)), encoding="utf-8")
             plot_benchmark(results, picture)
             page.write_text(report.benchmark_page(results), encoding="utf-8")
@@ -158,7 +162,7 @@ def _released_files() -> list[Path]:
 
 def _compute_limit(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
-    from soilml.cli.progress import stages
+    from soilml.cli.progress import stage_progress
     from soilml.quantities import SHEAR
     from training.benchmark.bayes_limit import benchmark_sets, compute_posteriors
     from training.benchmark.bayes_limit_file import save_limit
@@ -169,7 +173,7 @@ def _compute_limit(args: argparse.Namespace) -> int:
             "--limit given with other arguments; it allows --sets alone: omit the rest"
         )
     sets = benchmark_sets(read_recipe(RECIPE), SHEAR, args.sets)
-    with stages() as progress:
+    with stage_progress() as progress:
         summaries = list(compute_posteriors(sets, progress))
     save_limit(args.limit, sets, summaries)
     print(f"written: {args.limit}, the Bayes limit of {len(sets)} sets", file=sys.stderr)
@@ -182,7 +186,7 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
-    from soilml.cli.progress import stages
+    from soilml.cli.progress import stage_progress
     from soilml.config.case import read_case
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.io.read_table import read_table
@@ -202,10 +206,10 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
     names = next(iter(estimators.values())).names
     for note in check_same_provenance(case, table, estimators, names):
         print(note, file=sys.stderr)
-    with made_folder(args.out) as folder:
-        with stages() as progress:
+    with create_folder(args.out) as folder:
+        with stage_progress() as progress:
             scores = compare(case, table, estimators, progress, args.analytic_sets)
-        with replacing_all([folder / name for name in FILES]) as (rows, picture, page):
+        with atomic_outputs([folder / name for name in FILES]) as (rows, picture, page):
             rows.write_text(csv_text(report.csv_columns(scores, names)), encoding="utf-8")
             report.plot_comparison(scores, names, picture)
             text = report.comparison_page(scores, names, Path(test).name)

@@ -1,4 +1,4 @@
-"""`soilml train`: from training data to a model file for the onboard runtime."""
+"""`soilml train`: from data to a model file for on-board use."""
 
 from __future__ import annotations
 
@@ -6,36 +6,40 @@ import argparse
 import sys
 from pathlib import Path
 
+from soilml.cli.options import InputFile
 from soilml.errors import InputError
-from soilml.io.atomic_files import named, replacing_all
+from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.optional_imports import need
 
-HELP = "train an estimator and export it as one ONNX file"
+HELP = "train regressors on data and export one ONNX model file"
 DESCRIPTION = """\
-Fit the regressors of SPEC.toml to DATA.parquet, recalibrate their uncertainty on held-out rows, and
-export the estimator as one ONNX file for `soilml estimate` and the onboard runtime.
+Train the regressors of SPEC.toml on DATA.parquet, calibrate their uncertainty
+on held-out rows, and export the result as one ONNX file.
 
   soilml train spec.toml data.parquet wheel.onnx
-  soilml train fused data.parquet wheel.onnx     packaged specs: fused, lssvm, mlp, linear, slip ...
-  soilml train any_wheel any.onnx                one file for wheels of any size; takes no data
+  soilml train fused data.parquet wheel.onnx
+  soilml train any_wheel any.onnx        for wheels of any size; needs no data
 
-Writes OUT.onnx, its model card OUT.md, and its learning curves OUT.png. A spec contains
+Packaged specs: fused, lssvm, mlp, linear, slip, ... Next to OUT.onnx, the
+command writes the model card OUT.md and the learning curves OUT.png. A spec
+contains
 
-  features = ["slip", "torque/load", "load"]     # measured quantities, or ratios of them
-  targets = ["cohesion", "friction_angle", "shear_modulus"]  # varied by the recipe, or "slip"
-  rule = "best-linear"                           # fusion rule: or covariance-intersection,
-                                                 # inverse-variance, pairwise
+  features = ["slip", "torque/load", "load"]   # measured quantities or ratios
+  targets = ["cohesion", "friction_angle", "shear_modulus"]
+                                     # parameters in the recipe, or slip
+  rule = "best-linear"               # fusion rule: or covariance-intersection,
+                                     # inverse-variance, ...
   seed = 0
-  [[regressor]]                                  # one or more; several are fused
-  type = "fixed-size-lssvm"                      # centres, gamma, width (tuned where omitted)
-  centres = 150                                  # features = [...]: a subset of the spec's
+  [[regressor]]                      # one or more; several are fused
+  type = "fixed-size-lssvm"          # centres; gamma, width (tuned if absent)
+  centres = 150                      # features = [...]: a subset of the spec's
   [[regressor]]
-  type = "mlp"                                   # hidden = [64, 64], epochs, batch, patience, ...
+  type = "mlp"                       # hidden = [64, 64], epochs, batch, ...
   [[regressor]]
-  type = "linear"                                # or "lssvm": exact, for some thousand rows
-  [set_posterior]                                # optional: posterior of all readings of one soil,
-  designs = 4096                                 # by their exact joint likelihood under a learned
-  hidden = 64                                    # response of the wheel to slip, load and soil
+  type = "linear"                    # or "lssvm", exact, for few thousand rows
+  [set_posterior]                    # optional: pools all readings of a soil
+  designs = 4096                     # by their likelihood, with a learned
+  hidden = 64                        # response to slip, load and soil
   epochs = 500
 """
 
@@ -43,17 +47,24 @@ Writes OUT.onnx, its model card OUT.md, and its learning curves OUT.png. A spec 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "spec", metavar="SPEC.toml", help="training spec, or the name of a packaged spec"
+        "spec",
+        type=InputFile,
+        metavar="SPEC.toml",
+        help="spec file, or the name of a packaged spec",
     )
     parser.add_argument(
-        "data", metavar="DATA.parquet", nargs="?", help="training data of `soilml generate`"
+        "data",
+        type=InputFile,
+        metavar="DATA.parquet",
+        nargs="?",
+        help="data written by soilml generate",
     )
     parser.add_argument("out", metavar="OUT.onnx", help="model file to write")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return named(args.out, ".onnx", ".md", ".png")
+    return output_files(args.out, ".onnx", ".md", ".png")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,14 +76,14 @@ def run(args: argparse.Namespace) -> int:
         return _any_wheel(args)
     if args.data is None:
         raise InputError(
-            f"DATA.parquet is missing; {args.spec} is trained on data: make them by soilml generate"
+            f"DATA.parquet is missing; {args.spec} is trained on data of soilml generate"
         )
     return _from_data(args)
 
 
 def _any_wheel(args: argparse.Namespace) -> int:
     """Train the estimator for wheels of any size."""
-    from soilml.cli.progress import stages
+    from soilml.cli.progress import stage_progress
     from training.export.any_wheel_file import card, export, read_any_spec, trained
 
     if args.data is not None:
@@ -80,9 +91,9 @@ def _any_wheel(args: argparse.Namespace) -> int:
             f"{args.data} given, but {args.spec} simulates its own rows; leave the data out"
         )
     spec, out = read_any_spec(args.spec), Path(args.out)
-    with stages() as progress:
+    with stage_progress() as progress:
         posterior, figures = trained(spec, progress)
-        with replacing_all(outputs(args)[:2]) as (model, page):
+        with atomic_outputs(outputs(args)[:2]) as (model, page):
             metadata = export(spec, posterior, figures, model)
             page.write_text(card(metadata, posterior, figures), encoding="utf-8")
     size = out.stat().st_size / 1e3
@@ -92,8 +103,8 @@ def _any_wheel(args: argparse.Namespace) -> int:
 
 def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
-    from soilml.cli.progress import stages
-    from soilml.io.text_tables import aligned
+    from soilml.cli.progress import stage_progress
+    from soilml.io.text_tables import format_table
     from training.data.dataset import read_dataset
     from training.export.learning_curves import draw_curves
     from training.export.model_card import card
@@ -104,10 +115,10 @@ def _from_data(args: argparse.Namespace) -> int:
     out = Path(args.out)
     spec = read_spec(args.spec)
     data = read_dataset(args.data, spec.features, spec.targets)
-    with stages() as progress:
+    with stage_progress() as progress:
         trained = train(spec, data, progress)
         progress("exporting", 0, 2)
-        with replacing_all(outputs(args)) as (model, page, picture):
+        with atomic_outputs(outputs(args)) as (model, page, picture):
             metadata = export(trained, model, args.data)
             progress("exporting", 1, 2)
             draw_curves(trained, picture)
@@ -120,7 +131,7 @@ def _from_data(args: argparse.Namespace) -> int:
     labels = [name.replace("_", " ") for name in spec.targets]
     head = ("", *[f"RMSE/prior std, {n}" for n in labels], *[f"90 % coverage, {n}" for n in labels])
     print(f"On {trained.scores['estimator'].rows} held-out rows:\n", file=sys.stderr)
-    print(aligned(head, rows), file=sys.stderr)
+    print(format_table(head, rows), file=sys.stderr)
     print(
         f"\nwritten: {out} ({out.stat().st_size / 1e3:.0f} kB; largest difference of the float32 "
         f"file {metadata['parity']} prior standard deviations), "

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from datagen.recipe import located
+from datagen.recipe import packaged_file
 from soilml import __version__
 from soilml.config.measurement_noise import take_noise
 from soilml.io.toml_settings import read_settings
@@ -54,12 +54,12 @@ class AnySpec:
 
 def is_for_any_wheel(path: str | os.PathLike[str]) -> bool:
     """Whether a spec has [any_wheel]."""
-    return "any_wheel" in read_settings(located(path, "training", "specs"))
+    return "any_wheel" in read_settings(packaged_file(path, "training", "specs"))
 
 
 def read_any_spec(path: str | os.PathLike[str]) -> AnySpec:
     """The spec in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
-    settings = read_settings(located(path, "training", "specs"))
+    settings = read_settings(packaged_file(path, "training", "specs"))
     text = json.dumps(settings.content, sort_keys=True)
     seed = int(settings.take("seed", int, "a whole number, 0 or more", 0))
     family = DimensionlessFamily.take(settings.table("any_wheel"))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from sklearn.base import clone
 
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from training.regressors.feature_subset import FeatureSubset
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
@@ -35,7 +35,7 @@ def draw_curves(trained: Trained, path: str | os.PathLike[str]) -> None:
             _epochs(axis, reader)
         else:
             _search(axis, reader)
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from datagen.recipe import recipe_of
+from datagen.recipe import parse_recipe
 from soilml import __version__
 from soilml.errors import SoilmlError
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 from soilml.onboard.features import READABLE, computed, inputs_of, parts
 from soilml.onboard.model_file import DRIVEN, FORMAT, KIND, behind, checksum
 from soilml.quantities import QUANTITIES, column
@@ -122,7 +122,7 @@ def write_model(model: Any, metadata: dict[str, str], path: str | os.PathLike[st
     graph = model.SerializeToString(deterministic=True)
     metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
     metadata["metadata_sha256"] = checksum(metadata)
-    with replacing(path) as part:
+    with atomic_output(path) as part:
         part.write_bytes(graph + behind(metadata))
 
 
@@ -216,7 +216,7 @@ def _metadata(trained: Trained, parity: float, data_path: str | os.PathLike[str]
 
 def _set(posterior: SetPosteriorGraph, recipe: str) -> dict[str, Any]:
     """What the board must know of the set posterior: noise that is taken for given."""
-    content = recipe_of(recipe, "recipe of the data")
+    content = parse_recipe(recipe, "recipe of the data")
     noise = {
         name: [content.case.noise[column(name)].constant, content.case.noise[column(name)].share]
         for name in CHANNELS

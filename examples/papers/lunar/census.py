@@ -20,7 +20,7 @@ from lunar.pull import band, everywhere
 from lunar.sweep import Floats, driven, noisy, soils, table, three_loads
 
 from soilml import Case, Estimator, Model, Wheel, identify
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.quantities import SHEAR
 
 SOILS, FITTED = 200, 25
@@ -55,15 +55,15 @@ def show_many(case: Case, estimator: Estimator, load: float, seed: int) -> None:
         f"\nEach reading alone, {SOILS} soils of the prior, {len(SLIPS)} slips each at {load:g} N."
     )
     print("Errors over the prior's spread, and truths inside the 90 % interval:\n")
-    print(aligned((DRIVEN, "in range", *PARAMETERS), estimates))
+    print(format_table((DRIVEN, "in range", *PARAMETERS), estimates))
     print(
         "\nDrawbar pull foretold, RMS error in N (truths inside the 90 % band); torque / r finds no"
     )
     print("soil, and takes off what the prior's soils lose in the mean:\n")
     header = (DRIVEN, "foretold at", "prior", "torque / r", "LS-SVM", f"LS-SVM, all {len(SLIPS)}")
-    print(aligned(header, pulls, text_columns=2))
+    print(format_table(header, pulls, text_columns=2))
     print(f"\nLeast squares of the simplified model, 6 slips x 3 loads, {FITTED} soils:\n")
-    print(aligned((DRIVEN, *PARAMETERS, "pull N"), fits))
+    print(format_table((DRIVEN, *PARAMETERS, "pull N"), fits))
 
 
 def show_limit(case: Case, estimator: Estimator, load: float, seed: int) -> None:
@@ -82,7 +82,7 @@ def show_limit(case: Case, estimator: Estimator, load: float, seed: int) -> None
         share = 1.0 - off / np.var(seen.soils, axis=0)
         lines.append((name, *_each(share, "{:.2f}"), f"{pull.error(seen.pull):.2f}"))
     print("\nVariance of the soils that one reading explains (R2), and RMS error of the pull:\n")
-    print(aligned(("", "c", "phi", "K", "pull N"), lines))
+    print(format_table(("", "c", "phi", "K", "pull N"), lines))
 
 
 def _pulls(

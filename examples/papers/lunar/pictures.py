@@ -11,7 +11,7 @@ from lunar.pull import spread
 from lunar.sweep import Floats
 
 from soilml import Estimate
-from soilml.io.atomic_files import replacing
+from soilml.io.atomic_files import atomic_output
 
 #: Factor from SI and unit by parameter, in order.
 SHOWN = ((1e-3, "kPa"), (57.29578, "deg"), (1e3, "mm"))
@@ -62,7 +62,7 @@ def draw_sweep(sweep: Sweep, out: Path) -> None:
     figure.suptitle(
         "A sweep of slip at 50 N: what each reading of slip, torque and load tells (90 %)"
     )
-    with replacing(out) as part:
+    with atomic_output(out) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 
@@ -158,7 +158,7 @@ def draw_told(told: list[Told], truth: Floats, prior: tuple[Floats, Floats], out
         "What readings of slip, torque and load can tell of lunar soil; the frame is the prior",
         fontsize=13,
     )
-    with replacing(out) as part:
+    with atomic_output(out) as part:
         figure.savefig(part, format="png", dpi=90, metadata={"Software": "soilml"})
 
 

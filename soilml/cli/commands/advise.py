@@ -10,11 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from soilml.cli.advice_text import covariates
-from soilml.cli.commands.identify import add_row_options, chosen_rows
-from soilml.cli.commands.simulate import numbers
-from soilml.cli.effects_option import add_effects_option, chosen_effects
-from soilml.cli.output import deliver
+from soilml.cli.advice_text import mean_covariates
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_row_options,
+    available_effects,
+    parse_names,
+    parse_numbers,
+    read_rows,
+)
+from soilml.cli.output import write_columns
 from soilml.config.case import read_case
 from soilml.errors import InputError
 from soilml.experiment_design import (
@@ -29,119 +35,140 @@ from soilml.experiment_design.candidate_rows import channel_words
 from soilml.experiment_design.messages import next_row_messages
 from soilml.identification.free_parameters import select_free
 from soilml.identification.observations import read_observations
-from soilml.io.atomic_files import named
+from soilml.io.atomic_files import output_files
 from soilml.io.read_table import RUNS
 from soilml.optional_imports import need
 
-#: Most rows that are planned ahead, and most slips times loads that are tried.
-MOST_AHEAD, MOST_POINTS = 5, 1000
+#: Largest number of rows planned in a sequence, and of operating points (slips times loads).
+MAX_COUNT, MAX_POINTS = 5, 1000
 
-HELP = "which row to drive next, and what it would leave open"
+HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
-Say what the rows of RUNS.csv leave open of each parameter with a prior in MODEL.toml, and which
-next row, at another slip or load or with another sensor, would narrow it most.
+Rank the operating points (slip, load) and sensors of a next measurement by how
+much they reduce the uncertainty of the parameters that have a prior in
+MODEL.toml.
 
   soilml advise MODEL.toml RUNS.csv
-  soilml advise MODEL.toml RUNS.csv --slips 0.1,0.3,0.5 --loads 30:120:4 --count 3
-  soilml advise MODEL.toml --loads 30:120:4 --picture map.png     before anything is measured
+  soilml advise MODEL.toml RUNS.csv --slips 0.1,0.3,0.5 --loads 30:120:4
+  soilml advise MODEL.toml --loads 30:120:4 --picture map.png
 
-Each candidate is judged by the width that it is expected to leave: its readings are simulated for
-soils that are still possible, and the exact posterior of each is averaged. <parameter>_left is that
-width over the prior's: 1 where nothing is known. Rows of the answer: the best in all, the best
-for each parameter, the best repetition of what was driven, then the best --count rows one after
-the other, whose widths are what is left after all of them. --all gives every candidate instead.
-Channels are those whose noise [noise] declares: torque, and torque with each other one. Without
---loads, loads from half to twice those driven are tried. Points where a twentieth of the soils that
-are still possible would not carry the wheel are left out. It believes the model, as the posterior
-does.
+For each candidate, readings are simulated for samples of the posterior (of the
+prior without RUNS.csv), and the standard deviation of the exact posterior is
+averaged over them. <parameter>_left is this expected standard deviation
+divided by that of the prior (1: nothing learned). The rows of the table are:
+the best candidate for all parameters together and for each parameter, the best
+repetition of a measured row, and the best sequence of --count rows, whose
+widths are those after all rows up to it. --all lists every candidate instead.
+
+Candidate channels are those whose noise is declared in [noise]: torque alone,
+and torque with each other channel. Without --loads, loads from half to twice
+the measured ones are tried. A point is excluded where a twentieth or more of
+the posterior samples does not carry the wheel. Model errors are not
+considered.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", metavar="MODEL.toml")
-    parser.add_argument("runs", metavar="RUNS.csv", nargs="?", help="rows measured so far")
-    parser.add_argument("--slips", metavar="A,B,...", help="slips that can be driven")
-    parser.add_argument("--loads", metavar="A,B,...", help="loads that can be driven, N")
-    parser.add_argument("--count", type=int, default=3, help="rows to plan ahead, 1 to 5")
-    parser.add_argument("--free", metavar="A,B,...", help="parameters to find")
-    parser.add_argument("--all", action="store_true", help="every candidate, the best first")
+    parser.add_argument(
+        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
+    )
+    parser.add_argument(
+        "runs",
+        type=InputFile,
+        metavar="RUNS.csv",
+        nargs="?",
+        help="rows measured so far, CSV or Parquet",
+    )
+    parser.add_argument(
+        "--slips", metavar="A,B,...", help="candidate slips: A,B,... or start:stop:count"
+    )
+    parser.add_argument("--loads", metavar="A,B,...", help="candidate loads in N")
+    parser.add_argument(
+        "--count",
+        type=int,
+        default=3,
+        help="number of rows in the planned sequence, 1 to 5 (default: 3)",
+    )
+    parser.add_argument(
+        "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
+    )
+    parser.add_argument("--all", action="store_true", help="list every candidate, best first")
     add_effects_option(parser)
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
-    parser.add_argument("--picture", metavar="FILE.png", type=Path, help="maps over slip and load")
+    parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
+    parser.add_argument(
+        "--picture", metavar="FILE.png", help="draw maps of the expected width over slip and load"
+    )
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    picture = None if args.picture is None else str(args.picture)
-    return [*named(args.out, ".csv"), *named(picture, ".png")]
+    return [*output_files(args.out, ".csv"), *output_files(args.picture, ".png")]
 
 
 def run(args: argparse.Namespace) -> int:
-    """Score all candidates and deliver the table."""
+    """Rate all candidates and write the table."""
     if args.picture is not None:
         need("matplotlib", "advise --picture")
-    if not 1 <= args.count <= MOST_AHEAD:
-        raise InputError(
-            f"--count is {args.count}; needed is a whole number from 1 to {MOST_AHEAD}"
-        )
+    if not 1 <= args.count <= MAX_COUNT:
+        raise InputError(f"--count is {args.count}; needed is a whole number from 1 to {MAX_COUNT}")
     if args.where is not None and args.runs is None:
-        raise InputError("--where chooses rows of RUNS.csv; give that too")
-    case = read_case(args.model, chosen_effects(args))
-    free = select_free(
-        case, None if args.free is None else [n.strip() for n in args.free.split(",")]
-    )
+        raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
+    case = read_case(args.model, available_effects(args))
+    free = select_free(case, parse_names(args.free))
     slips, loads = (
-        None if text is None else numbers(option, text).tolist()
+        None if text is None else parse_numbers(option, text).tolist()
         for option, text in (("--slips", args.slips), ("--loads", args.loads))
     )
     if args.runs is None:
-        ranges, at, belief = candidate_grid(slips, loads), None, None
+        ranges, at = candidate_grid(slips, loads), None
     else:
-        data = read_observations(case, chosen_rows(args, RUNS))
+        data = read_observations(case, read_rows(args, RUNS))
         ranges, at = candidate_grid(slips, loads, data.load), data.at
-    if len(ranges.slips) * len(ranges.loads) > MOST_POINTS:
+    if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(
-            f"{len(ranges.slips)} slips and {len(ranges.loads)} loads are too many to try; at most "
-            f"{MOST_POINTS} together"
+            f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
+            f"at most {MAX_POINTS} operating points are possible"
         )
-    belief = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
-    known = {} if at is None else covariates(at)
-    found = advise(case, belief, ranges, driven=at, count=args.count, covariates=known)
+    samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
+    known = {} if at is None else mean_covariates(at)
+    advice = advise(case, samples, ranges, driven=at, count=args.count, covariates=known)
     if args.picture is not None:
         from soilml.experiment_design.plot import save_maps
 
-        save_maps(args.picture, found, at)
+        save_maps(args.picture, advice, at)
     if args.all:
-        ranked = sorted(found.choices, key=lambda c: c.overall)
-        deliver(_columns(found, [("candidate", c) for c in ranked]), args.out)
+        ranked = sorted(advice.choices, key=lambda c: c.overall)
+        write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
     else:
-        deliver(_columns(found, _chosen(found)), args.out)
-    said = [] if at is None else [*next_row_messages(found), *data.notes]
-    if found.stuck:
-        said.append(
-            f"{found.stuck} of {len(ranges.slips) * len(ranges.loads)} points are left out: of the "
-            "soils that are still possible, a twentieth or more would not carry the wheel there"
+        write_columns(_columns(advice, _best_rows(advice)), args.out)
+    notes = [] if at is None else [*next_row_messages(advice), *data.notes]
+    if advice.stuck:
+        notes.append(
+            f"{advice.stuck} of {len(ranges.slips) * len(ranges.loads)} operating points are "
+            "excluded: a twentieth or more of the posterior samples does not carry the wheel there"
         )
-    print("\n".join(said), file=sys.stderr)
+    print("\n".join(notes), file=sys.stderr)
     return 0
 
 
-def _chosen(found: Advice) -> list[tuple[str, RatedRow]]:
-    """What the table shows of all choices: why, and which."""
-    rows = [("best in all", found.best())]
-    rows += [(f"best in all with {own[1]}", found.best(None, own)) for own in found.sets[1:]]
-    rows += [(f"best for {name}", found.best(name)) for name in found.names]
-    repeat = found.repeat()
+def _best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
+    """The rows of the table: reason and candidate."""
+    rows = [("best in all", advice.best())]
+    rows += [(f"best in all with {own[1]}", advice.best(None, own)) for own in advice.sets[1:]]
+    rows += [(f"best for {name}", advice.best(name)) for name in advice.names]
+    repeat = advice.repeat()
     if repeat is not None:
         rows.append(("best repeat", repeat))
-    if len(found.sequence) > 1:
-        rows += [(f"row {i} of {len(found.sequence)}", c) for i, c in enumerate(found.sequence, 1)]
+    if len(advice.sequence) > 1:
+        rows += [
+            (f"row {i} of {len(advice.sequence)}", c) for i, c in enumerate(advice.sequence, 1)
+        ]
     return rows
 
 
-def _columns(found: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
+def _columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
     """The table's columns."""
     choices = [choice for _, choice in rows]
     columns: dict[str, Any] = {
@@ -150,7 +177,7 @@ def _columns(found: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, A
         "slip": np.asarray([c.candidate.slip for c in choices]),
         "load_N": np.asarray([c.candidate.load for c in choices]),
     }
-    for i, name in enumerate(found.names):
+    for i, name in enumerate(advice.names):
         columns[f"{name}_left"] = np.asarray([c.left[i] for c in choices])
     columns["all_left"] = np.asarray([c.overall for c in choices])
     return columns

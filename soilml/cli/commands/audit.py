@@ -1,70 +1,83 @@
-"""`soilml audit`: what a rig and a design could tell."""
+"""`soilml audit`: effects that a rig and an experimental design could identify."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.effects_option import add_effects_option, chosen_effects
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_ignore_extra_option,
+    available_effects,
+    parse_names,
+)
+from soilml.cli.output import json_text
 from soilml.config.case import read_case
-from soilml.io.atomic_files import named, save_text
+from soilml.io.atomic_files import output_files, save_text
 from soilml.io.read_table import read_table
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 
 if TYPE_CHECKING:
     from soilml.gap import Audit
 
-HELP = "what these runs could name, before they are driven"
+HELP = "missing effects that planned runs could identify"
 DESCRIPTION = """\
-Say which missing effects the runs of DESIGN.csv could name with the sensors of MODEL.toml, which
-they could not, and which run to add. Nothing measured is needed.
+Determine which missing effects the planned runs of DESIGN.csv could identify
+with the sensors of MODEL.toml, which they could not, and which run to add. No
+measurement is needed.
 
   soilml audit MODEL.toml DESIGN.csv
   soilml audit MODEL.toml DESIGN.csv --out audit.json
 
-DESIGN.csv: run, slip, load_N, and speed_m_s, pass, slip_angle_rad where they are set. Channels are
-those whose noise [noise] declares. `left` is the signal of an effect of its reference size, in
-sigma, that the free soil parameters cannot absorb; `apart` what is left of it against its nearest
-rival: an effect is nameable from about 3. `detectable` is the smallest size that is noticed in four
-of five data sets.
+DESIGN.csv has the columns run, slip, load_N, and speed_m_s, pass,
+slip_angle_rad where they are set. Channels are those whose noise is declared
+in [noise].
+
+In the table, `left` is the signal of an effect of its reference size in
+standard deviations of the noise (sigma) after the free soil parameters have
+absorbed what they can, and `apart` is the part of it that its most similar
+rival cannot explain: an effect can be named from about 3. `detectable` is the
+smallest size that is noticed in four of five data sets.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", metavar="MODEL.toml")
-    parser.add_argument("design", metavar="DESIGN.csv", help="planned rows, CSV or Parquet")
-    parser.add_argument("--free", metavar="A,B,...", help="soil parameters that may differ")
-    parser.add_argument("--out", metavar="FILE.json", help="where to write the audit")
-    parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
+    parser.add_argument("model", type=InputFile, metavar="MODEL.toml", help="gear, soil and noise")
+    parser.add_argument(
+        "design", type=InputFile, metavar="DESIGN.csv", help="planned rows, CSV or Parquet"
+    )
+    parser.add_argument(
+        "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
+    )
+    parser.add_argument("--out", metavar="FILE.json", help="write the audit to this file")
+    add_ignore_extra_option(parser)
     add_effects_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return named(args.out, ".json")
+    return output_files(args.out, ".json")
 
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
     from soilml.gap import audit
 
-    effects = chosen_effects(args)
+    effects = available_effects(args)
     case = read_case(args.model, effects)
     design = read_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
-    free = None if args.free is None else [name.strip() for name in args.free.split(",")]
-    found = audit(case, design, free=free, effects=effects)
+    found = audit(case, design, free=parse_names(args.free), effects=effects)
     if args.out is not None:
-        content = json.loads(json.dumps(found.as_json()).replace("Infinity", "null"))
-        save_text(args.out, json.dumps(content, indent=2) + "\n")
-    print(_for_people(found))
+        save_text(args.out, json_text(found.as_json()))
+    print(_text(found))
     return 0
 
 
-def _for_people(found: Audit) -> str:
+def _text(found: Audit) -> str:
     rows = [
         (
             e.name,
@@ -79,10 +92,10 @@ def _for_people(found: Audit) -> str:
         for e in found.effects
     ]
     header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rivals")
-    parts = [aligned(header, rows, text_columns=2, last_left=True)]
+    parts = [format_table(header, rows, text_columns=2, last_left=True)]
     if found.classes:
         parts.append(
-            "at its reference size, the weaker of these looks like another of them:\n"
+            "these effects cannot be distinguished at their reference sizes:\n"
             + "\n".join("  " + ", ".join(c) for c in found.classes)
         )
     if found.untestable:
@@ -91,6 +104,6 @@ def _for_people(found: Audit) -> str:
     gaining = [entry for entry in found.additions if entry[3]]
     lines = [f"  {kind} ({text}): {', '.join(gained)}" for kind, text, _, gained in gaining[:5]]
     parts.append(
-        "runs to add, and what they would make nameable:\n" + ("\n".join(lines) or "  none")
+        "runs to add, and the effects that could then be named:\n" + ("\n".join(lines) or "  none")
     )
     return "\n\n".join(parts)

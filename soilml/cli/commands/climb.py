@@ -1,72 +1,93 @@
-"""`soilml climb`: what a rover can climb on ground that it has only begun to drive."""
+"""`soilml climb`: the slope that a rover can climb, from its first climbs of gentle slopes."""
 
 from __future__ import annotations
 
 import argparse
-import json
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.output import put, watched
+from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, check_seed
+from soilml.cli.output import is_terminal, json_text, write_stdout
 from soilml.errors import InputError
-from soilml.io.atomic_files import made_folder, named, replacing_all, save_text
-from soilml.io.text_tables import aligned, csv_text
+from soilml.io.atomic_files import atomic_outputs, create_folder, output_files, save_text
+from soilml.io.text_tables import csv_text, format_table
 
 if TYPE_CHECKING:
     from soilml.systems.climbing.ability import Band
     from soilml.systems.climbing.files.report import ClimbingReport
 
-#: What a folder gets.
+#: Files that the output folder receives.
 FILES = ("climb.json", "curve.csv", "climbs.csv")
-#: Slips of the printed curve.
-SHOWN = 9
-#: Units for people: factor and name.
+#: Number of slips in the printed curve.
+PRINTED_SLIPS = 9
+#: Units of the printed tables: factor and name.
 _UNITS = {"rad": (180.0 / pi, "deg"), "m": (1e3, "mm")}
 
-HELP = "steepest slope a rover with force sensors in its wheels can climb"
+HELP = "the steepest slope a rover with force-sensor wheels can climb"
 DESCRIPTION = """\
-From climbs of gentle slopes and the stress on the rims of a front and a rear wheel: cohesion,
-friction angle and shear modulus of the ground, drawbar pull against slip, and the steepest slope.
+Identify cohesion, friction angle and shear modulus of the ground from climbs
+of gentle slopes and the measured stress on the rims of a front and a rear
+wheel; then predict drawbar pull against slip and the steepest slope that can
+be climbed.
 
   soilml climb ROVER.toml RUNS.csv --stress STRESS.csv
-  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv --slip-limit 0.3 --out DIR
+  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv --out DIR
 
-ROVER.toml: [rover] mass, radius, width (kg, m), and where known front_share of the weight and
-height_ratio of the centre of mass to the wheelbase; [soil] cohesion = 0.0 for what is given,
-[soil.prior] shear_modulus = [0.001, 0.05] for what is sought; [noise] speed_m_s = "0.9 %",
-slope_rad = 0.005, normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load. Of four wheels.
+ROVER.toml describes a rover with four wheels:
 
-RUNS.csv: run, wheel (front or rear), slope_rad, and slip or speed_m_s and rim_speed_m_s; one row
-for each wheel of each steady climb, each repetition a run. STRESS.csv: run, wheel, angle_rad,
-normal_Pa, a row for each sample; slip too where the run is no climb (artificial slip on the flat).
-Each slope brings one equation: three unknowns need three slopes. Bands hold nine tenths of what
-noise leaves possible.
+  [rover]       mass (kg), radius and width of a wheel (m); optionally
+                front_share, the share of the weight on the front wheels, and
+                height_ratio, height of the centre of mass over wheelbase
+  [soil]        known parameters, such as cohesion = 0.0 (Pa)
+  [soil.prior]  ranges of the others, such as shear_modulus = [0.001, 0.05] (m)
+  [noise]       such as speed_m_s = "0.9 %", slope_rad = 0.005,
+                normal_Pa = "5 %", entry_angle_rad, speed_scale, front_load
+
+RUNS.csv has a row for each wheel of each steady climb, a repetition being a
+run of its own: run, wheel (front or rear), slope_rad, and either slip or
+speed_m_s and rim_speed_m_s. STRESS.csv has a row for each sample: run, wheel,
+angle_rad, normal_Pa, and slip where the run is no climb (imposed slip on level
+ground).
+
+Each slope gives one equation, so three unknowns need three slopes. The bands
+are 90 % intervals. DIR receives climb.json, curve.csv and climbs.csv.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("rover", metavar="ROVER.toml")
-    parser.add_argument("runs", metavar="RUNS.csv", help="climbs, CSV or Parquet")
-    parser.add_argument("--stress", metavar="STRESS.csv", required=True, help="stress on the rims")
+    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover, soil and noise")
+    parser.add_argument("runs", type=InputFile, metavar="RUNS.csv", help="climbs, CSV or Parquet")
     parser.add_argument(
-        "--slip-limit", type=float, metavar="S", help="steepest slope at slips up to this, too"
+        "--stress",
+        type=InputFile,
+        metavar="STRESS.csv",
+        required=True,
+        help="stress on the rims, CSV or Parquet",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of all draws; 0 by default")
-    parser.add_argument("--ignore-extra", action="store_true", help="pass over unknown columns")
-    parser.add_argument("--out", metavar="DIR", help="folder for three files, or FILE.json")
+    parser.add_argument(
+        "--slip-limit",
+        type=float,
+        metavar="S",
+        help="give the steepest slope at slips up to S as well",
+    )
+    add_seed_option(parser)
+    add_ignore_extra_option(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for three files, or FILE.json alone")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes, where their folder is there already."""
+    """The files that the command writes, where their folder exists already."""
     if args.out is None or args.out.lower().endswith(".json"):
-        return named(args.out, ".json")
+        return output_files(args.out, ".json")
     if not args.out:
-        raise InputError("--out is empty; needed is a folder, or a name ...json")
+        raise InputError("--out is empty; needed is a folder, or a file name ending in .json")
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {args.out} is a file; needed is a folder, or a name ...json")
+        raise InputError(
+            f"--out {args.out} is a file; needed is a folder, or a file name ending in .json"
+        )
     return [folder / name for name in FILES] if folder.is_dir() else []
 
 
@@ -76,28 +97,27 @@ def run(args: argparse.Namespace) -> int:
     from soilml.systems.climbing.files.report import climbing_report
     from soilml.systems.climbing.files.rover_file import read_rover
 
-    if args.seed < 0:
-        raise InputError(f"--seed is {args.seed}; needed is a whole number, 0 or more")
+    check_seed(args)
     if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
         raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip from 0 to 1")
     file = read_rover(args.rover)
     data = read_climb_data(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
     report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
-    text = json.dumps(report.as_json(), indent=2, allow_nan=False) + "\n"
-    if args.out is None and not watched():
-        put(text)
+    text = json_text(report.as_json())
+    if args.out is None and not is_terminal():
+        write_stdout(text)
         return 0
     if args.out is not None and args.out.lower().endswith(".json"):
         save_text(args.out, text)
     elif args.out is not None:
         texts = (text, csv_text(_curve(report)), csv_text(_runs(report)))
         with (
-            made_folder(args.out) as folder,
-            replacing_all([folder / name for name in FILES]) as parts,
+            create_folder(args.out) as folder,
+            atomic_outputs([folder / name for name in FILES]) as parts,
         ):
             for part, content in zip(parts, texts, strict=True):
                 part.write_text(content, encoding="utf-8")
-    print(_for_people(report))
+    print(_text(report))
     return 0
 
 
@@ -131,26 +151,29 @@ def _runs(report: ClimbingReport) -> dict[str, Any]:
     }
 
 
-def _for_people(report: ClimbingReport) -> str:
+def _text(report: ClimbingReport) -> str:
     from soilml.systems.climbing.ability import band
 
     fit, ability = report.ground.fit, report.ability
     best, where = band(ability.steepest), band(ability.steepest_slip)
     found = [
-        f"steepest slope {_of_band(best, _UNITS['rad'][0], '.1f')} deg, at slip "
-        f"{_of_band(where, 1.0, '.2f')}"
+        f"steepest slope {_band_text(best, _UNITS['rad'][0], '.1f')} deg, at slip "
+        f"{_band_text(where, 1.0, '.2f')}"
     ]
     if report.slip_limit is not None:
         within = band(ability.steepest_within(report.slip_limit))
-        text = _of_band(within, _UNITS["rad"][0], ".1f")
+        text = _band_text(within, _UNITS["rad"][0], ".1f")
         found.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
     climbs, slopes = fit.rows_used, report.ground.distinct_slopes
     parts = [
         f"{climbs} climb{'s'[: climbs > 1]} on {slopes} slope{'s'[: slopes > 1]}",
-        aligned(("parameter", "value", "std", "unit", "left of range"), _parameters(report)),
-        aligned(
+        format_table(("parameter", "value", "std", "unit", "left of range"), _parameters(report)),
+        format_table(
             ("slip", "pull_N", "p05", "p95", "slope_deg", "p05", "p95"),
-            [_point(report, i * (len(ability.slip) - 1) // (SHOWN - 1)) for i in range(SHOWN)],
+            [
+                _point(report, i * (len(ability.slip) - 1) // (PRINTED_SLIPS - 1))
+                for i in range(PRINTED_SLIPS)
+            ],
             text_columns=0,
         ),
         "\n".join(found),
@@ -185,6 +208,6 @@ def _point(report: ClimbingReport, i: int) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _of_band(found: Band, factor: float, form: str) -> str:
+def _band_text(found: Band, factor: float, form: str) -> str:
     low, middle, high = (factor * float(v) for v in (found.lower, found.middle, found.upper))
     return f"{middle:{form}} ({low:{form}} to {high:{form}})"

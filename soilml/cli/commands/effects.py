@@ -4,36 +4,37 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.effects_option import add_effects_option, chosen_effects
+from soilml.cli.options import add_effects_option, available_effects
 from soilml.errors import InputError
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.effects.base import STAGES
 from soilml.physics.operating_point import COVARIATES
 
-HELP = "list the effects that a model can be given, or show one"
+HELP = "list the effects that a model can include, or show one"
 DESCRIPTION = """\
 List the effects that [[effect]] in a model file may name.
 
-  soilml effects                 all, a line each
-  soilml effects slip-sinkage    one: parameters, units, bounds, equation, source
+  soilml effects                 all effects, one line each
+  soilml effects slip-sinkage    one effect: parameters, units, bounds,
+                                 equation, source
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("name", nargs="?", help="one effect")
+    parser.add_argument("name", nargs="?", help="name of the effect to show")
     add_effects_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
-    effects = chosen_effects(args)
+    effects = available_effects(args)
     if args.name is None:
         listed = [
             (name, cls.about.kind, cls.about.size, cls.about.text) for name, cls in effects.items()
         ]
-        print(aligned(("effect", "of the", "size", "what it is"), listed, text_columns=4))
+        print(format_table(("effect", "of the", "size", "what it is"), listed, text_columns=4))
         return 0
     if args.name not in effects:
         raise InputError(f"no effect {args.name!r}; there are: {', '.join(effects)}")
@@ -48,8 +49,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
     if about.needs:
         print(f"needs: {', '.join(COVARIATES[field] for field in about.needs)}")
-    print(f"told from others by: {about.isolate}\nsource: {about.source}\n")
-    print(aligned(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
+    print(f"distinguished from others by: {about.isolate}\nsource: {about.source}\n")
+    print(format_table(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
     print(
         f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"
     )

@@ -1,4 +1,4 @@
-"""`soilml estimate`: a trained model on measured rows, as on board."""
+"""`soilml estimate`: a trained model applied to measured rows, as on board."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.cli.advice_text import after_estimate, typical, vaguest
-from soilml.cli.commands.identify import add_row_options, chosen_rows
-from soilml.cli.joint_readings import channels_said, joint_readings, row_readings
-from soilml.cli.output import deliver
+from soilml.cli.advice_text import advice_after_estimate, median_row, widest_row
+from soilml.cli.joint_readings import channel_note, joint_readings, row_readings
+from soilml.cli.options import InputFile, add_row_options, read_rows
+from soilml.cli.output import write_columns
 from soilml.cli.wheel_check import check_same_wheel, for_the_case
 from soilml.errors import InputError, TableError
 from soilml.experiment_design import is_identified
-from soilml.io.atomic_files import named
+from soilml.io.atomic_files import output_files
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
@@ -29,79 +29,103 @@ from soilml.onboard.multi_sensor import ACROSS_FILES, PRIOR_ONCE, fused_estimate
 from soilml.optional_imports import need
 from soilml.quantities import column
 
-HELP = "soil parameters or slip from measured rows, by a trained model file"
+HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
-Estimate soil parameters, or slip, with MODEL.onnx, just as the onboard runtime does.
+Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
+are those of the onboard runtime.
 
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
   soilml estimate exported/any_wheel.onnx RUNS.csv --case MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
-Each row gets a mean, a standard deviation and a 90 % interval (_p05, _p95) of every parameter, and
-in_range: 0 where the readings are unlike anything that the model was trained on; the answer is then
-the prior. One row brings one equation for three unknowns, so its estimate is mostly the prior; with
---by run, all rows of a run answer together, which can say far more, and sinkage_m, drawbar_pull_N
-and <column>_std take part where the table has them; rows that no soil explains together, or of
-which more than a tenth is out of range, give the prior. A row with a blank reading gets a blank
-estimate, and so does one whose status is not ok. --with fuses files that estimate the same from
-other sensors, row by row, and needs errors that are independent: files that read the same are
-refused but for --rule covariance-intersection. A file whose reading is blank, or out of range,
-takes no part, and `files` says how many did. Slip differs from row to row: no --by. What rows do
-not tell is said on standard error, with the next row that would. Needs numpy and onnxruntime alone.
+Each row of the table gives mean, standard deviation (_std) and 90 % interval
+(_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
+lie outside the training data; the estimate is then the prior.
+
+One row gives one equation for three unknowns, so the estimate of a single row
+is close to the prior. --by run pools all rows of a run, which is far more
+accurate; sinkage_m, drawbar_pull_N and <column>_std are used where the table
+has them. The estimate of a run is the prior where no soil explains all its
+rows or where more than a tenth of them is out of range. A row with a blank
+reading, or whose status is not ok, gets a blank estimate. Slip differs from
+row to row and has no --by.
+
+--with fuses, row by row, model files that estimate the same parameters from
+other sensors. Their errors must be independent: files that read the same
+sensors are refused, except with --rule covariance-intersection. A file takes
+no part in a row where its reading is blank or out of range; the column `files`
+counts those that do. Standard error reports which parameters are not
+determined, and the next measurement that would help. Only numpy and
+onnxruntime are needed.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", metavar="MODEL.onnx")
-    parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
-    parser.add_argument("--by", metavar="run", help="one estimate for each value of this column")
+    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="trained model file")
     parser.add_argument(
-        "--with", dest="others", metavar="OTHER.onnx", action="append", default=[], help="fuse with"
+        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
     )
-    parser.add_argument("--rule", help=f"how --with fuses: {', '.join(ACROSS_FILES)}")
-    parser.add_argument("--case", metavar="MODEL.toml", help="your wheel, for any_wheel.onnx")
+    parser.add_argument(
+        "--by", metavar="COLUMN", help="one estimate for each value of this column, such as run"
+    )
+    parser.add_argument(
+        "--with",
+        dest="others",
+        type=InputFile,
+        metavar="OTHER.onnx",
+        action="append",
+        default=[],
+        help="another model file to fuse with; can be repeated",
+    )
+    parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(ACROSS_FILES)}")
+    parser.add_argument(
+        "--case",
+        type=InputFile,
+        metavar="MODEL.toml",
+        help="your wheel, soil, priors and noise, for a model file for wheels of any size",
+    )
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.csv", help="where to write the estimates")
+    parser.add_argument("--out", metavar="FILE.csv", help="write the estimates to this file")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return named(args.out, ".csv")
+    return output_files(args.out, ".csv")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate and deliver the table."""
+    """Estimate and write the table."""
     need("onnxruntime", "estimate")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
-    _check_asked(args, estimators)
-    estimators[0], said_first = for_the_case(args, estimators[0])
+    _check_options(args, estimators)
+    estimators[0], case_notes = for_the_case(args, estimators[0])
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
-    table = chosen_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
+    table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
         check_same_wheel(estimator, table)
-    each = [_measured(estimator, table) & table.answered for estimator in estimators]
-    measured = np.any([_measured(estimator, table) for estimator in estimators], axis=0)
-    if not np.any(each):
+    usable = [_complete(estimator, table) & table.answered for estimator in estimators]
+    complete = np.any([_complete(estimator, table) for estimator in estimators], axis=0)
+    if not np.any(usable):
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
-        raise TableError(f"{table.source}: no row has all that this model reads: {wanted}")
+        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, said = _row_by_row(estimators, table, each, args.rule or PRIOR_ONCE)
+        columns, notes = _row_estimates(estimators, table, usable, args.rule or PRIOR_ONCE)
     else:
-        columns, said = _by(estimators[0], table, each[0], args.by)
-    deliver(columns, args.out)
-    said = said_first + said
-    said += _left_out(table, ~measured, "lack a reading")
-    said += _left_out(table, measured & ~table.answered, "have a status that is not ok")
-    print("\n".join(said), file=sys.stderr)
+        columns, notes = _group_estimates(estimators[0], table, usable[0], args.by)
+    write_columns(columns, args.out)
+    notes = case_notes + notes
+    notes += _excluded(table, ~complete, "lack a reading")
+    notes += _excluded(table, complete & ~table.answered, "have a status that is not ok")
+    print("\n".join(notes), file=sys.stderr)
     return 0
 
 
-def _left_out(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
-    """How many rows get no estimate, why, and where the first of them stand."""
+def _excluded(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
+    """A note on rows that get no estimate: how many, the reason, and the first three."""
     if not rows.any():
         return []
     some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
@@ -109,45 +133,45 @@ def _left_out(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
     return [f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}"]
 
 
-def _check_asked(args: argparse.Namespace, estimators: list[Estimator]) -> None:
-    """Raise `InputError` where the options do not go together."""
+def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` for options that cannot be combined."""
     if args.rule is not None and not args.others:
-        raise InputError("--rule says how --with fuses; give --with OTHER.onnx")
+        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:
-        raise InputError("--with fuses row by row; leave out --by")
+        raise InputError("--with fuses single rows; omit --by")
     if args.rule != COVARIANCE_INTERSECTION:
         _check_independent(args, estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
-            "a run; leave out --by"
+            "a run; omit --by"
         )
 
 
 def _check_independent(args: argparse.Namespace, estimators: list[Estimator]) -> None:
-    """Raise `InputError` where one file reads nothing but what another reads: they err alike."""
+    """Raise `InputError` where all inputs of one file are inputs of another: dependent errors."""
     files = list(zip((args.model, *args.others), estimators, strict=True))
     for (one, first), (other, second) in combinations(files, 2):
         shared = set(first.inputs) & set(second.inputs)
         if len(shared) == min(len(first.inputs), len(second.inputs)):
             names = ", ".join(column(name) for name in first.inputs if name in shared)
             raise InputError(
-                f"{one} and {other} both read {names}: their errors are not independent; take one "
+                f"{one} and {other} both read {names}: their errors are not independent; use one "
                 f"of them, or --rule {COVARIANCE_INTERSECTION}"
             )
 
 
-def _measured(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
-    """Rows that have all that the model reads."""
+def _complete(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
+    """Rows that have all readings that the model needs, (rows,)."""
     return np.asarray(np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0))
 
 
-def _row_by_row(
-    estimators: list[Estimator], table: Table, each: list[NDArray[np.bool_]], rule: str
+def _row_estimates(
+    estimators: list[Estimator], table: Table, usable: list[NDArray[np.bool_]], rule: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """A line for every row; blank where no model has all that it reads."""
-    estimates = [_of_rows(*parts, table) for parts in zip(estimators, each, strict=True)]
-    whole = np.any(each, axis=0)
+    """Columns with a line for every row, blank where no model has all its readings, and notes."""
+    estimates = [_all_rows(*parts, table) for parts in zip(estimators, usable, strict=True)]
+    answered = np.any(usable, axis=0)
     inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
     columns: dict[str, Any] = {"run": table["run"]}
     columns |= {column(name): table[column(name)] for name in inputs}
@@ -155,97 +179,94 @@ def _row_by_row(
     if len(estimators) > 1:
         combined = fused_estimates(estimates, rule)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
-    for key, values in _answers(estimate).items():
-        columns[key] = np.where(whole, values, np.nan)
-    columns["in_range"] = whole & estimate.in_range
-    hint = "join rows with --by run"
+    for key, values in _columns(estimate).items():
+        columns[key] = np.where(answered, values, np.nan)
+    columns["in_range"] = answered & estimate.in_range
+    hint = "pool rows with --by run"
     if files is not None:
         columns["files"] = files
     if estimators[0].per_row:
-        hint = "measure with other sensors too, or train for soil that is better known,"
-    said = _worth(estimate, "one row alone", "does", hint)
+        hint = "measure with other sensors too, or train for a narrower prior of the soil,"
+    notes = _width_notes(estimate, "a single row", "does", hint)
     if files is None and estimate.in_range.any():
-        row = typical(estimate)
+        row = median_row(estimate)
         readings = row_readings(estimators[0], table.rows(np.asarray([row])))
-        lines = after_estimate(
+        lines = advice_after_estimate(
             estimators[0], estimate.mean[row], estimate.covariance[row], readings
         )
-        said += [f"after {table.place(row)} alone, a typical row: {line}" for line in lines[-1:]]
-    outside = int(np.count_nonzero(whole & ~estimate.in_range))
+        notes += [f"after {table.place(row)} alone, a typical row: {line}" for line in lines[-1:]]
+    outside = int(np.count_nonzero(answered & ~estimate.in_range))
     if outside:
-        said.append(
-            f"{outside} of {int(whole.sum())} rows are out of range: theirs is the prior"
-            if files is None
-            else f"{outside} of {int(whole.sum())} rows are out of range, or the files contradict "
-            "each other there: theirs is the prior"
-        )
-    return columns, said
+        why = "" if files is None else ", or the files contradict each other there"
+        count = f"{outside} of {int(answered.sum())} rows"
+        notes.append(f"{count} are out of range{why}: their estimate is the prior")
+    return columns, notes
 
 
-def _of_rows(estimator: Estimator, whole: NDArray[np.bool_], table: Table) -> Estimate:
-    """An estimate for every row: out of range where it is not whole."""
-    found = estimator.unknown(len(table))
-    if whole.any():
+def _all_rows(estimator: Estimator, usable: NDArray[np.bool_], table: Table) -> Estimate:
+    """An estimate for every row; one that is not usable counts as out of range."""
+    result = estimator.unknown(len(table))
+    if usable.any():
         alone = estimator.sets is not None and estimator.sets.alone
-        readings = (joint_readings if alone else row_readings)(estimator, table.rows(whole))
+        readings = (joint_readings if alone else row_readings)(estimator, table.rows(usable))
         estimate = estimator(**readings)
         for key in ("mean", "std", "covariance", "low", "high", "in_range"):
-            getattr(found, key)[whole] = getattr(estimate, key)
-    return found
+            getattr(result, key)[usable] = getattr(estimate, key)
+    return result
 
 
-def _by(
-    estimator: Estimator, table: Table, whole: NDArray[np.bool_], by: str
+def _group_estimates(
+    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """A line for every value of a column, from all its rows together; blank where none is whole."""
+    """Columns with a line for every value of a column, from all its usable rows, and notes."""
     order = [name for name, _ in table.groups(by)]
-    groups = list(table.rows(whole).groups(by))
+    groups = list(table.rows(usable).groups(by))
     readings = [joint_readings(estimator, rows) for _, rows in groups]
-    estimates = [estimator.run(**those) for those in readings]
-    sound = [int(estimator.inside(**those).sum()) for those in readings]
-    estimate = _stacked(estimates)
-    place = {name: i for i, (name, _) in enumerate(groups)}
-    there = np.asarray([name in place for name in order])
-    index = np.asarray([place.get(name, 0) for name in order])
+    estimates = [estimator.run(**inputs) for inputs in readings]
+    in_range = [int(estimator.inside(**inputs).sum()) for inputs in readings]
+    estimate = _stack(estimates)
+    position = {name: i for i, (name, _) in enumerate(groups)}
+    answered = np.asarray([name in position for name in order])
+    index = np.asarray([position.get(name, 0) for name in order])
     counts = np.asarray([len(rows) for _, rows in groups])
     columns: dict[str, Any] = {
         by: np.asarray(order),
-        "rows": np.where(there, counts[index], 0),
-        "rows_in_range": np.where(there, np.asarray(sound)[index], 0),
+        "rows": np.where(answered, counts[index], 0),
+        "rows_in_range": np.where(answered, np.asarray(in_range)[index], 0),
     }
-    for key, values in _answers(estimate).items():
-        columns[key] = np.where(there, values[index], np.nan)
-    columns["in_range"] = there & estimate.in_range[index]
-    said = channels_said(estimator, joint_readings(estimator, table.rows(whole)))
-    said += _worth(estimate, f"all rows of a {by}", "do", "drive other loads and slips")
+    for key, values in _columns(estimate).items():
+        columns[key] = np.where(answered, values[index], np.nan)
+    columns["in_range"] = answered & estimate.in_range[index]
+    notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
+    notes += _width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
     if estimate.in_range.any():
-        name, rows = groups[i := vaguest(estimate)]
-        lines = after_estimate(
+        name, rows = groups[i := widest_row(estimate)]
+        lines = advice_after_estimate(
             estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
         )
-        said += [f"{by} {name}: {line}" for line in lines]
-    for (name, rows), good, one in zip(groups, sound, estimates, strict=True):
+        notes += [f"{by} {name}: {line}" for line in lines]
+    for (name, rows), inside, one in zip(groups, in_range, estimates, strict=True):
         if not one.in_range:
-            why = f"{len(rows) - good} of {len(rows)} rows are out of range"
-            if good >= LEAST_SOUND * len(rows):
-                why = "no soil that the file knows explains its rows together"
-            said.append(f"{by} {name}: {why}; the answer is the prior")
-    return columns, said
+            why = f"{len(rows) - inside} of {len(rows)} rows are out of range"
+            if inside >= LEAST_SOUND * len(rows):
+                why = "no soil within the prior explains all its rows"
+            notes.append(f"{by} {name}: {why}; the estimate is the prior")
+    return columns, notes
 
 
-def _answers(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
+def _columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
     """Mean, std and interval of every parameter, by column name."""
-    found = {}
+    columns = {}
     for i, name in enumerate(estimate.names):
         key = column(name)
-        found[key] = estimate.mean[:, i]
-        found[f"{key}_std"] = estimate.std[:, i]
-        found[f"{key}_p05"] = estimate.low[:, i]
-        found[f"{key}_p95"] = estimate.high[:, i]
-    return found
+        columns[key] = estimate.mean[:, i]
+        columns[f"{key}_std"] = estimate.std[:, i]
+        columns[f"{key}_p05"] = estimate.low[:, i]
+        columns[f"{key}_p95"] = estimate.high[:, i]
+    return columns
 
 
-def _stacked(estimates: list[Estimate]) -> Estimate:
+def _stack(estimates: list[Estimate]) -> Estimate:
     first = estimates[0]
     parts = {
         key: np.stack([getattr(e, key) for e in estimates])
@@ -254,17 +275,18 @@ def _stacked(estimates: list[Estimate]) -> Estimate:
     return Estimate(names=first.names, units=first.units, prior=first.prior, **parts)
 
 
-def _worth(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:
-    """What the estimates that are in range are worth, in words; abstaining where it is nothing."""
+def _width_notes(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:
+    """Median width of the estimates in range over the prior's; parameters not determined."""
     if not estimate.in_range.any():
         return []
     share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
     names = [name.replace("_", " ") for name in estimate.names]
     shares = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share, strict=True))
-    said = [f"width of the estimate against the prior's, {what}: {shares}"]
+    notes = [f"posterior width / prior width, {what}: {shares}"]
     vague = [name for name, ok in zip(names, is_identified(share), strict=True) if not ok]
     if vague:
-        said.append(
-            f"{' and '.join(vague)}: mostly the prior, {what} {does} not tell; {hint} to learn more"
+        notes.append(
+            f"{' and '.join(vague)}: the estimate is mostly the prior, {what} {does} not determine "
+            f"{'it' if len(vague) == 1 else 'them'}; {hint} for a better estimate"
         )
-    return said
+    return notes

@@ -1,4 +1,4 @@
-"""`soilml papers`: every printed number of the source papers beside the computed one."""
+"""`soilml papers`: every printed number of the source papers compared with the computed one."""
 
 from __future__ import annotations
 
@@ -9,60 +9,61 @@ import textwrap
 from collections import Counter
 from pathlib import Path
 
-from soilml.cli.output import deliver, watched
-from soilml.io.atomic_files import named
-from soilml.io.text_tables import aligned
+from soilml.cli.output import is_terminal, write_columns
+from soilml.cli.progress import progress_bar
+from soilml.io.atomic_files import output_files
+from soilml.io.text_tables import format_table
 from soilml.optional_imports import need
 from soilml.papers import PAPERS, TITLES
 from soilml.papers.published import Comparison, printed_numbers
 
-HELP = "the source papers' printed numbers beside the computed ones"
+HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
-Compute what the source papers print as numbers, and show it beside what they print.
+Compute the numbers that the source papers print, and compare them.
 
-  soilml papers                        all; takes about ten seconds
+  soilml papers                        all papers; takes about ten seconds
   soilml papers nagatani2009           one paper
-  soilml papers comin2017 --all        every number, also those that nothing computes
-  soilml papers --out papers.csv       every number, for programs
+  soilml papers comin2017 --all        every number, also those not computed
+  soilml papers --out papers.csv       every number, as CSV
 
-holds: yes           computed, and the difference is within the tolerance
-       known         computed, and known to miss it: the reason stands under the table
-       NO            computed, should be within the tolerance, and is not: exit status 1
-       given         an input that the model keeps as printed; no result
-       not computed  rests on measurements or settings that are not printed: the reason is given
+holds: yes           computed; the difference is within the tolerance
+       known         computed; the difference is larger, for a known reason
+                     that is given under the table
+       NO            computed; the difference is larger without a known reason:
+                     exit status 1
+       given         an input, which the model keeps as printed; not a result
+       not computed  depends on measurements or settings that are not printed;
+                     the reason is given
 
-Tolerance is the largest difference allowed, in the number's unit or in per cent of it.
+The tolerance is the largest permitted difference, in the number's unit or in
+per cent of the number.
 """
 WIDTH = 110
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("paper", nargs="?", help=f"one of: {', '.join(PAPERS)}")
-    parser.add_argument("--all", action="store_true", help="a line for every number")
-    parser.add_argument("--out", metavar="FILE.csv", help="where to write the table")
+    parser.add_argument("paper", nargs="?", help=f"paper to compute: {', '.join(PAPERS)}")
+    parser.add_argument("--all", action="store_true", help="list every number")
+    parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return named(args.out, ".csv")
+    return output_files(args.out, ".csv")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compute and deliver the table."""
+    """Compute, compare and write the table."""
     need("scipy", "papers")
     rows = list(printed_numbers(args.paper))
     found = []
-    for i, row in enumerate(rows):
-        if sys.stderr.isatty():
-            print(
-                f"\r\033[K{i + 1}/{len(rows)} {row.what[:60]}", end="", file=sys.stderr, flush=True
-            )
-        found.append(row.compared())
-    if sys.stderr.isatty():
-        print("\r\033[K", end="", file=sys.stderr, flush=True)
-    if args.out is not None or not watched():
-        deliver(_columns(found), args.out)
+    with progress_bar("computing", len(rows)) as progress:
+        for row in rows:
+            found.append(row.compared())
+            progress(len(found))
+    if args.out is not None or not is_terminal():
+        write_columns(_columns(found), args.out)
     else:
         papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
         print("\n\n".join(_page(paper, its, args.all) for paper, its in papers.items()), end="\n\n")
@@ -70,14 +71,14 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{len(found)} printed numbers: {count['yes']} reproduced within their tolerance, "
         f"{count['known']} known to miss it, {count['NO']} wrong; {count['given']} inputs kept as "
-        f"printed; {count['not computed']} that nothing computes",
+        f"printed; {count['not computed']} not computed",
         file=sys.stderr,
     )
     return 1 if count["NO"] else 0
 
 
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
-    """One paper as an aligned table with the reasons under it; the rest in a line a reason."""
+    """One paper as an aligned table with the reasons under it, then what the table omits."""
     shown = [c for c in found if every or c.said in ("yes", "known", "NO")]
     notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
     lines = []
@@ -89,13 +90,13 @@ def _page(paper: str, found: list[Comparison], every: bool) -> str:
         numbers = (f"{row.published:.4g}", computed, "" if c.said == "not computed" else allowed)
         lines.append((f"{c.said}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
     header = ("holds", "unit", "printed", "computed", "tolerance", "what (where)")
-    page = [TITLES[paper], aligned(header, lines, text_columns=2, last_left=True)]
+    page = [TITLES[paper], format_table(header, lines, text_columns=2, last_left=True)]
     page += [_wrapped(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
     return "\n".join(page + ([] if every else _rest(found)))
 
 
 def _rest(found: list[Comparison]) -> list[str]:
-    """What the table leaves out: inputs, and numbers that nothing computes, by reason."""
+    """What the table omits: inputs, and numbers that are not computed, by reason."""
     given = [c.row.what for c in found if c.said == "given"]
     said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
     why: dict[str, list[str]] = {}

@@ -1,4 +1,4 @@
-"""`soilml pull`: drawbar pull against slip and the slope that it climbs, with their bands."""
+"""`soilml pull`: drawbar pull against slip and the slope that can be climbed, with bands."""
 
 from __future__ import annotations
 
@@ -10,15 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from soilml.cli.commands.identify import add_row_options, chosen_rows
-from soilml.cli.commands.simulate import numbers
-from soilml.cli.effects_option import add_effects_option, chosen_effects
-from soilml.cli.output import put, watched
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_row_options,
+    available_effects,
+    parse_names,
+    parse_numbers,
+    read_rows,
+)
+from soilml.cli.output import is_terminal, write_stdout
 from soilml.config.case import read_case
 from soilml.errors import FitError, InputError
-from soilml.io.atomic_files import named, replacing_all
+from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.read_table import RUNS
-from soilml.io.text_tables import aligned, csv_text
+from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 
 if TYPE_CHECKING:
@@ -26,68 +32,85 @@ if TYPE_CHECKING:
     from soilml.traction.pull_and_slope import QuantileBand
     from soilml.traction.report import PullReport
 
-#: Every so many slips of the curve are printed; loads asked for at most.
-SHOWN, MOST_LOADS = 2, 8
+#: The printed curve has every second slip; largest number of loads.
+PRINTED_STEP, MAX_LOADS = 2, 8
 DEGREES = 180.0 / pi
 
-HELP = "drawbar pull against slip, and the slope climbed, on the soil of measured rows"
+HELP = "drawbar pull against slip, and the slope that can be climbed"
 DESCRIPTION = """\
-How hard a gear pulls on the soil that the rows were driven on, at which slip, and what slope a
-vehicle on such gears climbs, each with the band that the rows leave.
+Predict the drawbar pull of a running gear against slip on the soil of the
+measured rows, and the slope that a vehicle with such gears can climb, both
+with 90 % bands.
 
   soilml pull MODEL.toml RUNS.csv --picture pull.png
   soilml pull MODEL.toml RUNS.csv --load 80,120 --slip-limit 0.3 --out pull.csv
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
 
-RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm, and where measured
-drawbar_pull_N, sinkage_m. Soils are drawn from the posterior of the rows (--free says of which
-parameters), or with --from from the estimate of a trained file, and each is driven through the
-model. All rows are taken for one soil; --by run answers for each run. Loads are those of the rows,
-unless --load names others; slips run to 0.6, to the highest driven, or to --slip-limit. On a slope
-a wheel carries the part of its load across the slope and pulls the part along it.
+RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
+measured, drawbar_pull_N and sinkage_m. Samples of the soil are drawn from the
+posterior given the rows (--free names its parameters), or from the estimate of
+a trained model (--from), and the model computes the pull of each. All rows are
+assumed to come from one soil, unless --by run asks for a result for each run.
 
-pull, p05, p95: middle and 90 % band; prior: the band before any row. What stands beside a warning
-that it is not known is no more than the prior. No error of the model is in a band, no load
-transfer, no side slope. The CSV has a row for each load and slip, in SI units.
+Loads are those of the rows, unless --load names others. Slips reach 0.6, the
+highest measured slip, or --slip-limit. On a slope, a wheel carries the
+component of its load normal to the slope and pulls the component along it. The
+bands include neither errors of the model nor load transfer nor side slopes.
+
+pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
+measurement. A value with a warning that it is not known is no more accurate
+than the prior. The CSV file has a row for each load and slip, in SI units.
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", metavar="MODEL.toml")
-    parser.add_argument("runs", metavar="RUNS.csv", help="measured rows, CSV or Parquet")
-    parser.add_argument("--load", help="vertical loads, N: start:stop:count, or with commas")
-    parser.add_argument("--slip-limit", type=float, metavar="S", help="highest slip allowed")
-    parser.add_argument("--free", metavar="A,B,...", help="parameters that are not known")
     parser.add_argument(
-        "--from", dest="trained", metavar="MODEL.onnx", help="soil by this file's estimate"
+        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
+    )
+    parser.add_argument(
+        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
+    )
+    parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
+    parser.add_argument("--slip-limit", type=float, metavar="S", help="largest slip considered")
+    parser.add_argument(
+        "--free", metavar="A,B,...", help="unknown parameters (default: those with a prior)"
+    )
+    parser.add_argument(
+        "--from",
+        dest="trained",
+        type=InputFile,
+        metavar="MODEL.onnx",
+        help="take the soil from the estimate of this model file",
     )
     add_effects_option(parser)
-    parser.add_argument("--by", metavar="run", help="one answer for each value of this column")
+    parser.add_argument(
+        "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
+    )
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.csv", help="where to write the curves")
-    parser.add_argument("--picture", metavar="FILE.png", help="where to draw the bands")
+    parser.add_argument("--out", metavar="FILE.csv", help="write the curves to this file")
+    parser.add_argument("--picture", metavar="FILE.png", help="draw the curves and bands")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return [*named(args.out, ".csv"), *named(args.picture, ".png")]
+    return [*output_files(args.out, ".csv"), *output_files(args.picture, ".png")]
 
 
 def run(args: argparse.Namespace) -> int:
-    """Predict and deliver."""
+    """Predict and write the results."""
     from soilml.traction.report import pull_report
 
     _check(args)
-    case = read_case(args.model, chosen_effects(args))
-    table = chosen_rows(args, RUNS)
+    case = read_case(args.model, available_effects(args))
+    table = read_rows(args, RUNS)
     options: dict[str, Any] = {
-        "loads": None if args.load is None else numbers("--load", args.load).tolist(),
+        "loads": None if args.load is None else parse_numbers("--load", args.load).tolist(),
         "slip_limit": args.slip_limit,
-        "free": None if args.free is None else [name.strip() for name in args.free.split(",")],
+        "free": parse_names(args.free),
     }
-    if len(options["loads"] or ()) > MOST_LOADS:
-        raise InputError(f"--load names {len(options['loads'])} loads; at most {MOST_LOADS}")
+    if len(options["loads"] or ()) > MAX_LOADS:
+        raise InputError(f"--load names {len(options['loads'])} loads; at most {MAX_LOADS}")
     if args.trained is not None:
         need("onnxruntime", "pull")
         from soilml.onboard.estimator import Estimator
@@ -103,10 +126,10 @@ def run(args: argparse.Namespace) -> int:
             failed[name] = str(error)
     if not found:
         name, why = next(iter(failed.items()))
-        raise FitError(f"no {args.by} has an answer; {args.by} {name}: {why}")
-    _deliver(args, found)
+        raise FitError(f"no {args.by} has a result; {args.by} {name}: {why}")
+    _write(args, found)
     for name, why in failed.items():
-        print(f"{args.by} {name} has no answer: {why}", file=sys.stderr)
+        print(f"{args.by} {name} has no result: {why}", file=sys.stderr)
     return 0
 
 
@@ -116,15 +139,19 @@ def _check(args: argparse.Namespace) -> None:
     if args.picture is not None:
         need("matplotlib", "pull --picture")
         if args.by is not None:
-            raise InputError("--picture shows one soil; choose it with --where run=NAME, not --by")
+            raise InputError(
+                "--picture draws one soil; select it with --where run=NAME instead of --by"
+            )
     if args.trained is not None and args.free is not None:
-        raise InputError("--free is for the posterior; a trained file has its own unknowns")
+        raise InputError(
+            "--free applies to the posterior; the parameters of --from are those of the model file"
+        )
 
 
-def _deliver(args: argparse.Namespace, found: dict[str, PullReport]) -> None:
-    """Write the files, and show the answer to a person or give it to a program."""
+def _write(args: argparse.Namespace, found: dict[str, PullReport]) -> None:
+    """Write the files, then text on a terminal or CSV into a pipe."""
     text = csv_text(_curves(args.by, found))
-    with replacing_all(outputs(args)) as parts:
+    with atomic_outputs(outputs(args)) as parts:
         for part in parts:
             if args.picture is not None and part == parts[-1]:
                 from soilml.traction.plot import draw
@@ -133,13 +160,13 @@ def _deliver(args: argparse.Namespace, found: dict[str, PullReport]) -> None:
             else:
                 part.write_text(text, encoding="utf-8")
     heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
-    if args.out is None and not watched():
-        put(text)
+    if args.out is None and not is_terminal():
+        write_stdout(text)
         for name, report in found.items():
-            for line in _doubts(report):
+            for line in _warnings(report):
                 print(f"{heads[name]}{line}", file=sys.stderr)
     else:
-        print("\n\n".join(heads[name] + _for_people(report) for name, report in found.items()))
+        print("\n\n".join(heads[name] + _text(report) for name, report in found.items()))
 
 
 def _curves(by: str | None, found: dict[str, PullReport]) -> dict[str, Any]:
@@ -180,23 +207,23 @@ def _ends(found: QuantileBand) -> tuple[Any, Any, Any]:
     return found.middle, found.lower, found.upper
 
 
-def _doubts(report: PullReport) -> list[str]:
-    """Warnings of all loads and of the whole, each once."""
+def _warnings(report: PullReport) -> list[str]:
+    """Warnings of each load, then those of the whole result."""
     own = [f"{one.known.load:.4g} N: {text}" for one in report.by_load for text in one.warnings]
     return [*own, *report.warnings]
 
 
-def _for_people(report: PullReport) -> str:
+def _text(report: PullReport) -> str:
     slips, loads = report.driven.slip, report.driven.load
     head = (
         f"{report.rows} row{'s'[: report.rows > 1]} at slips {slips[0]:.2g} to {slips[1]:.2g}, "
         f"loads {loads[0]:.4g} to {loads[1]:.4g} N"
     )
-    parts = [head, *(_of_load(one) for one in report.by_load)]
+    parts = [head, *(_load_text(one) for one in report.by_load)]
     return "\n\n".join([*parts, "\n".join(f"! {text}" for text in report.warnings)])
 
 
-def _of_load(one: LoadPrediction) -> str:
+def _load_text(one: LoadPrediction) -> str:
     from soilml.identification.diagnostics import NOT
     from soilml.traction.pull_and_slope import quantile_band
 
@@ -211,14 +238,14 @@ def _of_load(one: LoadPrediction) -> str:
         "prior_p05_N", "prior_p95_N",
     )  # fmt: skip
     lines = []
-    for i in range(SHOWN - 1, len(known.slip), SHOWN):
+    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
         cells = [f"{known.slip[i]:.3g}", *(f"{v[i]:.1f}" for v in _ends(pull))]
         cells += [f"{pull.middle[i] / known.load:.2f}"]
         cells += [f"{DEGREES * v[i]:.1f}" for v in _ends(slope)]
         lines.append((*cells, f"{before.lower[i]:.1f}", f"{before.upper[i]:.1f}"))
     ends = quantile_band(known.best_slip), quantile_band(known.steepest_slip)
-    pulled = _said(quantile_band(known.largest_pull), 1.0, one.left[0] > NOT)
-    climbed = _said(quantile_band(known.steepest), DEGREES, one.left[1] > NOT)
+    pulled = _value_text(quantile_band(known.largest_pull), 1.0, one.left[0] > NOT)
+    climbed = _value_text(quantile_band(known.steepest), DEGREES, one.left[1] > NOT)
     best = [
         f"largest pull    {pulled} N, at slip {_slips(ends[0])}; "
         f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",
@@ -226,11 +253,11 @@ def _of_load(one: LoadPrediction) -> str:
         f"before the rows {_range(quantile_band(prior.steepest), DEGREES)} deg",
     ]
     doubts = [f"! {text}" for text in one.warnings]
-    table = aligned(header, lines, text_columns=0)
+    table = format_table(header, lines, text_columns=0)
     return "\n".join([f"load {known.load:.4g} N", table, *best, *doubts])
 
 
-def _said(found: QuantileBand, factor: float, unknown: bool) -> str:
+def _value_text(found: QuantileBand, factor: float, unknown: bool) -> str:
     middle = "not known" if unknown else f"{factor * float(found.middle):.1f}"
     return f"{middle} ({_range(found, factor)})"
 

@@ -7,23 +7,24 @@ import json
 import math
 
 from soilml.errors import InputError
-from soilml.io.text_tables import aligned
+from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil, SoilEntry, soil_catalogue
 
 HELP = "list the published soils, or show one with its source"
 DESCRIPTION = """\
-List the catalogue of soils; values in SI, with what their papers do not print marked by *.
+List the catalogue of published soils. Values are in SI units; * marks a value
+that is not printed in the paper and is assumed.
 
-  soilml soils                      all, a line each
-  soilml soils wong1989/dry_sand    one, with its source and every value
+  soilml soils                      all soils, one line each
+  soilml soils wong1989/dry_sand    one soil, with its source and every value
 """
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("name", nargs="?", help="one soil, PAPER/SOIL")
-    parser.add_argument("--json", action="store_true", help="for programs")
+    parser.add_argument("name", nargs="?", help="PAPER/SOIL, the name of the soil to show")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"no soil {args.name!r}; `soilml soils` lists them")
     chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
     if args.json:
-        print(json.dumps({name: _plain(entry) for name, entry in chosen.items()}, indent=1))
+        print(json.dumps({name: _as_json(entry) for name, entry in chosen.items()}, indent=1))
     elif args.name is None:
         print(_list(list(chosen.values())))
     else:
@@ -66,7 +67,7 @@ def _list(entries: list[SoilEntry]) -> str:
             )
         )
     notes = "* not printed in the paper: assumed, see the entry.  SI: N/m^(n+1), N/m^(n+2)."
-    return f"{aligned(header, rows, last_left=True)}\n{notes}"
+    return f"{format_table(header, rows, last_left=True)}\n{notes}"
 
 
 def _one(entry: SoilEntry) -> str:
@@ -79,10 +80,10 @@ def _one(entry: SoilEntry) -> str:
             note = f"published as {entry.published[name]:g}: models use 0"
         value = getattr(entry.soil, name)
         rows.append((name, parameter.text, note, f"{value:.6g}", parameter.unit))
-    table = aligned(("field", "what", "from", "value", "unit"), rows, text_columns=3)
+    table = format_table(("field", "what", "from", "value", "unit"), rows, text_columns=3)
     return f"{entry.name}: {entry.text}\n{entry.source}\n\n{table}"
 
 
-def _plain(entry: SoilEntry) -> dict[str, object]:
+def _as_json(entry: SoilEntry) -> dict[str, object]:
     values = {name: getattr(entry.soil, name) for name in declared(Soil)}
     return {"text": entry.text, "source": entry.source, "assumed": entry.assumed, "values": values}

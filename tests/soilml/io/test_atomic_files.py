@@ -7,13 +7,13 @@ import stat
 import pytest
 
 from soilml.errors import InputError
-from soilml.io.atomic_files import made_folder, replacing, replacing_all, save_text
+from soilml.io.atomic_files import atomic_output, atomic_outputs, create_folder, save_text
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     target = tmp_path / "out.csv"
     target.write_text("old")
-    with pytest.raises(RuntimeError), replacing(target) as part:
+    with pytest.raises(RuntimeError), atomic_output(target) as part:
         part.write_text("half")
         raise RuntimeError
     assert target.read_text() == "old"
@@ -22,7 +22,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
 
 def test_two_writers_of_one_file_do_not_mix(tmp_path):
     target = tmp_path / "out.csv"
-    with replacing(target) as first, replacing(target) as second:
+    with atomic_output(target) as first, atomic_output(target) as second:
         first.write_text("the first, and long")
         second.write_text("the second")
     assert target.read_text() == "the first, and long"
@@ -32,11 +32,11 @@ def test_two_writers_of_one_file_do_not_mix(tmp_path):
 def test_several_files_are_replaced_together_or_not_at_all(tmp_path):
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_text("old")
-    with pytest.raises(InputError, match="two"), replacing_all([one, two]) as (first, _):
+    with pytest.raises(InputError, match="two"), atomic_outputs([one, two]) as (first, _):
         first.write_text("new")  # the second is never written
     assert one.read_text() == "old"
     two.mkdir()
-    with pytest.raises(InputError, match="is a folder"), replacing_all([one, two]):
+    with pytest.raises(InputError, match="is a folder"), atomic_outputs([one, two]):
         pytest.fail("begun though the second cannot be written")
     assert sorted(tmp_path.iterdir()) == [one, two]
 
@@ -70,29 +70,32 @@ def test_a_name_as_long_as_the_disk_takes_can_be_written(tmp_path):
 
 
 def test_a_folder_made_for_nothing_goes_again(tmp_path):
-    with pytest.raises(RuntimeError), made_folder(tmp_path / "a" / "b"):
+    with pytest.raises(RuntimeError), create_folder(tmp_path / "a" / "b"):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
-    with made_folder(tmp_path / "a" / "b") as folder:
+    with create_folder(tmp_path / "a" / "b") as folder:
         assert folder.is_dir()
-    with pytest.raises(RuntimeError), made_folder(folder):
+    with pytest.raises(RuntimeError), create_folder(folder):
         raise RuntimeError
     assert folder.is_dir()
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file cannot be made"), made_folder(tmp_path / "file"):
+    with (
+        pytest.raises(InputError, match="file cannot be created"),
+        create_folder(tmp_path / "file"),
+    ):
         pass
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
     target = tmp_path / "out.csv"
-    with pytest.raises(InputError, match="No space left"), replacing(target) as part:
+    with pytest.raises(InputError, match="No space left"), atomic_output(target) as part:
         part.write_text("half")
         raise OSError(errno.ENOSPC, "No space left on device")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_folder_is_named(tmp_path):
-    with pytest.raises(InputError, match="no folder"):
+    with pytest.raises(InputError, match="does not exist"):
         save_text(tmp_path / "nowhere" / "out.csv", "")
     with pytest.raises(InputError, match="is a folder"):
         save_text(tmp_path, "")

@@ -295,7 +295,7 @@ def test_without_the_released_models_the_command_says_where_they_are(tmp_path, m
     assert main(["compare", "a.toml", "b.parquet"]) == 2
     assert "needed are MODEL.toml TEST.parquet" in capsys.readouterr().err
     assert main(["compare", "--limit", "limit.csv"]) == 2
-    assert "....parquet" in capsys.readouterr().err
+    assert "must end in .parquet" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from datagen.recipe import located
+from datagen.recipe import packaged_file
 from soilml.cli import main
 from soilml.errors import InputError
 from training.export.any_wheel_file import is_for_any_wheel, read_any_spec
 
-SPEC = located("any_wheel", "training", "specs").read_text()
+SPEC = packaged_file("any_wheel", "training", "specs").read_text()
 
 
 def spec_of(folder, text):

@@ -1,0 +1,38 @@
+"""The commands are there whether the package is installed or only on the path."""
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from soilml.cli.main import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+
+#: A process that finds no distribution, as on a machine with PYTHONPATH only.
+WITHOUT_ENTRY_POINTS = """\
+import importlib.metadata, sys
+importlib.metadata.entry_points = lambda **_: ()
+from soilml.cli.main import main
+sys.exit(main())
+"""
+
+
+def test_every_command_is_there_without_entry_points(tmp_path):
+    for words in (["--help"], ["generate", "--help"], ["compare", "--help"]):
+        done = subprocess.run(
+            [sys.executable, "-c", WITHOUT_ENTRY_POINTS, *words],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        if words == ["--help"]:
+            assert [name for name in COMMANDS if f"    {name} " not in done.stdout] == []
+
+
+def test_the_installed_entry_points_are_the_built_in_commands():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["entry-points"]["soilml.commands"] == COMMANDS
