@@ -1,4 +1,4 @@
-"""Low-discrepancy draws of soils and operating points."""
+"""Low-discrepancy samples of soils and operating points."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from datagen.recipe import DRIVEN, Block, Recipe
+from datagen.recipe import OPERATING_COLUMNS, Block, Recipe
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class SampledRows:
-    """Rows (n,): the number of the run, and each parameter's value by path."""
+    """Rows (n,): the number of the run, parameters by path, slip, load (N) and covariates."""
 
     run: NDArray[np.int64]
     soil: dict[str, Floats]
@@ -26,10 +26,11 @@ class SampledRows:
 
 
 def sample_rows(recipe: Recipe, block: int, first: int, last: int) -> SampledRows:
-    """Rows `first` to `last` (excluded) of a block; the same whatever pieces it is drawn in.
+    """Rows `first` to `last` (excluded) of a block; they do not depend on the pieces drawn.
 
-    Runs of one row vary soil and operating point in one scrambled Sobol sequence; longer runs draw
-    soils and operating points from two, and what is steady within a run with the soils.
+    Runs of one row take soil and operating point from one scrambled Sobol sequence. Longer runs
+    take soils and operating points from two, and columns that are steady within a run from the
+    sequence of the soils.
     """
     shape: Block = recipe.blocks[block]
     priors = list(recipe.case.prior.items())
@@ -42,13 +43,13 @@ def sample_rows(recipe: Recipe, block: int, first: int, last: int) -> SampledRow
         dimensions = len(priors) + len(shape.steady)
         runs = _sobol(dimensions, (recipe.seed, block, 1), run[0], run[-1] - run[0] + 1)
         soil = runs[run - run[0]]
-        operating = _sobol(len(DRIVEN), (recipe.seed, block, 2), first, last - first)
+        operating = _sobol(len(OPERATING_COLUMNS), (recipe.seed, block, 2), first, last - first)
         for i, name in enumerate(shape.steady, len(priors)):
-            operating[:, DRIVEN.index(name)] = soil[:, i]
-    place = row % shape.rows
+            operating[:, OPERATING_COLUMNS.index(name)] = soil[:, i]
+    position = row % shape.rows
     for name, count in shape.levels:
-        operating[:, DRIVEN.index(name)] = place % count / (count - 1)
-        place = place // count
+        operating[:, OPERATING_COLUMNS.index(name)] = position % count / (count - 1)
+        position = position // count
     return SampledRows(
         run=run,
         soil={path: prior.at(soil[:, i]) for i, (path, prior) in enumerate(priors)},
@@ -59,25 +60,30 @@ def sample_rows(recipe: Recipe, block: int, first: int, last: int) -> SampledRow
 
 
 def _covariates(recipe: Recipe, block: int, run: NDArray[np.int64]) -> dict[str, Floats]:
-    """Speed, pass and slip angle where the recipe varies them: one draw for each run."""
+    """Speed, pass and slip angle where the recipe varies them: one value for each run."""
     if not recipe.covariates:
         return {}
-    u = of_runs(recipe, block, run, len(recipe.covariates), 3)
-    found = {field: prior.at(u[:, i]) for i, (field, prior) in enumerate(recipe.covariates.items())}
-    if "pass_number" in found:
-        found["pass_number"] = np.round(found["pass_number"])
-    return found
+    used = len(recipe.case.prior) + len(OPERATING_COLUMNS)
+    u = run_fractions(recipe, block, run, len(recipe.covariates), 3, used)
+    values = {
+        field: prior.at(u[:, i]) for i, (field, prior) in enumerate(recipe.covariates.items())
+    }
+    if "pass_number" in values:
+        values["pass_number"] = np.round(values["pass_number"])
+    return values
 
 
-def of_runs(recipe: Recipe, block: int, run: NDArray[np.int64], count: int, stream: int) -> Floats:
-    """Fractions (n, count), one draw for each run, that do not follow the soil's.
+def run_fractions(
+    recipe: Recipe, block: int, run: NDArray[np.int64], count: int, stream: int, used: int
+) -> Floats:
+    """Fractions (n, count), one value for each run, independent of other random numbers of a run.
 
-    The same dimension of two scrambled sequences runs together: these take dimensions of their own.
+    The same dimension of two scrambled sequences is correlated, so the first `used` dimensions,
+    which other quantities take, are skipped.
     """
-    taken = len(recipe.case.prior) + len(DRIVEN) + (stream - 3) * len(recipe.covariates)
     runs = int(run[-1] - run[0] + 1)
-    u = _sobol(taken + count, (recipe.seed, block, stream), int(run[0]), runs)
-    return u[run - run[0], taken:]
+    u = _sobol(used + count, (recipe.seed, block, stream), int(run[0]), runs)
+    return u[run - run[0], used:]
 
 
 def _sobol(dimensions: int, seed: tuple[int, ...], skip: int, count: int) -> Floats:

@@ -1,4 +1,4 @@
-"""From a recipe to a Parquet file, in pieces."""
+"""Simulate a recipe into a Parquet file, piece by piece."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datagen.draws import SampledRows, of_runs, sample_rows
-from datagen.recipe import VIBRATION, Recipe
-from datagen.sensor_noise import reported, true_values
-from datagen.wheel_leg_vibration import HIDDEN, normal_stiffness
+from datagen.draws import SampledRows, run_fractions, sample_rows
+from datagen.gear_sensors import GEAR_SENSORS
+from datagen.recipe import OPERATING_COLUMNS, Recipe
+from datagen.sensor_noise import noisy_readings, true_values
+from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.physics.soils import Soil
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.row_status import Status
 
 #: Rows of a piece: one row group of the file.
 PIECE = 16384
+#: Number of the first random stream of gear sensors; lower ones are those of `datagen.draws`.
+FIRST_STREAM = 4
 
 
 @dataclass(frozen=True)
 class Generated:
-    """How many rows a file got, and how many of them have no equilibrium."""
+    """Number of rows in a file, and of those without equilibrium."""
 
     rows: int
     failed: int
@@ -39,16 +41,44 @@ def generate(
     path: str | os.PathLike[str],
     progress: Callable[[int], None] = lambda rows: None,
 ) -> Generated:
-    """Write the recipe's rows to a Parquet file; the same recipe gives the same bytes.
+    """Simulate a recipe and write its rows to a Parquet file, atomically.
 
-    The file appears under its name when it is whole. Rows without equilibrium stay in it, with
-    their reason in `status` and blank readings. Raises `InputError` where more than half are so.
+    The same recipe gives the same bytes on the same machine.
+
+    Parameters
+    ----------
+    recipe
+        Gear, soils, operating ranges, noise, number of rows and seed; see `read_recipe`.
+    path
+        The Parquet file. Columns: run, the readings, covariates, the true parameters that vary,
+        status; the unit of each is in its metadata, the recipe in that of the file.
+    progress
+        Called with the number of rows written so far.
+
+    Returns
+    -------
+    Generated
+        Number of rows, and of rows without equilibrium. The latter are in the file with blank
+        readings and the reason in `status`.
+
+    Raises
+    ------
+    InputError
+        Where more than half of the rows have no equilibrium, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from datagen.recipe import read_recipe
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     generate(read_recipe("wheel").sized(rows=64, seed=1), f"{folder}/data.parquet")
+    Generated(rows=64, failed=0)
     """
     schema = _schema(recipe)
     total = failed = 0
     settings = {"compression": "zstd", "write_page_checksum": True}
     with atomic_output(path) as part, pq.ParquetWriter(part, schema, **settings) as writer:
-        for columns in pieces(recipe):
+        for columns in simulate_pieces(recipe):
             bad = int(np.count_nonzero(columns["status"] != Status.OK.reason))
             total, failed = total + len(columns["status"]), failed + bad
             arrays = [_array(columns[name], schema.field(name).type) for name in schema.names]
@@ -57,35 +87,35 @@ def generate(
         if failed > total / 2:
             raise InputError(
                 f"{failed} of {total} rows have no equilibrium: lower load_N in [operating], or "
-                "raise kphi, or look at [gear]"
+                "raise kphi, or check [gear]"
             )
     return Generated(total, failed)
 
 
-def pieces(recipe: Recipe) -> Iterator[dict[str, np.ndarray]]:
-    """The rows, as dictionaries of columns, a piece at a time."""
-    for block, size in enumerate(sizes(recipe)):
+def simulate_pieces(recipe: Recipe) -> Iterator[dict[str, np.ndarray]]:
+    """The rows as dictionaries of columns, one piece after the other."""
+    for block, size in enumerate(block_sizes(recipe)):
         for first in range(0, size, PIECE):
-            yield piece(recipe, block, first, min(first + PIECE, size))
+            yield simulate_rows(recipe, block, first, min(first + PIECE, size))
 
 
-def sizes(recipe: Recipe) -> list[int]:
-    """Rows of each block: whole runs, but in the block of the shortest, which fills up."""
-    filler = min(range(len(recipe.blocks)), key=lambda i: recipe.blocks[i].rows)
-    found = [int(recipe.rows * b.share / b.rows) * b.rows for b in recipe.blocks]
-    found[filler] = recipe.rows - sum(size for i, size in enumerate(found) if i != filler)
-    return found
+def block_sizes(recipe: Recipe) -> list[int]:
+    """Rows of each block: complete runs, except that the block of the shortest gets the rest."""
+    shortest = min(range(len(recipe.blocks)), key=lambda i: recipe.blocks[i].rows)
+    sizes = [int(recipe.rows * b.share / b.rows) * b.rows for b in recipe.blocks]
+    sizes[shortest] = recipe.rows - sum(size for i, size in enumerate(sizes) if i != shortest)
+    return sizes
 
 
-def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.ndarray]:
-    """Rows `first` to `last` (excluded) of a block."""
+def simulate_rows(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.ndarray]:
+    """Columns of the rows `first` to `last` (excluded) of a block, each (last - first,)."""
     rows = sample_rows(recipe, block, first, last)
     case = recipe.case.with_values(rows.soil)
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
     force = case.model(case.soil, at)
     truth = true_values(rows.slip, rows.load, force)
-    felt = _felt(recipe, block, rows, case.soil, truth)
-    readings = reported(recipe, block, np.arange(first, last), rows.run, truth)
+    sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
+    readings = noisy_readings(recipe, block, np.arange(first, last), rows.run, truth)
     reasons = np.asarray([status.reason for status in Status])
     names = {path: QUANTITIES[path].column if path in QUANTITIES else path for path in rows.soil}
     return {
@@ -93,30 +123,32 @@ def piece(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.nda
         **readings,
         **{COVARIATES[field]: values for field, values in rows.covariates.items()},
         **{names[path]: values for path, values in rows.soil.items()},
-        **felt,
+        **sensor_columns,
         "status": reasons[force.status],
     }
 
 
-def _felt(
-    recipe: Recipe, block: int, rows: SampledRows, soil: Soil, truth: dict[str, np.ndarray]
+def _add_gear_sensors(
+    recipe: Recipe, case: Case, block: int, rows: SampledRows, truth: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Adds what a leg's hub feels to the truth; columns of what it depends on, (n,)."""
-    leg = recipe.stick_slip
-    if leg is None:
-        return {}
-    width = recipe.case.parameters()["gear.width"][1]
-    hidden = leg.hidden(soil, width, of_runs(recipe, block, rows.run, 2, 4))
-    truth[VIBRATION] = leg.vibration(soil, rows.slip, rows.load, hidden, recipe.load.lower)
-    stiffness = np.broadcast_to(normal_stiffness(soil, width), rows.slip.shape)
-    columns = {QUANTITIES["normal_stiffness"].column: stiffness}
-    return columns | {f"stick-slip.{name}": values for name, values in hidden.items()}
+    """Add the readings of the recipe's gear sensors to `truth`; returns their further columns."""
+    columns: dict[str, np.ndarray] = {}
+    used = len(recipe.case.prior) + len(OPERATING_COLUMNS) + len(recipe.covariates)
+    for table, sensor in recipe.gear_sensors.items():
+        stream = FIRST_STREAM + list(GEAR_SENSORS).index(table)
+        u = run_fractions(recipe, block, rows.run, sensor.run_draws, stream, used)
+        used += sensor.run_draws
+        reading, own = sensor.simulate(case, rows.slip, rows.load, recipe.load.lower, u)
+        truth[sensor.sensor] = reading
+        columns |= own
+    return columns
 
 
 def _schema(recipe: Recipe) -> pa.Schema:
-    probe = piece(recipe, 0, 0, 1)
+    probe = simulate_rows(recipe, 0, 0, 1)
     own = {name: parameter.unit for name, (parameter, _) in recipe.case.parameters().items()}
-    own |= {f"stick-slip.{name}": unit for name, unit in HIDDEN.items()}
+    for sensor in recipe.gear_sensors.values():
+        own |= sensor.units
     units = {name: COLUMNS[name].unit if name in COLUMNS else own[name] for name in probe}
     fields = [
         pa.field(

@@ -1,4 +1,4 @@
-"""A recipe: which wheel, which soils, how driven, how measured, how many rows."""
+"""Recipes of synthetic data: gear, soils, operating ranges, sensor noise, number of rows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from datagen.wheel_leg_vibration import StickSlip, take_stick_slip
+from datagen.gear_sensors import GEAR_SENSORS, GearSensor
 from soilml.config.case import Case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
 from soilml.config.prior import take_prior
@@ -20,24 +20,29 @@ from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.physics.gears import Midstance
 from soilml.physics.operating_point import COVARIATES, MOST_SLIP
 from soilml.quantities import COLUMNS
 
-#: Columns of [operating], in the order in which they are drawn.
-DRIVEN = ("slip", "load_N")
-#: Columns that a sensor of the rover fills, and that may have noise and bias.
-SENSED = ("slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m", "vibration_m_s2")
-#: The sensor that [stick_slip] adds.
-VIBRATION = SENSED[-1]
+#: Columns of [operating], in the order of their random numbers.
+OPERATING_COLUMNS = ("slip", "load_N")
+#: Columns of sensors, which may have noise and bias. Random streams follow this order.
+SENSOR_COLUMNS = (
+    "slip",
+    "load_N",
+    "torque_Nm",
+    "drawbar_pull_N",
+    "sinkage_m",
+    *(kind.sensor for kind in GEAR_SENSORS.values()),
+)
 
 
 @dataclass(frozen=True)
 class Block:
     """Runs of one length: `share` of all rows are in runs of `rows` rows on one soil each.
 
-    Within a run, the columns `steady` of [operating] keep one value, and those of `levels` take
-    that many, evenly from end to end of the range: row by row in turn, the first column fastest.
+    Within a run, the columns `steady` of [operating] keep one value. Those of `levels` take that
+    many values, evenly spaced from end to end of the range, as a full factorial in which the first
+    column varies fastest.
     """
 
     rows: int
@@ -47,20 +52,20 @@ class Block:
 
     @property
     def label(self) -> str:
-        """What the names of its runs begin with."""
+        """The first part of the names of its runs."""
         levels = "".join(f"{count}{name}-" for name, count in self.levels)
         return f"{self.rows}x" + "".join(f"{name}-" for name in self.steady) + levels
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What `soilml generate` makes; `content` is the file as it was read."""
+    """The content of a recipe file; `content` is the file as it was read."""
 
     case: Case
     slip: Prior
     load: Prior
     covariates: dict[str, Prior]
-    stick_slip: StickSlip | None
+    gear_sensors: dict[str, GearSensor]
     bias: dict[str, Noise]
     blocks: tuple[Block, ...]
     rows: int
@@ -81,7 +86,7 @@ class Recipe:
 
     @property
     def text(self) -> str:
-        """Everything that decides the rows, as canonical JSON."""
+        """Everything that determines the rows, as canonical JSON."""
         return json.dumps(self.content | {"rows": self.rows, "seed": self.seed}, sort_keys=True)
 
     @property
@@ -91,25 +96,51 @@ class Recipe:
 
 
 def packaged_file(path: str | os.PathLike[str], package: str, folder: str) -> Path:
-    """The file at `path`, or one that comes with the package, by its bare name.
+    """The file at `path`, or a TOML file in a folder of a package, by its bare name.
 
-    Raises `InputError` naming those that there are.
+    Raises `InputError` listing the packaged names where neither exists.
     """
     file = Path(path)
     if file.exists() or file.name != str(path):
         return file
-    inside = Path(str(resources.files(package).joinpath(folder)))
-    own = inside / f"{file.name.removesuffix('.toml')}.toml"
-    if not own.is_file():
-        names = ", ".join(sorted(f.stem for f in inside.glob("*.toml")))
-        raise InputError(f"{path}: there is no such file; {folder} of the package: {names}")
-    return own
+    packaged = Path(str(resources.files(package).joinpath(folder)))
+    match = packaged / f"{file.name.removesuffix('.toml')}.toml"
+    if not match.is_file():
+        names = ", ".join(sorted(f.stem for f in packaged.glob("*.toml")))
+        raise InputError(f"{path}: there is no such file; packaged {folder}: {names}")
+    return match
 
 
 def read_recipe(
     path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS
 ) -> Recipe:
-    """The recipe in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
+    """Read a recipe from a TOML file, or a packaged one by name.
+
+    Parameters
+    ----------
+    path
+        The file, or one of the names of `datagen/recipes`: wheel, wheel_test, wheel_leg, benchmark.
+    effects
+        The effects that [[effect]] may name.
+
+    Returns
+    -------
+    Recipe
+        Number of rows and seed can be replaced with `Recipe.sized`.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing or a key is missing, unknown or has a bad value; names the key.
+
+    Examples
+    --------
+    >>> recipe = read_recipe("wheel")
+    >>> recipe.rows, recipe.slip.lower, recipe.slip.upper
+    (96000, 0.05, 0.6)
+    >>> recipe.sized(rows=100).rows
+    100
+    """
     file = packaged_file(path, "datagen", "recipes")
     settings = read_settings(file)
     recipe = _take_recipe(settings, effects)
@@ -118,7 +149,7 @@ def read_recipe(
 
 
 def parse_recipe(text: str, where: str) -> Recipe:
-    """The recipe of which this is the `text`."""
+    """The recipe whose `Recipe.text` this is; `where` names its origin in messages."""
     settings = Settings(json.loads(text), where, Path())
     recipe = _take_recipe(settings, EFFECTS)
     settings.finish()
@@ -128,13 +159,15 @@ def parse_recipe(text: str, where: str) -> Recipe:
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
     case = take_case(settings, effects)
     if not case.prior:
-        settings.fail("nothing varies: give ranges in [soil.prior]")
+        settings.fail("no parameter varies: give ranges in [soil.prior]")
     operating = settings.table("operating")
     slip, load = take_prior(operating, "slip"), take_prior(operating, "load_N")
     if not -MOST_SLIP < slip.lower < slip.upper < MOST_SLIP:
-        operating.fail(f"slip is [{slip.lower:g}, {slip.upper:g}]; it must lie between -1 and 1")
+        operating.fail(
+            f"slip is [{slip.lower:g}, {slip.upper:g}]; needed are slips between -1 and 1"
+        )
     if load.lower <= 0:
-        operating.fail(f"load_N begins at {load.lower:g}; it must lie above zero")
+        operating.fail(f"load_N begins at {load.lower:g}; needed are loads above 0 N")
     operating.knows(COVARIATES.values())
     covariates = {f: take_prior(operating, k) for f, k in COVARIATES.items() if k in operating}
     for effect in case.model.effects:
@@ -142,30 +175,28 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
             if field not in covariates:
                 operating.fail(f"{COVARIATES[field]} is missing; the effect {effect.name} needs it")
     operating.finish()
-    stick_slip = None
-    if "stick_slip" in settings:
-        stick_slip = take_stick_slip(settings.table("stick_slip"))
-        if not isinstance(case.model.gear, Midstance):
-            settings.fail(
-                f"[stick_slip] is of wheel-legs; [gear] type is {case.model.gear.name!r}, needed "
-                "is 'midstance'"
-            )
-        if slip.lower < 0.0:
-            operating.fail(f"slip begins at {slip.lower:g}; [stick_slip] is for driving legs")
+    gear_sensors: dict[str, GearSensor] = {}
+    for table, kind in GEAR_SENSORS.items():
+        if table in settings:
+            gear_sensors[table] = kind.take(settings.table(table), case)
+            if slip.lower < kind.lowest_slip:
+                needed = f"[{table}] needs slips of {kind.lowest_slip:g} or more"
+                operating.fail(f"slip begins at {slip.lower:g}; {needed}")
     bias_settings = settings.table("bias")
-    bias = {key: take_noise(bias_settings, key) for key in SENSED if key in bias_settings}
-    bias_settings.knows(SENSED)
+    bias = {key: take_noise(bias_settings, key) for key in SENSOR_COLUMNS if key in bias_settings}
+    bias_settings.knows(SENSOR_COLUMNS)
     bias_settings.finish()
-    for key in case.noise.keys() - set(SENSED):
-        settings.fail(f"[noise] {key}: no sensor of {COLUMNS[key].text} is simulated")
-    if VIBRATION in (*case.noise, *bias) and stick_slip is None:
-        settings.fail(f"[noise] {VIBRATION}: give [stick_slip], which says how a leg vibrates")
+    for key in case.noise.keys() - set(SENSOR_COLUMNS):
+        settings.fail(f"[noise] {key}: a sensor of {COLUMNS[key].text} is not simulated")
+    for table, kind in GEAR_SENSORS.items():
+        if kind.sensor in (*case.noise, *bias) and table not in gear_sensors:
+            settings.fail(f"[noise] {kind.sensor}: the table [{table}] is missing, which adds it")
     return Recipe(
         case=case,
         slip=slip,
         load=load,
         covariates=covariates,
-        stick_slip=stick_slip,
+        gear_sensors=gear_sensors,
         bias=bias,
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),
@@ -186,13 +217,13 @@ def _take_blocks(settings: Settings) -> tuple[Block, ...]:
         if not 0.0 < block.share <= 1.0:
             entry.fail(f"share is {block.share:g}; needed is a number above 0, up to 1")
         if block.steady and block.rows == 1:
-            entry.fail("steady is for runs of 2 rows or more")
+            entry.fail("steady needs runs of 2 rows or more")
         if both := set(block.steady) & {name for name, _ in block.levels}:
-            entry.fail(f"{both.pop()} stands in steady and in levels; give it in one of them")
-        if (cells := math.prod(count for _, count in block.levels)) > block.rows:
-            entry.fail(f"levels has {cells} cells; needed are that many rows or more")
+            entry.fail(f"{both.pop()} is in steady and in levels; needed is one of them")
+        if (combinations := math.prod(count for _, count in block.levels)) > block.rows:
+            entry.fail(f"levels has {combinations} combinations; needed are that many rows or more")
         if block.label in {other.label for other in blocks}:
-            entry.fail("another [[runs]] has the same rows, steady and levels; make them one")
+            entry.fail("another [[runs]] has the same rows, steady and levels; merge them")
         entry.finish()
         blocks.append(block)
     if not blocks:
@@ -203,19 +234,19 @@ def _take_blocks(settings: Settings) -> tuple[Block, ...]:
 
 
 def _take_steady(entry: Settings) -> tuple[str, ...]:
-    needed = f"a list of {', '.join(DRIVEN)}"
-    given = entry.take("steady", list, needed, [])
-    if any(given.count(name) != 1 or name not in DRIVEN for name in given):
-        entry.fail(f"steady is {given!r}; needed is {needed}")
-    return tuple(name for name in DRIVEN if name in given)
+    needed = f"a list of {', '.join(OPERATING_COLUMNS)}"
+    names = entry.take("steady", list, needed, [])
+    if any(names.count(name) != 1 or name not in OPERATING_COLUMNS for name in names):
+        entry.fail(f"steady is {names!r}; needed is {needed}")
+    return tuple(name for name in OPERATING_COLUMNS if name in names)
 
 
 def _take_levels(entry: Settings) -> tuple[tuple[str, int], ...]:
-    given = entry.table("levels")
-    given.knows(DRIVEN)
-    found = tuple((name, given.count(name)) for name in DRIVEN if name in given)
-    given.finish()
-    for name, count in found:
+    table = entry.table("levels")
+    table.knows(OPERATING_COLUMNS)
+    levels = tuple((name, table.count(name)) for name in OPERATING_COLUMNS if name in table)
+    table.finish()
+    for name, count in levels:
         if count < 2:
             entry.fail(f"levels has {count} for {name}; needed is 2 or more, or steady")
-    return found
+    return levels

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.generate import pieces
+from datagen.generate import simulate_pieces
 from datagen.recipe import Block, read_recipe
 from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case
@@ -48,7 +48,7 @@ def test_comes_from_the_recipe_and_spec_in_the_tree(name):
 def test_is_as_good_on_another_seed_as_its_card_says(name):
     estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
     recipe = read_recipe(RELEASED[name][0]).sized(12000, seed=4242)
-    rows = next(pieces(recipe))
+    rows = next(simulate_pieces(recipe))
     alone = np.char.startswith(rows["run"], "1x")
     readings = {n: rows[column(n)][alone] for n in estimator.inputs}
     truth = np.stack([rows[column(n)][alone] for n in estimator.names], axis=1)
@@ -69,7 +69,7 @@ STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 def runs(recipe, rows, steady, count=400):
     """Columns (runs, rows) of runs in which something is steady."""
     recipe = replace(recipe, blocks=(Block(rows, 1.0, steady),)).sized(rows * count, seed=777)
-    parts = list(pieces(recipe))
+    parts = list(simulate_pieces(recipe))
     return {k: np.concatenate([p[k] for p in parts]).reshape(count, rows) for k in parts[0]}
 
 

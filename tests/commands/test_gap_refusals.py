@@ -121,7 +121,7 @@ OPTIONS = {
     "checked to NaN": (["--checked", "torque-gain=nan"], "must be a number above zero"),
     "second check": (
         ["--checked", "torque-gain=0.01", "--checked", "slope=-1"],
-        "'slope=-1': the spread must be a number above zero",
+        "'slope=-1': the standard deviation must be a number above zero",
     ),
     "no effects file": (["--effects", "none.py"], "no such file"),
     "broken effects file": (["--effects", "broken.py"], "division by zero"),

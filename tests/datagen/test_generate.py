@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
-from datagen.generate import generate, piece, pieces, sizes
+from datagen.generate import block_sizes, generate, simulate_pieces, simulate_rows
 from datagen.recipe import read_recipe
 from soilml import Model, Operating, Wheel, read_table, soil
 from soilml.errors import InputError
@@ -40,9 +40,9 @@ def test_same_recipe_and_seed_give_the_same_bytes(tmp_path):
 def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
     blocks = "[bias]\ntorque_Nm = 0.1\n[[runs]]\nrows = 8\nshare = 1.0\n"
     made = recipe(tmp_path, blocks)
-    whole = piece(made, 0, 0, 600)
+    whole = simulate_rows(made, 0, 0, 600)
     for first, last in ((0, 13), (13, 14), (301, 600)):
-        part = piece(made, 0, first, last)
+        part = simulate_rows(made, 0, first, last)
         for name, values in part.items():
             if values.dtype.kind == "U":
                 assert (values == whole[name][first:last]).all()
@@ -87,7 +87,7 @@ def test_runs_share_soil_and_bias(tmp_path):
     extra = "[bias]\ntorque_Nm = 0.5\n[[runs]]\nrows = 6\nshare = 1.0\n"
     text = RECIPE.replace('torque_Nm = "2 %"', "sinkage_m = 1e-9")
     made = recipe(tmp_path, extra, rows=1200, text=text)
-    columns = next(pieces(made))
+    columns = next(simulate_pieces(made))
     runs = columns["run"].reshape(-1, 6)
     assert (runs == runs[:, :1]).all()
     assert len(np.unique(runs[:, 0])) == 200
@@ -111,7 +111,7 @@ def test_what_is_steady_keeps_one_value_in_a_run_and_differs_between_runs(tmp_pa
         for steady in ('["load_N"]', '["slip", "load_N"]')
     )
     made = recipe(tmp_path, blocks, rows=1600)
-    one_load, one_point = pieces(made)
+    one_load, one_point = simulate_pieces(made)
     assert not set(one_load["run"]) & set(one_point["run"])
     spread = {
         (block, name): np.ptp(columns[name].reshape(-1, 8), axis=1)
@@ -122,14 +122,14 @@ def test_what_is_steady_keeps_one_value_in_a_run_and_differs_between_runs(tmp_pa
     for steady in ((0, "load_N"), (1, "slip"), (1, "load_N")):
         assert (spread[steady] == 0.0).all()
     assert np.std(one_load["load_N"]) == pytest.approx(90.0 / np.sqrt(12.0), rel=0.05)
-    part = piece(made, 1, 13, 30)
+    part = simulate_rows(made, 1, 13, 30)
     assert (part["load_N"] == one_point["load_N"][13:30]).all()
 
 
 def test_columns_at_levels_take_them_evenly_in_turn_and_in_every_combination(tmp_path):
     levels = ("{ load_N = 3 }", "{ slip = 2, load_N = 3 }")
     blocks = "".join(f"[[runs]]\nrows = 8\nshare = 0.5\nlevels = {one}\n" for one in levels)
-    loads, grid = pieces(recipe(tmp_path, blocks, rows=1600))
+    loads, grid = simulate_pieces(recipe(tmp_path, blocks, rows=1600))
     assert not set(loads["run"]) & set(grid["run"])
     assert loads["load_N"][8:16].tolist() == [30.0, 75.0, 120.0] * 2 + [30.0, 75.0]
     assert (np.ptp(loads["slip"].reshape(-1, 8), axis=1) > 0.2).all()
@@ -141,7 +141,7 @@ def test_columns_at_levels_take_them_evenly_in_turn_and_in_every_combination(tmp
 def test_rows_requested_are_rows_made(tmp_path):
     blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
     for rows in (1, 64, 1000):
-        assert sum(sizes(recipe(tmp_path, blocks, rows=rows))) == rows
+        assert sum(block_sizes(recipe(tmp_path, blocks, rows=rows))) == rows
     assert recipe(tmp_path).sized(77, 3).rows == 77
 
 
@@ -186,8 +186,8 @@ def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("[0.05, 0.6]", "[0.05, 1.6]", "must lie between -1 and 1"),
-        ("[30.0, 120.0]", "[-30.0, 120.0]", "above zero"),
+        ("[0.05, 0.6]", "[0.05, 1.6]", "needed are slips between -1 and 1"),
+        ("[30.0, 120.0]", "[-30.0, 120.0]", "above 0 N"),
         ("rows = {rows}", "rows = 0", "1 or more"),
         ("rows = {rows}", "rows = {rows}\nrow = 3", "did you mean 'rows'"),
         ("seed = {seed}", "", "seed is missing"),
@@ -195,10 +195,10 @@ def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
         ("slip = [0.05, 0.6]", "slip = [0.05, 0.6]\nload = [1, 2]", "unknown key 'load'"),
         ("[operating]", '[[runs]]\nsteady = ["load"]\n[operating]', "list of slip, load_N"),
         ("[operating]", '[[runs]]\nsteady = ["slip"]\n[operating]', "2 rows or more"),
-        ("[operating]", "[[runs]]\nshare = 0.5\n" * 2 + "[operating]", "make them one"),
+        ("[operating]", "[[runs]]\nshare = 0.5\n" * 2 + "[operating]", "merge them"),
         ("[operating]", "[[runs]]\nlevels = {{ load = 3 }}\n[operating]", "did you mean 'load_N'"),
         ("[operating]", "[[runs]]\nlevels = {{ slip = 1 }}\n[operating]", "or steady"),
-        ("[operating]", "[[runs]]\nlevels = {{ slip = 3 }}\n[operating]", "3 cells"),
+        ("[operating]", "[[runs]]\nlevels = {{ slip = 3 }}\n[operating]", "3 combinations"),
         (
             "[operating]",
             '[[runs]]\nrows = 3\nsteady = ["slip"]\nlevels = {{ slip = 3 }}\n[operating]',

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from datagen.draws import sample_rows
-from datagen.generate import generate, piece
+from datagen.generate import generate, simulate_rows
 from datagen.recipe import read_recipe
 from datagen.wheel_leg_vibration import normal_stiffness
 from soilml import read_table, soil
@@ -53,8 +53,8 @@ def recipe(tmp_path, text=RECIPE, rows=400):
     return read_recipe(tmp_path / "r.toml")
 
 
-def test_the_hub_feels_what_the_spring_says(tmp_path):
-    made = piece(recipe(tmp_path), 0, 0, 60)
+def test_vibration_is_that_of_the_spring(tmp_path):
+    made = simulate_rows(recipe(tmp_path), 0, 0, 60)
     felt = [
         vibration_amplitude(
             SpringLeg(stiffness=k, hub_mass=load / GRAVITY, turning=3.0), slip, angle, drop
@@ -71,7 +71,7 @@ def test_the_hub_feels_what_the_spring_says(tmp_path):
 
 def test_the_line_of_the_tests_gives_its_slip_back(tmp_path):
     """Comin and Saaj 2017, eq. 24 with the linear parameters of table V; degrees and g."""
-    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    made = simulate_rows(recipe(tmp_path, LINE), 0, 0, 200)
     a, drop = made["vibration_m_s2"] / GRAVITY, np.rad2deg(made["stick-slip.increment"])
     slip = -0.882 + 0.022 * drop + (6.609 - 0.156 * drop) * a
     np.testing.assert_allclose(slip, made["slip"], atol=1e-9)
@@ -79,7 +79,7 @@ def test_the_line_of_the_tests_gives_its_slip_back(tmp_path):
 
 def test_with_the_line_leg_and_drop_of_friction_follow_the_soil(tmp_path):
     """Comin and Saaj 2017, eq. 28 with table VII."""
-    made = piece(recipe(tmp_path, LINE), 0, 0, 200)
+    made = simulate_rows(recipe(tmp_path, LINE), 0, 0, 200)
     found = spring_soil(made["stick-slip.increment"], made["stick-slip.stiffness"])
     np.testing.assert_allclose(found[0], made["friction_angle_rad"], rtol=1e-9)
     np.testing.assert_allclose(found[1], made["normal_stiffness_Pa"], rtol=1e-9)
@@ -100,7 +100,7 @@ def test_stiffness_a_centimetre_deep_is_that_of_the_catalogue_s_soils():
 
 
 def test_what_is_unknown_of_a_leg_fills_its_range_and_does_not_follow_the_soil(tmp_path):
-    made = piece(recipe(tmp_path, rows=2000), 0, 0, 2000)
+    made = simulate_rows(recipe(tmp_path, rows=2000), 0, 0, 2000)
     drop = made["stick-slip.increment"] / made["friction_angle_rad"]
     for values, low, high in ((made["stick-slip.stiffness"], 3500, 4500), (drop, 0.2, 0.3)):
         assert low <= values.min() < low + 0.01 * (high - low) and values.max() <= high
@@ -111,7 +111,7 @@ def test_what_is_unknown_of_a_leg_fills_its_range_and_does_not_follow_the_soil(t
 def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
     for text in (RECIPE, RECIPE.replace("[3500, 4500]", "[1500, 9000]"), LINE):
         made = recipe(tmp_path, text)
-        whole, part = piece(made, 0, 0, 200), piece(made, 0, 150, 163)
+        whole, part = simulate_rows(made, 0, 0, 200), simulate_rows(made, 0, 150, 163)
         np.testing.assert_allclose(
             part["vibration_m_s2"], whole["vibration_m_s2"][150:163], rtol=1e-12
         )
@@ -119,7 +119,7 @@ def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
 
 def test_the_file_names_units_and_can_be_read(tmp_path):
     noisy = RECIPE.replace("[stick_slip]", "[noise]\nvibration_m_s2 = 0.2\n[stick_slip]")
-    clean = piece(recipe(tmp_path), 0, 0, 400)["vibration_m_s2"]
+    clean = simulate_rows(recipe(tmp_path), 0, 0, 400)["vibration_m_s2"]
     generate(recipe(tmp_path, noisy), tmp_path / "d.parquet")
     units = json.loads(pq.read_schema(tmp_path / "d.parquet").metadata[b"soilml_units"])
     assert units["vibration_m_s2"] == "m/s^2" and units["stick-slip.stiffness"] == "N/m"
@@ -138,17 +138,17 @@ def test_speed_and_other_draws_of_a_run_do_not_follow_the_soil(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("turning = 3.0", 'law = "magic"', "law is 'magic'; there are: spring, line"),
+        ("turning = 3.0", 'law = "magic"', "law is 'magic'; needed is one of: spring, line"),
         ("drop = [0.2, 0.3]", "", "drop is missing"),
-        ("drop = [0.2, 0.3]", "drop = [20, 30]", "shares of the friction angle"),
+        ("drop = [0.2, 0.3]", "drop = [20, 30]", "fractions of the friction angle"),
         ("stiffness = [3500, 4500]", "stiffness = [5, 4500]", "stiffness is 5"),
         ("turning = 3.0", 'law = "line"', "unknown key 'stiffness'"),
         ("turning = 3.0", "turn = 3.0", "did you mean 'turning'"),
         ("turning = 3.0", "turning = -1.0", "turning is -1"),
         ("turning = 3.0", "hub_mass = 3.0", "unknown key 'hub_mass'"),
-        ("slip = [0.0, 0.6]", "slip = [-0.1, 0.6]", "is for driving legs"),
-        (STICK_SLIP, "[noise]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
-        (STICK_SLIP, "[bias]\nvibration_m_s2 = 0.2", "give [stick_slip]"),
+        ("slip = [0.0, 0.6]", "slip = [-0.1, 0.6]", "[stick_slip] needs slips of 0 or more"),
+        (STICK_SLIP, "[noise]\nvibration_m_s2 = 0.2", "the table [stick_slip] is missing"),
+        (STICK_SLIP, "[bias]\nvibration_m_s2 = 0.2", "the table [stick_slip] is missing"),
     ],
 )
 def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
@@ -160,12 +160,14 @@ def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
 def test_a_wheel_has_no_legs_to_stick_and_slip(tmp_path):
     gear = RECIPE[RECIPE.index("[gear]") : RECIPE.index("[soil]")]
     wheel = '[gear]\ntype = "wheel"\nradius = 0.15\nwidth = 0.1\n'
-    with pytest.raises(InputError, match=r"\[stick_slip\] is of wheel-legs; .* 'wheel'"):
+    with pytest.raises(
+        InputError, match=r"\[stick_slip\]: the table is for wheel-legs only; .* 'wheel'"
+    ):
         recipe(tmp_path, RECIPE.replace(gear, wheel))
 
 
 def test_the_packaged_recipe_varies_all_that_the_specs_read(tmp_path):
-    made = piece(read_recipe("wheel_leg"), 0, 0, 200)
+    made = simulate_rows(read_recipe("wheel_leg"), 0, 0, 200)
     assert (made["status"] == "ok").mean() > 0.9
     good = made["status"] == "ok"
     for name in ("slip", "load_N", "torque_Nm", "sinkage_m", "vibration_m_s2"):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.generate import piece, sizes
+from datagen.generate import block_sizes, simulate_rows
 from datagen.recipe import Block, Recipe
 from soilml.config.case import Case
 from soilml.errors import InputError
@@ -72,10 +72,12 @@ def generate_design_sets(
     Raises `InputError` where a row has no equilibrium: stored posteriors refer to complete sets.
     """
     designs = []
-    for number, (block, size) in enumerate(zip(recipe.blocks, sizes(recipe), strict=True)):
+    for number, (block, size) in enumerate(zip(recipe.blocks, block_sizes(recipe), strict=True)):
         available = size // block.rows
         count = available if max_sets is None else min(max_sets, available)
-        table = Table(piece(recipe, number, 0, count * block.rows), f"recipe, runs of {block.rows}")
+        table = Table(
+            simulate_rows(recipe, number, 0, count * block.rows), f"recipe, runs of {block.rows}"
+        )
         if not table.answered.all():
             raise InputError(f"{table.source}: a row has no equilibrium; narrow [operating]")
         rows_of_set = np.arange(len(table)).reshape(count, block.rows)

@@ -67,7 +67,7 @@ class RecipeFamily:
             raise InputError(
                 f"set_posterior: the recipe has {len(names)} unknowns, more than {MOST_AXES}"
             )
-        if recipe.slip.lower <= 0.0 or recipe.covariates or recipe.stick_slip is not None:
+        if recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
             raise InputError(
                 "set_posterior: it is for driving wheels (slip above 0) whose torque follows from "
                 "slip, load and soil alone; leave it out of the spec"
