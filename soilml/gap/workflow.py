@@ -25,8 +25,8 @@ from soilml.gap.search.verdict import likeness, map_of, named, status_of, values
 from soilml.gap.statistics.coordinates import predicted
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
+from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
-from soilml.identification.observations import check_wheel_size
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.errors import FitError, TableError
+from soilml.errors import FitError
+from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
@@ -139,19 +140,3 @@ def _believed(table: Table, key: str, std: Floats) -> tuple[Floats, list[str]]:
     more = int(tiny.sum()) - 1
     said = f"{given} is not believed{f', nor {more} more' if more else ''}: "
     return np.where(tiny, median, std), [f"{said}{median:.3g}, the median of the others, is taken"]
-
-
-def check_wheel_size(case: Case, table: Table) -> None:
-    """A table that says which wheel was driven must say the case's wheel."""
-    for name in ("radius", "width"):
-        key = QUANTITIES[f"wheel_{name}"].column
-        size = getattr(case.model.gear, name, None)
-        if key not in table or size is None:
-            continue
-        wrong = np.abs(table[key] / size - 1.0) > 0.005
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise TableError(
-                f"{table.place(row)}, column {key}: {table[key][row]:g} given, the model's wheel "
-                f"has {size:g}; choose rows with --where run=NAME, or correct [gear]"
-            )

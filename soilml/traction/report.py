@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import check_wheel_size, read_observations
+from soilml.identification.observations import read_observations
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator

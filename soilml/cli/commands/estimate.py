@@ -15,7 +15,7 @@ from soilml.cli.advice_text import advice_after_estimate, median_row, widest_row
 from soilml.cli.joint_readings import channel_note, joint_readings, row_readings
 from soilml.cli.options import InputFile, add_row_options, read_rows
 from soilml.cli.output import write_columns
-from soilml.cli.wheel_check import check_same_wheel, for_the_case
+from soilml.cli.wheel_check import apply_case_option, check_table_wheel
 from soilml.errors import InputError, TableError
 from soilml.experiment_design import is_identified
 from soilml.io.atomic_files import output_files
@@ -100,13 +100,13 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
-    estimators[0], case_notes = for_the_case(args, estimators[0])
+    estimators[0], case_notes = apply_case_option(args, estimators[0])
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
     table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
-        check_same_wheel(estimator, table)
+        check_table_wheel(estimator, table)
     usable = [_complete(estimator, table) & table.answered for estimator in estimators]
     complete = np.any([_complete(estimator, table) for estimator in estimators], axis=0)
     if not np.any(usable):

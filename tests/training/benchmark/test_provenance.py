@@ -14,14 +14,17 @@ from training.benchmark.provenance import check_same_provenance
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 OTHERS = {
     "soil": (MODEL.replace("dry_sand", "sandy_loam_32"), ", the model file"),
-    "bearing": (MODEL.replace("[soil.prior]", "kphi = 1e6\n[soil.prior]"), "the model file 1e+06"),
+    "bearing": (
+        MODEL.replace("[soil.prior]", "kphi = 1e6\n[soil.prior]"),
+        "the model file has 1e+06",
+    ),
     "effect": (MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n', "effects none"),
     "prior": (MODEL.replace("3000.0", "6000.0"), "prior [0.0, 3000.0] of cohesion"),
     "scale": (
         MODEL.replace("[0.005, 0.03]", '{ range = [0.005, 0.03], scale = "log" }'),
         "of shear_modulus",
     ),
-    "gear": (MODEL.replace('"wheel"', '"linear-wheel"'), "a gear of type 'wheel'"),
+    "gear": (MODEL.replace('"wheel"', '"linear-wheel"'), "gear type 'wheel'"),
     "wheel": (MODEL.replace("radius = 0.15", "radius = 0.1"), "radius 0.15"),
 }
 

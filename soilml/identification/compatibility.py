@@ -1,0 +1,121 @@
+"""Whether a case, a table and a model file are of the same wheel, soil, effects and priors.
+
+Differences are phrases such as "gear.radius 0.15, the model file has 0.1": the value of the other,
+then that of the case, which comes from the user's model file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from soilml.config.case import Case, take_case
+from soilml.errors import InputError, TableError
+from soilml.io.table import Table
+from soilml.io.toml_settings import Settings
+from soilml.quantities import QUANTITIES
+
+#: Relative difference up to which two sizes of a gear count as equal: they are measured, and
+#: written with three digits.
+SIZE_TOLERANCE = 0.005
+#: The same for other values, which are copied from file to file.
+VALUE_TOLERANCE = 0.001
+
+
+def recipe_case(text: str, source: str) -> Case | None:
+    """The case of a recipe in JSON; None for the empty recipe of data that were not simulated.
+
+    Raises `InputError` for a text that is not a recipe; `source` names the file that holds it.
+    """
+    try:
+        content = json.loads(text, parse_int=float)
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict):
+        raise InputError(f"{source}: its recipe is damaged; generate or train it again")
+    return take_case(Settings(content, f"recipe of {source}", Path())) if content else None
+
+
+def check_wheel_columns(
+    table: Table, sizes: Mapping[str, float | None], owner: str, hint: str
+) -> None:
+    """Raise `TableError` where a column wheel_radius_m or wheel_width_m has another size.
+
+    `sizes` are radius and width (m) as `owner` has them; None or missing where it has none.
+    """
+    for name in ("radius", "width"):
+        key, size = QUANTITIES[f"wheel_{name}"].column, sizes.get(name)
+        if key not in table or size is None:
+            continue
+        wrong = np.abs(table[key] / size - 1.0) > SIZE_TOLERANCE
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise TableError(
+                f"{table.place(row)}, column {key}: {table[key][row]:g} given, {owner} {size:g}; "
+                f"{hint}"
+            )
+
+
+def check_wheel_size(case: Case, table: Table) -> None:
+    """Raise `TableError` for a table whose wheel columns have another size than the case's gear."""
+    sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}
+    hint = "select rows with --where run=NAME, or correct [gear]"
+    check_wheel_columns(table, sizes, "the model's wheel has", hint)
+
+
+def gear_differences(case: Case, other: Case) -> Iterator[str]:
+    """Differences of type and dimensions of the gear; a dimension that varies is not compared."""
+    own, others = case.model.gear.name, other.model.gear.name
+    if type(case.model.gear) is not type(other.model.gear):
+        yield f"gear type {others!r}, the model file has {own!r}"
+        return
+    yield from _fixed_differences(case, other, gear=True)
+
+
+def value_differences(case: Case, other: Case) -> Iterator[str]:
+    """Differences of the fixed values of soil and effects; what `other` varies has no value."""
+    yield from _fixed_differences(case, other, gear=False)
+
+
+def effect_differences(case: Case, other: Case) -> Iterator[str]:
+    """The effects of both, where their names differ."""
+    own, others = ({effect.name for effect in c.model.effects} for c in (case, other))
+    if own != others:
+        yield f"effects {_join(others)}, the model file has {_join(own)}"
+
+
+def prior_differences(case: Case, other: Case, names: Sequence[str]) -> Iterator[str]:
+    """Differences of the priors of these parameters, where the case has one."""
+    for name in names:
+        own, others = case.prior.get(name), other.prior.get(name)
+        if own is None:
+            continue
+        if others is None:
+            yield f"no prior of {name}, the model file has {own.as_setting()}"
+        elif own.log != others.log or not (
+            _is_close(own.lower, others.lower, VALUE_TOLERANCE)
+            and _is_close(own.upper, others.upper, VALUE_TOLERANCE)
+        ):
+            yield f"prior {others.as_setting()} of {name}, the model file has {own.as_setting()}"
+
+
+def _fixed_differences(case: Case, other: Case, gear: bool) -> Iterator[str]:
+    tolerance = SIZE_TOLERANCE if gear else VALUE_TOLERANCE
+    values = other.parameters()
+    for path, (_, value) in case.parameters().items():
+        fixed = path in values and path not in other.prior
+        if path.startswith("gear.") != gear or not fixed:
+            continue
+        if not _is_close(value, values[path][1], tolerance):
+            yield f"{path} {values[path][1]:g}, the model file has {value:g}"
+
+
+def _is_close(a: float, b: float, tolerance: float) -> bool:
+    return abs(a - b) <= tolerance * max(abs(a), abs(b))
+
+
+def _join(names: set[str]) -> str:
+    return ", ".join(sorted(names)) or "none"
