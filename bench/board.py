@@ -12,7 +12,7 @@ import numpy as np
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.identification.trained_estimator import for_simulated_case
-from soilml.onboard.set_posterior import ANSWER, KEPT
+from soilml.onboard.set_contract import MEMORY_OUTPUTS, SET_OUTPUTS, SET_PREFIX
 
 ROOT = Path(__file__).parents[1]
 CALLS = 4000
@@ -38,7 +38,7 @@ def latency() -> str:
     for file in sorted((ROOT / "exported").glob("*wheel*.onnx")):
         estimator = for_simulated_case(Estimator.load(file), case)
         size = f"| {file.name} | {file.stat().st_size / 1e3:.0f} "
-        alone = estimator.sets is not None and estimator.sets.alone
+        alone = estimator.sets is not None and estimator.sets.sets_only
         whole = _timed(lambda e=estimator: e(**_reading()))
         if alone:
             lines.append(f"{size}| | | {whole[0]:.0f} | {whole[1]:.0f} {_set_latency(estimator)}")
@@ -60,7 +60,7 @@ def _set_latency(estimator: Estimator) -> str:
         return f"| | {run[0]:.0f} | |"
     sets = estimator.sets
     feed = sets.feed(sets.rows(many), sets.start())
-    names = [*(f"set_{name}" for name in ANSWER), *KEPT]
+    names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
     raw = _timed(lambda: estimator.session.run(names, feed), CALLS // 8)
     _, memory = estimator.step(estimator.start(), **many)
     step = _timed(lambda: estimator.step(memory, **_reading()), CALLS // 8)

@@ -11,7 +11,7 @@ from faults import Readings
 from scipy.stats import qmc
 
 from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.monomials import derivative, monomials, terms
+from training.set_posterior.monomials import derivative, monomial_terms, monomials
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -21,7 +21,7 @@ DEGREE, POINTS, FIT_ERROR = 6, 512, 1e-3
 STARTS, STEPS = 2048, 12
 #: Readings below this many standard deviations are left out: their logarithm is not normal.
 MIN_SNR = 3.0
-TERMS = terms(3, DEGREE)
+TERMS = monomial_terms(3, DEGREE)
 DERIVATIVES = [derivative(TERMS, k) for k in (1, 2, 3)]
 
 

@@ -33,10 +33,10 @@ from soilml import Estimator
 from soilml.cli.progress import progress_bar
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.onboard.set_contract import ABSENT_STD
 from soilml.quantities import SHEAR
 from training.set_posterior.coordinates import Coordinate
 from training.set_posterior.recipe_family import RecipeFamily
-from training.set_posterior.wheel_family import ABSENT
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 Order = np.ndarray[Any, np.dtype[np.int64]]
@@ -100,7 +100,7 @@ def simulate_fault(
     """Simulate soils of the prior with a fault, and fit the models that may explain them."""
     true_case, rng = fault.case(case), np.random.default_rng(seed)
     u = rng.random((SETS + VALID_SETS, 3))
-    x = np.stack([a.drawn(u[:, i]) for i, a in enumerate(axes)], axis=1)
+    x = np.stack([a.quantile(u[:, i]) for i, a in enumerate(axes)], axis=1)
     theta = parameter_values(axes, x)
     true = simulate(true_case, theta[:SETS], SLIP, LOAD)
     reported = fault.report(true)
@@ -252,7 +252,7 @@ def false_alarm_table(files: Sequence[str] = RELEASED) -> str:
     for rows in SIZES:
         sets = RecipeFamily.of(recipe, SHEAR).sets(FALSE_ALARM_SETS, rows, 4711)
         std = {name: sets.readings[f"{name}_std"] for name in COLUMNS}
-        read = {k: np.where(v < ABSENT, sets.readings[k], np.nan) for k, v in std.items()}
+        read = {k: np.where(v < ABSENT_STD, sets.readings[k], np.nan) for k, v in std.items()}
         readings = {k: sets.readings[k] for k in ("slip", "load")} | read
         shares.append([run_file(file, readings, std, True)[2].mean() for file in estimators])
     cells = [" / ".join(f"{100 * share:.1f}" for share in own) for own in shares]

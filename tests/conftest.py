@@ -134,13 +134,13 @@ def wheel_posterior():
     from datagen.recipe import read_recipe
     from soilml.quantities import SHEAR
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.posterior_summary import Limits
+    from training.set_posterior.misfit_test import MisfitLimits
     from training.set_posterior.recipe_family import RecipeFamily
     from training.set_posterior.response_surface import ResponseSettings, fit_response
 
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
     response = fit_response(family, ResponseSettings(768, 32, 120, 0), lambda *_: None)
-    return SetPosteriorGraph(family, response, Limits(*map(np.asarray, LENIENT)))
+    return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
 
 
 @pytest.fixture(scope="session")
@@ -158,13 +158,13 @@ def any_posterior():
     from soilml.io.toml_settings import read_settings
     from training.set_posterior.dimensionless_family import DimensionlessFamily
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.posterior_summary import Limits
+    from training.set_posterior.misfit_test import MisfitLimits
     from training.set_posterior.response_surface import ResponseSettings, fit_response
 
     settings = read_settings(packaged_file("any_wheel", "training", "specs"))
     family = DimensionlessFamily.take(settings.table("any_wheel"))
     response = fit_response(family, ResponseSettings(768, 32, 60, 0), lambda *_: None)
-    return SetPosteriorGraph(family, response, Limits(*map(np.asarray, LENIENT)))
+    return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
 
 
 @pytest.fixture(scope="session")

@@ -179,8 +179,10 @@ def test_channels_may_be_missing_in_some_rows(wheel):
 
 def test_a_wheel_beyond_the_range_of_a_file_is_refused():
     radius = {"wheel_radius": (0.04, 0.5)}
-    file = SetPosterior(terms=35, noise={}, context=radius, given={}, alone=True)
-    assert file.on({"wheel_radius": 0.3}, {}).given == {"wheel_radius": 0.3}
+    file = SetPosterior(
+        terms=35, noise={}, context_ranges=radius, context_values={}, sets_only=True
+    )
+    assert file.with_context({"wheel_radius": 0.3}, {}).context_values == {"wheel_radius": 0.3}
     for wrong in (0.75, 300.0, -0.1, np.nan):  # too large, in mm, impossible, unknown
         with pytest.raises(InputError, match="wheel_radius"):
-            file.on({"wheel_radius": wrong}, {})
+            file.with_context({"wheel_radius": wrong}, {})

@@ -11,7 +11,7 @@ from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES, best_linear, shr
 from training.calibration.recalibration import CalibratedRegressor
 from training.data.dataset import Dataset
 from training.onnx_graph.builder import Graph
-from training.onnx_graph.fusion_rules import draw_best_linear, draw_rule
+from training.onnx_graph.fusion_rules import add_best_linear_fusion, add_rowwise_fusion
 
 Floats = NDArray[np.float64]
 
@@ -48,8 +48,8 @@ class Ensemble:
             means.append(mean)
             stds.append(graph.op("Mul", std, graph.constant(member.widen)))
         if self.rule == BEST_LINEAR:
-            return draw_best_linear(graph, means, stds, self.weights, self.correlation)
-        return draw_rule(self.rule, graph, means, stds)
+            return add_best_linear_fusion(graph, means, stds, self.weights, self.correlation)
+        return add_rowwise_fusion(self.rule, graph, means, stds)
 
 
 def fuse_members(members: list[CalibratedRegressor], rule: str, data: Dataset) -> Ensemble:

@@ -41,7 +41,11 @@ from training.regressors.gaussian_mlp import GaussianMLP
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import fit_response
-from training.set_posterior.validation import SetFigures, validated, with_limits
+from training.set_posterior.validation import (
+    SetFigures,
+    calibrate_misfit_limits,
+    validate_posterior,
+)
 from training.spec import Spec
 
 Floats = NDArray[np.float64]
@@ -122,10 +126,10 @@ def train(
     posterior, figures = None, {}
     if spec.set_posterior is not None:
         family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
-        posterior = with_limits(
+        posterior = calibrate_misfit_limits(
             family, fit_response(family, spec.set_posterior, progress), progress
         )
-        figures = validated(posterior, progress)
+        figures = validate_posterior(posterior, progress)
     return Trained(
         spec=spec,
         estimator=estimator,

@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_posterior import OPTIONAL
+from soilml.onboard.set_contract import OPTIONAL_READINGS
 from soilml.quantities import CHANNELS, column
 
 
@@ -29,7 +29,7 @@ def joint_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
     for name in CHANNELS:
         key, spread = column(name), f"{column(name)}_std"
         known = name in estimator.sets.noise or spread in table
-        if name in OPTIONAL and key in table and known:
+        if name in OPTIONAL_READINGS and key in table and known:
             readings[name] = table[key]
         if name in readings and spread in table:
             readings[f"{name}_std"] = _fill_blank_std(

@@ -24,7 +24,7 @@ def apply_case_option(
 
     Raises `InputError` where a file for wheels of any size has no case, or another file has one.
     """
-    any_wheel = estimator.sets is not None and bool(estimator.sets.needs)
+    any_wheel = estimator.sets is not None and bool(estimator.sets.missing_context)
     if any_wheel and args.case is None:
         raise InputError(
             f"{args.model} is for wheels of any size: give --case MODEL.toml with your [gear], "
@@ -44,7 +44,7 @@ def apply_case_option(
 def check_table_wheel(estimator: Estimator, table: Table) -> None:
     """Raise `TableError` where the table's wheel columns differ from the wheel of the training."""
     gear = json.loads(estimator.metadata["gear"])
-    fixed = estimator.sets.given if estimator.sets is not None else {}
+    fixed = estimator.sets.context_values if estimator.sets is not None else {}
     sizes = {n: fixed.get(f"wheel_{n}", gear.get(n)) for n in ("radius", "width")}
     check_wheel_columns(table, sizes, "the model was trained for", _HINT)
     effects = json.loads(estimator.metadata["recipe"]).get("effect", [])

@@ -47,7 +47,7 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
         given[f"{name}_max"] = ends.upper
     bearing = float(soil.kc) / float(gear.width) + float(soil.kphi)
     near = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
-    widest = estimator.sets.context["bearing_std"][1] if estimator.sets else 0.0
+    widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
     if near > widest:
         said.append(
             f"kphi may stray by a factor of {math.exp(near):.2g}, the file follows "
@@ -75,7 +75,7 @@ def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
 
     For sets that the case made: the sensor of the torque has no bias.
     """
-    if estimator.sets is None or not estimator.sets.needs:
+    if estimator.sets is None or not estimator.sets.missing_context:
         return estimator
     return condition_on_case(estimator, case)[0].on(noise={"torque_bias": (0.0, 0.0)})
 

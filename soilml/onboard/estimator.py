@@ -18,7 +18,7 @@ from soilml.onboard.estimate import Estimate, PoolingCalibration, PriorSummary
 from soilml.onboard.features import readings
 from soilml.onboard.gaussian_pooling import pooled_run
 from soilml.onboard.model_file import check_origin, numbers, opened, together_of
-from soilml.onboard.set_posterior import Memory, SetPosterior, once
+from soilml.onboard.set_posterior import Memory, SetPosterior, without_copies
 
 Floats = NDArray[np.float64]
 
@@ -101,9 +101,11 @@ class Estimator:
         its share of the reading. Raises `InputError` for what the file does not take, or is not
         for.
         """
-        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).on(given, noise or {})
+        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).with_context(given, noise or {})
         outputs = json.loads(self.metadata["outputs"])
-        scale = np.asarray([sets.given.get(entry.get("scale", ""), 1.0) for entry in outputs])
+        scale = np.asarray(
+            [sets.context_values.get(entry.get("scale", ""), 1.0) for entry in outputs]
+        )
         unit = [numbers(outputs, k) for k in ("prior_mean", "prior_std", "lower", "upper")]
         return replace(self, sets=sets, prior=PriorSummary(*(scale * end for end in unit)))
 
@@ -112,7 +114,7 @@ class Estimator:
 
         Raises `InputError` for a reading that is missing, not finite or impossible.
         """
-        if self.sets is not None and self.sets.alone:
+        if self.sets is not None and self.sets.sets_only:
             return self._one_by_one(self.sets, measured)
         flat, shape = readings(self.inputs, measured)
         with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
@@ -138,7 +140,7 @@ class Estimator:
         there is no row, and where the rows of a run have no one value: slip.
         """
         if self.sets is not None:
-            rows = once(self._ready.rows(measured))
+            rows = without_copies(self._ready.rows(measured))
             if rows["slip"].size == 0:
                 raise InputError("no reading given; needed is one or more")
             return self._answered(rows, self.start())[0]
@@ -150,7 +152,7 @@ class Estimator:
         Far from the best that many readings allow. Raises `InputError` as `run` does, and for a
         file that has no estimates of single readings.
         """
-        if self.sets is not None and self.sets.alone:
+        if self.sets is not None and self.sets.sets_only:
             raise InputError(f"{self.path} has no estimates of single readings to join; take run")
         if self.per_row:
             raise InputError(
@@ -167,7 +169,7 @@ class Estimator:
         if self.sets is None:
             return np.atleast_1d(self(**measured).in_range)
         rows = self._ready.rows(measured)
-        return self.sets.inside(self.session, rows)
+        return self.sets.rows_in_range(self.session, rows)
 
     def start(self) -> Memory:
         """The memory of a soil of which nothing was measured yet."""
@@ -188,7 +190,7 @@ class Estimator:
     def _ready(self) -> SetPosterior:
         if self.sets is None:
             raise InputError(f"{self.path} has no set posterior; train it with [set_posterior]")
-        if missing := self.sets.needs:
+        if missing := self.sets.missing_context:
             raise InputError(
                 f"{self.path} is for many wheels: give {', '.join(missing)} first, by "
                 "estimator.on(...)"
@@ -197,7 +199,7 @@ class Estimator:
 
     def _answered(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
         """Estimate and memory after these rows (m,)."""
-        found, memory = self._ready.learned(self.session, rows, memory)
+        found, memory = self._ready.update(self.session, rows, memory)
         mean, std, covariance, low, high = (np.asarray(x, np.float64) for x in found[:5])
         sound = np.asarray(bool(found[5][0]))
         parts = (mean, std, covariance, low, high, sound)

@@ -1,7 +1,7 @@
-"""Readings of one soil together, on board: the part of a model file that answers for a whole set.
+"""Estimates from all readings of one soil, onboard: the set posterior of a model file.
 
-The answer follows from all readings at once, whatever their order and number. What they leave is a
-memory of fixed size, so that a rover can go on where it stopped.
+The estimate follows from all readings jointly and does not depend on their order. What they
+contribute is kept in a memory of bounded size, so that a rover can continue where it stopped.
 """
 
 from __future__ import annotations
@@ -16,189 +16,233 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.features import READABLE, readings
+from soilml.onboard.set_contract import (
+    ABSENT_READING,
+    ABSENT_STD,
+    LEAST_STD,
+    MEMORY_INPUTS,
+    MEMORY_OUTPUTS,
+    NOISE_NAMES,
+    OPTIONAL_READINGS,
+    REQUIRED_READINGS,
+    ROW_IN_RANGE,
+    SET_OUTPUTS,
+    SET_PREFIX,
+    SET_SWITCH,
+    STD_INPUTS,
+    empty_memory,
+)
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Feed = dict[str, NDArray[Any]]
 
-#: What every row brings, and what it may bring beside: a number, or NaN where it was not measured.
-NEEDED = ("slip", "torque", "load")
-OPTIONAL = ("sinkage", "drawbar_pull")
-#: Standard deviations that may be given row by row; without them those of the file hold.
-SPREADS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
-#: What may have noise.
-NOISY = ("torque", *OPTIONAL, "torque_bias")
-#: Outputs of the graph that make an answer, in this order, and those that make the memory.
-ANSWER = ("mean", "std", "covariance", "low", "high", "in_range", "misfit")
-KEPT = ("memory_out", "counted_out")
-#: A channel that was not measured reads 1 with this standard deviation.
-ABSENT = 1e6
-#: A reading of zero with noise that is a share of it has this standard deviation, and fits nothing.
-LEAST_STD = 1e-12
-#: Rows of the memory beyond which it is turned into a triangle; rows of one call of the graph.
-FULL, PIECE = 192, 256
+#: Rows of the residual system beyond which it is replaced by its triangular factor, which has at
+#: most as many rows as columns: 36 with three unknowns, 72 with five.
+MOST_SYSTEM_ROWS = 192
+#: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
+ROWS_PER_CALL = 256
+#: Stands for the smallest positive standard deviation: zero and negative values are refused.
+POSITIVE_STD = 1e-300
 
 
 @final
 @dataclass(frozen=True)
 class Memory:
-    """What the readings so far say of the soil: a linear system in float32, and three counts.
+    """Sufficient statistics of the readings so far: a linear system and three counts, float32.
 
-    The counts are readings that tell something, rows, and rows inside the range. At most `FULL`
-    rows of the system are kept, 60 kB, however many readings there were.
+    Parameters
+    ----------
+    system : ndarray
+        Residual system (k, terms + 1) of the readings; k stays below `MOST_SYSTEM_ROWS` plus the
+        rows of one call, however many readings there were.
+    counts : ndarray
+        Informative readings, rows, and rows in range, (3,).
     """
 
-    system: Singles  # (k, terms + 1)
-    counted: Singles  # (3,)
+    system: Singles
+    counts: Singles
 
     @property
     def rows(self) -> int:
-        """Rows that were read."""
-        return int(self.counted[1])
+        """Number of rows that were read."""
+        return int(self.counts[1])
 
     def packed(self) -> Memory:
-        """The same in as few rows as it has columns, where it has grown large.
+        """An equivalent memory, with the triangular factor of a large system in its place.
 
-        Sums of squared residuals depend on the system only through its triangular factor
-        (Golub and Van Loan, Matrix Computations, section 5.3): nothing is lost.
+        The likelihood depends on the system A only through A^T A = R^T R, with R its triangular
+        factor (Golub and Van Loan, Matrix Computations, section 5.3).
         """
-        if len(self.system) <= FULL:
+        if len(self.system) <= MOST_SYSTEM_ROWS:
             return self
-        triangle: Any = np.linalg.qr(self.system.astype(np.float64), mode="r")
-        return replace(self, system=triangle.astype(np.float32))
+        factor: Any = np.linalg.qr(self.system.astype(np.float64), mode="r")
+        return replace(self, system=factor.astype(np.float32))
 
 
 @final
 @dataclass(frozen=True)
 class SetPosterior:
-    """The graph's inputs and outputs for sets, and the noise that the file takes for given."""
+    """The part of a model file's graph that estimates from sets of rows.
+
+    Parameters
+    ----------
+    terms : int
+        Number of monomials: columns of the residual system, less one.
+    noise : dict
+        Noise model by name: constant part, and share of the reading.
+    context_ranges : dict
+        Least and largest value of each context input, which holds for a whole set.
+    context_values : dict
+        Values of the context inputs that were set.
+    sets_only : bool
+        Whether the file has no regressors of single rows.
+    """
 
     terms: int
-    noise: dict[str, tuple[float, float]]  # channel -> constant, share of the reading
-    context: dict[str, tuple[float, float]]  # what holds for a set -> least and most
-    given: dict[str, float]  # the same, as it was given
-    alone: bool  # the file has no regressors of single readings beside it
+    noise: dict[str, tuple[float, float]]
+    context_ranges: dict[str, tuple[float, float]]
+    context_values: dict[str, float]
+    sets_only: bool
 
     @staticmethod
-    def of(said: Mapping[str, Any]) -> SetPosterior:
-        """From the file's metadata."""
+    def of(metadata: Mapping[str, Any]) -> SetPosterior:
+        """From the entry `set` of a file's metadata."""
+        noise, context = metadata["noise"], metadata["context"]
         return SetPosterior(
-            terms=int(said["terms"]),
-            noise={str(k): (float(v[0]), float(v[1])) for k, v in said["noise"].items()},
-            context={str(k): (float(v[0]), float(v[1])) for k, v in said["context"].items()},
-            given={},
-            alone=bool(said["alone"]),
+            terms=int(metadata["terms"]),
+            noise={str(k): (float(v[0]), float(v[1])) for k, v in noise.items()},
+            context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context.items()},
+            context_values={},
+            sets_only=bool(metadata["alone"]),
         )
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """What must still be given before anything is estimated."""
-        return tuple(name for name in self.context if name not in self.given)
+    def missing_context(self) -> tuple[str, ...]:
+        """Context inputs that must be set before anything is estimated."""
+        return tuple(name for name in self.context_ranges if name not in self.context_values)
 
-    def on(
-        self, given: Mapping[str, Any], noise: Mapping[str, tuple[float, float]]
+    def with_context(
+        self, context: Mapping[str, Any], noise: Mapping[str, tuple[float, float]]
     ) -> SetPosterior:
-        """With wheel, bearing, prior and noise given.
+        """A copy with context inputs (wheel, bearing values, prior) and noise set.
 
-        Raises `InputError` for one that is not known or out of range.
+        Raises
+        ------
+        InputError
+            If a name is not known, or a value is out of the range of the file.
         """
         for name, (constant, share) in noise.items():
-            if name not in NOISY or not (constant >= 0.0 and share >= 0.0):
+            if name not in NOISE_NAMES or not (constant >= 0.0 and share >= 0.0):
                 raise InputError(
                     f"noise of {name} is {constant:g} and {share:g} of the reading; needed are two "
-                    f"numbers not below zero for {', '.join(NOISY)}"
+                    f"numbers of zero or more for one of {', '.join(NOISE_NAMES)}"
                 )
-        for name, value in given.items():
-            if name not in self.context:
-                known = ", ".join(self.context) or "nothing: the file is of one wheel"
-                raise InputError(f"{name!r} cannot be given; this file takes {known}")
-            low, high = self.context[name]
+        for name, value in context.items():
+            if name not in self.context_ranges:
+                known = ", ".join(self.context_ranges) or "none: it was trained for one wheel"
+                raise InputError(
+                    f"{name!r} is not a context input of this file; its context inputs: {known}"
+                )
+            low, high = self.context_ranges[name]
             if not low <= float(value) <= high:
-                raise InputError(f"{name} is {value:g}; this file is for {low:g} to {high:g}")
-        own = self.given | {k: float(v) for k, v in given.items()}
-        return replace(self, given=own, noise=self.noise | dict(noise))
+                raise InputError(
+                    f"{name} is {value:g}; the range of this file is {low:g} to {high:g}"
+                )
+        values = self.context_values | {k: float(v) for k, v in context.items()}
+        return replace(self, context_values=values, noise=self.noise | dict(noise))
 
     def start(self) -> Memory:
-        """The memory before anything was measured."""
-        return Memory(np.zeros((0, self.terms + 1), np.float32), np.zeros(3, np.float32))
+        """The memory before the first reading."""
+        return Memory(*empty_memory(self.terms))
 
     def rows(self, measured: Mapping[str, Any]) -> dict[str, Floats]:
-        """Inputs of the graph by row (m,), checked and complete.
+        """Row inputs of the graph (m,) from readings, checked and completed.
 
-        Raises `InputError` for a reading that is missing, not finite or impossible.
+        Parameters
+        ----------
+        measured : mapping
+            Slip, torque and load; optionally sinkage and drawbar pull, NaN where they were not
+            measured, and standard deviations. Numbers or arrays that broadcast to one shape.
+
+        Raises
+        ------
+        InputError
+            If a reading is missing, not finite, out of its physical range, or not an input.
         """
-        known = (*NEEDED, *OPTIONAL, *SPREADS)
+        known = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS)
         for name in measured:
             if name not in known:
                 raise InputError(f"{name!r} is not read by this model; it reads {', '.join(known)}")
-        own = {name: measured[name] for name in measured if name in NEEDED}
-        flat, shape = readings(NEEDED, own)
-        found = dict(zip(NEEDED, flat, strict=True))
-        for name in OPTIONAL:
+        required = {name: measured[name] for name in measured if name in REQUIRED_READINGS}
+        flat, shape = readings(REQUIRED_READINGS, required)
+        rows = dict(zip(REQUIRED_READINGS, flat, strict=True))
+        for name in OPTIONAL_READINGS:
             value = _broadcast(name, measured.get(name, np.nan), shape)
             absent = np.isnan(value)
-            found[name] = np.where(absent, 1.0, value)
-            spread = self._spread(f"{name}_std", name, value, measured, shape)
-            found[f"{name}_std"] = np.where(absent, ABSENT, spread)
-        for name, kind in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
-            found[name] = self._spread(name, kind, found["torque"], measured, shape)
-        for name in SPREADS:
-            least = 0.0 if name == "torque_bias" else 1e-300
-            if not (found[name] >= least).all():
-                raise InputError(f"{name} is {found[name].min():g}; it must be above zero")
-        return found
+            std = self._std(f"{name}_std", name, value, measured, shape)
+            rows[name] = np.where(absent, ABSENT_READING, value)
+            rows[f"{name}_std"] = np.where(absent, ABSENT_STD, std)
+        for name, source in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
+            rows[name] = self._std(name, source, rows["torque"], measured, shape)
+        for name in STD_INPUTS:
+            least = 0.0 if name == "torque_bias" else POSITIVE_STD
+            if not (rows[name] >= least).all():
+                needed = "zero or more" if name == "torque_bias" else "above zero"
+                raise InputError(f"{name} is {rows[name].min():g}; it must be {needed}")
+        return rows
 
-    def _spread(
+    def _std(
         self,
         name: str,
-        kind: str,
+        source: str,
         reading: Floats,
         measured: Mapping[str, Any],
         shape: tuple[int, ...],
     ) -> Floats:
-        """A standard deviation (m,) as it was given, or by the file's own noise."""
+        """A standard deviation (m,) as measured, or from the noise model of its source."""
         if name in measured:
             return _broadcast(name, measured[name], shape)
-        constant, share = self.noise.get(kind, (0.0, 0.0))
-        if kind in OPTIONAL and not constant + share:
-            return np.full_like(reading, ABSENT)
+        constant, share = self.noise.get(source, (0.0, 0.0))
+        if source in OPTIONAL_READINGS and not constant + share:
+            return np.full_like(reading, ABSENT_STD)
         least = 0.0 if name == "torque_bias" else LEAST_STD
         return np.maximum(np.hypot(constant, share * np.abs(reading)), least)
 
     def feed(self, rows: Mapping[str, Floats], memory: Memory) -> Feed:
-        """Everything that the graph reads, by input name."""
-        with np.errstate(over="ignore", under="ignore"):
+        """All inputs of the graph by name."""
+        with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
             feed: Feed = {name: values.astype(np.float32) for name, values in rows.items()}
-        feed |= {name: np.asarray([value], np.float32) for name, value in self.given.items()}
-        if not self.alone:
-            feed["joint"] = np.ones(1, np.bool_)
-        return feed | {"memory": memory.system, "counted": memory.counted}
+        feed |= {n: np.asarray([value], np.float32) for n, value in self.context_values.items()}
+        if not self.sets_only:
+            feed[SET_SWITCH] = np.ones(1, np.bool_)
+        return feed | dict(zip(MEMORY_INPUTS, (memory.system, memory.counts), strict=True))
 
-    def inside(
+    def rows_in_range(
         self, session: ort.InferenceSession, rows: Mapping[str, Floats]
     ) -> NDArray[np.bool_]:
-        """Which rows (m,) lie where the response of the wheel was learned."""
-        found: NDArray[np.bool_] = session.run(("row_in_range",), self.feed(rows, self.start()))[0]
-        return found
+        """Which rows (m,) lie in the range of the response surface."""
+        flags: NDArray[np.bool_] = session.run((ROW_IN_RANGE,), self.feed(rows, self.start()))[0]
+        return flags
 
-    def learned(
+    def update(
         self, session: ort.InferenceSession, rows: Mapping[str, Floats], memory: Memory
     ) -> tuple[list[Any], Memory]:
-        """Answers of the graph, as in `ANSWER`, after rows and memory together; the new memory."""
-        many = len(rows["slip"])
-        for first in range(0, max(many - PIECE, 0), PIECE):
-            piece = {name: values[first : first + PIECE] for name, values in rows.items()}
-            memory = Memory(*session.run(KEPT, self.feed(piece, memory))).packed()
-        left = (many - 1) // PIECE * PIECE if many else 0
-        rest = {name: values[left:] for name, values in rows.items()}
-        names = [*(f"set_{name}" for name in ANSWER), *KEPT]
-        found = session.run(names, self.feed(rest, memory.packed()))
-        return found[: len(ANSWER)], Memory(*found[len(ANSWER) :])
+        """Outputs of the graph, in the order of `SET_OUTPUTS`, and memory after further rows."""
+        count = len(rows["slip"])
+        last = (count - 1) // ROWS_PER_CALL * ROWS_PER_CALL if count else 0
+        for first in range(0, last, ROWS_PER_CALL):
+            part = {name: v[first : first + ROWS_PER_CALL] for name, v in rows.items()}
+            memory = Memory(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
+        part = {name: values[last:] for name, values in rows.items()}
+        names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
+        outputs = session.run(names, self.feed(part, memory.packed()))
+        return outputs[: len(SET_OUTPUTS)], Memory(*outputs[len(SET_OUTPUTS) :])
 
 
-def once(rows: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Rows without those that repeat another in every reading: they are copies, and say nothing."""
-    table = np.stack([rows[name] for name in (*NEEDED, *OPTIONAL)], axis=1)
+def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Rows without those that repeat another in every reading: copies carry no information."""
+    table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
     first: dict[bytes, int] = {}
     for i, row in enumerate(table):
         first.setdefault(row.tobytes(), i)

@@ -164,7 +164,7 @@ def model_file_methods(label: str, estimator: Estimator) -> list[Method]:
 
         return estimate
 
-    if estimator.sets is None or estimator.sets.alone:
+    if estimator.sets is None or estimator.sets.sets_only:
         return [Method(label, kind, inputs, channels, by(estimator.run, True))]
     pooled = f"{label}{POOLED_SUFFIX}"
     return [

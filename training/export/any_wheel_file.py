@@ -14,17 +14,21 @@ from soilml import __version__
 from soilml.config.measurement_noise import take_noise
 from soilml.io.toml_settings import read_settings
 from soilml.onboard.model_file import FORMAT
+from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.quantities import QUANTITIES, SHEAR, column
 from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
 from training.set_posterior.dimensionless_family import DimensionlessFamily
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.metadata import figures_of, metadata_of, probe_of_sets, table_of
-from training.set_posterior.posterior_summary import prior_of
+from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.response_surface import ResponseSettings, fit_response
 from training.set_posterior.settings import take_response_settings
-from training.set_posterior.validation import SetFigures, validated, with_limits
-from training.set_posterior.wheel_family import CHANNELS
+from training.set_posterior.validation import (
+    SetFigures,
+    calibrate_misfit_limits,
+    validate_posterior,
+)
 
 Progress = Callable[[str, int, int], None]
 
@@ -64,7 +68,7 @@ def read_any_spec(path: str | os.PathLike[str]) -> AnySpec:
     seed = int(settings.take("seed", int, "a whole number, 0 or more", 0))
     family = DimensionlessFamily.take(settings.table("any_wheel"))
     own, noise = settings.table("noise"), {}
-    for name in CHANNELS:
+    for name in RESPONSE_CHANNELS:
         taken = take_noise(own, column(name))
         noise[name] = [taken.constant, taken.share]
     own.finish()
@@ -80,8 +84,10 @@ def read_any_spec(path: str | os.PathLike[str]) -> AnySpec:
 
 def trained(spec: AnySpec, progress: Progress) -> tuple[SetPosteriorGraph, dict[int, SetFigures]]:
     """The set posterior and its figures on fresh sets."""
-    posterior = with_limits(spec.family, fit_response(spec.family, spec.size, progress), progress)
-    return posterior, validated(posterior, progress)
+    posterior = calibrate_misfit_limits(
+        spec.family, fit_response(spec.family, spec.size, progress), progress
+    )
+    return posterior, validate_posterior(posterior, progress)
 
 
 def export(
@@ -92,8 +98,8 @@ def export(
 ) -> dict[str, str]:
     """Write the file and return its metadata; bytes depend on the spec alone."""
     graph = Graph()
-    posterior.draw(graph)
-    prior = prior_of(posterior.family)
+    posterior.add_to(graph)
+    prior = prior_summary(posterior.family)
     columns = []
     for k, (name, axis) in enumerate(zip(SHEAR, posterior.family.axes, strict=False)):
         entry = {

@@ -18,12 +18,12 @@ from soilml.errors import SoilmlError
 from soilml.io.atomic_files import atomic_output
 from soilml.onboard.features import READABLE, computed, inputs_of, parts
 from soilml.onboard.model_file import DRIVEN, FORMAT, KIND, behind, checksum
+from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.quantities import QUANTITIES, column
 from training.data.targets import PER_ROW
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph, Output, session_of
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.metadata import figures_of, metadata_of, probe_of_sets
-from training.set_posterior.wheel_family import CHANNELS
 from training.train import Trained
 
 Floats = NDArray[np.float64]
@@ -55,7 +55,7 @@ def draw(trained: Trained) -> Any:
         return graph.model(inputs, outputs)
     rows, sets = Graph("rows_"), Graph("sets_")
     _draw_rows(trained, rows, "rows_")
-    posterior.draw(sets, "sets_")
+    posterior.add_to(sets, "sets_")
     outputs = {
         name: (kind, [None] * len(shape))
         for name, (kind, shape) in (outputs | posterior.outputs).items()
@@ -219,7 +219,7 @@ def _set(posterior: SetPosteriorGraph, recipe: str) -> dict[str, Any]:
     content = parse_recipe(recipe, "recipe of the data")
     noise = {
         name: [content.case.noise[column(name)].constant, content.case.noise[column(name)].share]
-        for name in CHANNELS
+        for name in RESPONSE_CHANNELS
         if column(name) in content.case.noise
     }
     bias = content.bias.get(column("torque"))

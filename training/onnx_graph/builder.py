@@ -42,10 +42,6 @@ class Graph:
         self._constants.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
         return name
 
-    def small(self, value: Any) -> str:
-        """A constant array as float32."""
-        return self.constant(np.asarray(value, dtype=np.float32), exact=True)
-
     def op(self, kind: str, *inputs: str, out: str | None = None, **attributes: Any) -> str:
         """One node with one output; its name."""
         return self.ops(kind, 1, *inputs, out=out, **attributes)[0]
@@ -66,6 +62,18 @@ class Graph:
         names = outs or [name, *[f"{name}_{i}" for i in range(1, count)]]
         self._nodes.append(helper.make_node(kind, list(inputs), names, **attributes))
         return names
+
+    def rename_last(self, name: str, new: str) -> None:
+        """Rename the output of the node that was added last, which nothing reads yet.
+
+        Raises
+        ------
+        ValueError
+            If `name` is not the first output of that node.
+        """
+        if not self._nodes or self._nodes[-1].output[0] != name:
+            raise ValueError(f"{name} is not the output of the last node; name it right away")
+        self._nodes[-1].output[0] = new
 
     def double(self, name: str) -> str:
         """As float64."""

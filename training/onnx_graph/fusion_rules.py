@@ -6,54 +6,97 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, add_all, concat, reciprocal, sqrt
 
 Floats = NDArray[np.float64]
 
 
-def draw_best_linear(
+def add_best_linear_fusion(
     graph: Graph, means: list[str], stds: list[str], weights: Floats, correlation: Floats
 ) -> tuple[str, str]:
-    """Fixed weights (m, q) and the errors' correlation (q, m, m): names of mean and std (n, q)."""
-    m = len(means)
-    weighed = [graph.op("Mul", x, graph.constant(weights[i])) for i, x in enumerate(means)]
-    mean = graph.op("Sum", *weighed)
-    spread = [graph.op("Mul", s, graph.constant(weights[i])) for i, s in enumerate(stds)]
+    r"""The linear combination of m estimates with fixed weights.
+
+    .. math:: \mu = \sum_i w_i \mu_i, \qquad
+        \sigma^2 = \sum_i \sum_j w_i w_j \sigma_i \sigma_j \rho_{ij}
+
+    Parameters
+    ----------
+    graph : Graph
+        The graph to which nodes are added.
+    means, stds : list of str
+        Names of the m estimates and their standard deviations, (n, q) each.
+    weights : ndarray
+        Weights (m, q).
+    correlation : ndarray
+        Correlation (q, m, m) of the errors.
+
+    Returns
+    -------
+    tuple of str
+        Names of mean and standard deviation (n, q).
+    """
+    mean_values, std_values = _doubles(graph, means), _doubles(graph, stds)
+    mean = add_all([mean * weights[i] for i, mean in enumerate(mean_values)])
+    weighted_std = [std * weights[i] for i, std in enumerate(std_values)]
     terms = []
-    for i in range(m):
-        for j in range(i, m):
-            factor = correlation[:, i, j] * (1.0 if i == j else 2.0)
-            product = graph.op("Mul", spread[i], spread[j])
-            terms.append(graph.op("Mul", product, graph.constant(factor)))
-    return mean, graph.op("Sqrt", graph.op("Sum", *terms))
+    for i in range(len(means)):
+        for j in range(i, len(means)):
+            multiplicity = 1.0 if i == j else 2.0  # the pairs (i, j) and (j, i)
+            terms.append(weighted_std[i] * weighted_std[j] * (correlation[:, i, j] * multiplicity))
+    return mean.name, sqrt(add_all(terms)).name
 
 
-def draw_rule(rule: str, graph: Graph, means: list[str], stds: list[str]) -> tuple[str, str]:
-    """A rule that weighs row by row: names of the fused mean and std (n, q)."""
-    axis = graph.constant(np.asarray([1], dtype=np.int64))
-    mean = graph.op("Concat", *[graph.op("Unsqueeze", m, axis) for m in means], axis=1)
-    std = graph.op("Concat", *[graph.op("Unsqueeze", s, axis) for s in stds], axis=1)
-    precision = graph.op("Reciprocal", std)  # (n, m, q)
-    information = graph.op("Mul", precision, precision)
+def add_rowwise_fusion(
+    rule: str, graph: Graph, means: list[str], stds: list[str]
+) -> tuple[str, str]:
+    r"""A fusion rule whose weights follow from the standard deviations of each row.
+
+    With the information of an estimate :math:`I_i = \sigma_i^{-2}`, the weights of the rules
+    inverse-variance and covariance-intersection are :math:`I_i / \sum_j I_j`; the variances are
+    :math:`1 / \sum_j I_j` and :math:`m / \sum_j I_j`. Any other rule is the mean of all pairs.
+
+    Parameters
+    ----------
+    rule : str
+        One of `soilml.numerics.estimate_fusion.RULES`.
+    graph : Graph
+        The graph to which nodes are added.
+    means, stds : list of str
+        Names of the m estimates and their standard deviations, (n, q) each.
+
+    Returns
+    -------
+    tuple of str
+        Names of the fused mean and standard deviation (n, q).
+    """
+    mean_values, std_values = _doubles(graph, means), _doubles(graph, stds)
+    axis = mean_values[0].indices([1])
+    mean = concat([value.node("Unsqueeze", axis) for value in mean_values], axis=1)  # (n, m, q)
+    std = concat([value.node("Unsqueeze", axis) for value in std_values], axis=1)
+    precision = reciprocal(std)
+    information = precision * precision
     m = len(means)
     if rule in ("inverse-variance", "covariance-intersection"):
-        total = graph.reduced("ReduceSum", information, 1, keep=True)
-        weights = graph.op("Div", information, total)
+        total = information.sum(axis=1, keepdims=True)
+        weights = information / total
         share = 1.0 if rule == "inverse-variance" else 1.0 / m
-        variance = graph.op("Reciprocal", graph.op("Mul", total, graph.constant(share)))
+        variance = reciprocal(total * share)
     else:
-        weights, variance = _pairwise(graph, std, m)
-    fused = graph.reduced("ReduceSum", graph.op("Mul", weights, mean), 1)
-    return fused, graph.op("Sqrt", graph.reduced("ReduceSum", variance, 1))
+        weights, variance = _pairwise_fusion(std, m)
+    fused = (weights * mean).sum(axis=1, keepdims=False)
+    return fused.name, sqrt(variance.sum(axis=1, keepdims=False)).name
 
 
-def _pairwise(graph: Graph, std: str, m: int) -> tuple[str, str]:
-    square = graph.op("Mul", std, std)  # (n, m, q)
-    own = graph.op("Unsqueeze", square, graph.constant(np.asarray([2], dtype=np.int64)))
-    other = graph.op("Unsqueeze", square, graph.constant(np.asarray([1], dtype=np.int64)))
-    shares = graph.op("Div", other, graph.op("Add", own, other))  # (n, i, j, q)
-    summed = graph.reduced("ReduceSum", shares, 2)
-    # the diagonal of shares is one half
-    pairs = graph.op("Sub", summed, graph.constant(0.5))
-    weights = graph.op("Mul", pairs, graph.constant(2.0 / (m * (m - 1))))
-    spread = graph.op("Mul", graph.op("Mul", weights, weights), square)
-    return weights, graph.reduced("ReduceSum", spread, 1, keep=True)
+def _pairwise_fusion(std: Value, m: int) -> tuple[Value, Value]:
+    """Weights (n, m, q) and variance (n, 1, q) of the mean of all pairs' best combinations."""
+    variance = std * std
+    own = variance.node("Unsqueeze", variance.indices([2]))
+    other = variance.node("Unsqueeze", variance.indices([1]))
+    shares = other / (own + other)  # (n, i, j, q)
+    # each estimate is paired with itself as well, with a share of one half, which is taken off
+    weights = (shares.sum(axis=2, keepdims=False) - 0.5) * (2.0 / (m * (m - 1)))
+    return weights, (weights * weights * variance).sum(axis=1, keepdims=True)
+
+
+def _doubles(graph: Graph, names: list[str]) -> list[Value]:
+    return [Value(graph, name, np.float64) for name in names]

@@ -54,7 +54,7 @@ class Coordinate:
         """The parameter at coordinates x, of any shape."""
         return np.asarray(self.shift + self.factor * np.exp(self.rate * x) + self.slope * x)
 
-    def drawn(self, u: Floats) -> Floats:
+    def quantile(self, u: Floats) -> Floats:
         """Coordinates below which fractions u of the prior lie."""
         if self.tilt == 0.0:
             return np.asarray(2.0 * u - 1.0)

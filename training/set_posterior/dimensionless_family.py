@@ -12,23 +12,23 @@ from scipy.stats import qmc
 from soilml.config.prior import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
+from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.contact import Force
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
 from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.response_surface import NEAR
-from training.set_posterior.run_patterns import draw_patterns
+from training.set_posterior.response_surface import NORMAL_TRUNCATION
+from training.set_posterior.run_patterns import run_patterns
 from training.set_posterior.wheel_family import (
-    ABSENT,
-    CLEAR,
-    TINY,
-    Context,
+    MOST_RELATIVE_NOISE,
+    SMALLEST,
+    ContextValues,
     Origin,
     SimulatedSets,
-    draw_log_torque,
+    add_log_torque,
 )
 
 Floats = NDArray[np.float64]
@@ -37,14 +37,15 @@ Floats = NDArray[np.float64]
 COHESION, SHEAR_MODULUS = Prior(0.0, 1.0), Prior(1.0 / 6.0, 1.0)
 #: The bearing curve is given, and strays from what is given: its logarithm at the pivot by up to
 #: this much, and its exponent by up to that; the widest standard deviation is 1 / 2.5 of it.
-STRAY, BEND = 1.0, 0.25
-WIDEST = 0.4
+BEARING_RANGE, EXPONENT_RANGE = 1.0, 0.25
+MOST_BEARING_STD = 0.4
+LEAST_NORMAL_STD = 1e-3
 #: The curve pivots at this share of the radius.
-PIVOT = 0.05
+REFERENCE_DEPTH = 0.05
 #: Margin of every range in which designs are drawn, as a share of its width.
-MARGIN = 0.02
+RANGE_MARGIN = 0.02
 #: Loads of one set differ by up to this much in their logarithm.
-LEVELS = 1.2
+LOAD_SPREAD = 1.2
 #: Order of a design's numbers.
 SLIP, RADIUS, WIDTH, LOAD, EXPONENT, BEARING, MOST_COHESION, MOST_SHEAR_MODULUS = range(8)
 
@@ -94,8 +95,8 @@ class DimensionlessFamily:
                 Coordinate.of("cohesion", COHESION),
                 Coordinate.of("friction_angle", angle),
                 Coordinate.of("shear_modulus", SHEAR_MODULUS),
-                Coordinate.of("bearing", Prior(-STRAY, STRAY)),
-                Coordinate.of("bend", Prior(-BEND, BEND)),
+                Coordinate.of("bearing", Prior(-BEARING_RANGE, BEARING_RANGE)),
+                Coordinate.of("bend", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
             ),
         )
 
@@ -105,7 +106,7 @@ class DimensionlessFamily:
         found: list[Floats] = []
         have = 0
         while have < count:
-            u = sequence.random(1 << 13) * (1.0 + 2.0 * MARGIN) - MARGIN
+            u = sequence.random(1 << 13) * (1.0 + 2.0 * RANGE_MARGIN) - RANGE_MARGIN
             named = {name: prior.at(u[:, i]) for i, (name, prior) in enumerate(self.ranges.items())}
             radius, load, n = named["wheel_radius"], named["load"], named["n"]
             width = radius * named["width_over_radius"]
@@ -115,7 +116,7 @@ class DimensionlessFamily:
             pressure = load / (radius * width)
             drawn = drawn[(pressure > self.pressure[0]) & (pressure < self.pressure[1])]
             middle = np.zeros((len(drawn), 1, len(self.axes)))
-            depth = np.exp(self.answers(drawn, middle)[:, 0, 1])
+            depth = np.exp(self.responses(drawn, middle)[:, 0, 1])
             held = (depth > self.sinkage[0]) & (depth < self.sinkage[1])
             found.append(drawn[held])
             have += int(held.sum())
@@ -144,14 +145,20 @@ class DimensionlessFamily:
         rng = np.random.default_rng((seed, rows))
         base = self.designs(count, seed + rows)
         designs = np.repeat(base[:, None], rows, axis=1)
-        designs[..., SLIP] = self.ranges["slip"].at(draw_patterns(count, rows, rng))
-        designs[..., LOAD] *= np.exp(LEVELS * (draw_patterns(count, rows, rng) - 0.5))
-        near = np.where(rng.random(count) < 1.0 / 3.0, 0.0, rng.uniform(0.1, WIDEST, count))
-        x = np.stack([a.drawn(rng.random(count)) for a in self.axes[: self.free]], axis=1)
-        stray = np.clip(rng.standard_normal((count, 2)), -NEAR, NEAR) * near[:, None] / STRAY
+        designs[..., SLIP] = self.ranges["slip"].at(run_patterns(count, rows, rng))
+        designs[..., LOAD] *= np.exp(LOAD_SPREAD * (run_patterns(count, rows, rng) - 0.5))
+        near = np.where(
+            rng.random(count) < 1.0 / 3.0, 0.0, rng.uniform(0.1, MOST_BEARING_STD, count)
+        )
+        x = np.stack([a.quantile(rng.random(count)) for a in self.axes[: self.free]], axis=1)
+        stray = (
+            np.clip(rng.standard_normal((count, 2)), -NORMAL_TRUNCATION, NORMAL_TRUNCATION)
+            * near[:, None]
+            / BEARING_RANGE
+        )
         x = np.concatenate([x, stray], axis=1)
         flat = designs.reshape(-1, base.shape[1])
-        y = self.answers(flat, np.repeat(x, rows, axis=0)[:, None]).reshape(count, rows, 3)
+        y = self.responses(flat, np.repeat(x, rows, axis=0)[:, None]).reshape(count, rows, 3)
         z = self.features(flat).reshape(count, rows, -1)
         lower, upper = (end(self.features(base), axis=0) for end in (np.min, np.max))
         kept = np.isfinite(y).all(axis=(1, 2)) & ((z > lower) & (z < upper)).all(axis=(1, 2))
@@ -167,7 +174,7 @@ class DimensionlessFamily:
             read = told | (name == "torque")
             noisy = value + stds[name] * rng.standard_normal(value.shape)
             readings[name] = np.where(read, noisy, 1.0)
-            readings[f"{name}_std"] = np.where(read, stds[name], ABSENT)
+            readings[f"{name}_std"] = np.where(read, stds[name], ABSENT_STD)
         readings["torque"] += readings["torque_bias"] * rng.standard_normal((n, 1))
         scale = (designs[:, 0, MOST_COHESION], np.ones(n), designs[:, 0, MOST_SHEAR_MODULUS])
         names = ("wheel_radius", "wheel_width", "bearing_modulus", "n")
@@ -184,7 +191,7 @@ class DimensionlessFamily:
             "drawbar_pull": (0.03 * load, none),
             "torque_bias": (none, bias + none),
         }
-        origin = Origin(designs, x, near / STRAY, radius[:, 0], noise)
+        origin = Origin(designs, x, near / BEARING_RANGE, radius[:, 0], noise)
         return SimulatedSets(readings, context, np.stack(truth, axis=1), origin)
 
     def force(self, designs: Floats, x: Floats) -> Force:
@@ -196,12 +203,12 @@ class DimensionlessFamily:
             friction_angle=phi,
             shear_modulus=most_shear * shear,
             kc=0.0,
-            kphi=k * np.exp(stray) * (PIVOT * r) ** -bend,
+            kphi=k * np.exp(stray) * (REFERENCE_DEPTH * r) ** -bend,
             n=n + bend,
         )
         return Model(Wheel(radius=r, width=b))(soil, Operating(slip=slip, load=load))
 
-    def answers(self, designs: Floats, x: Floats) -> Floats:
+    def responses(self, designs: Floats, x: Floats) -> Floats:
         """See `Family`; torque as the logarithm of T / (W r), and the length is the radius."""
         force = self.force(designs, x)
         r, load = designs[:, RADIUS, None], designs[:, LOAD, None]
@@ -239,43 +246,41 @@ class DimensionlessFamily:
             "wheel_width": [r[0] * share[0], r[1] * share[1]],
             "bearing_modulus": [p1[0] / 0.01 ** n[0], p1[1] / 0.01 ** n[1]],
             "n": list(n),
-            "bearing_std": [0.0, WIDEST],
+            "bearing_std": [0.0, MOST_BEARING_STD],
             "cohesion_max": list(c),
             "shear_modulus_max": list(shear),
         }
 
-    def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
-        """See `Family`."""
-        op, small = graph.op, graph.small
-        near = op("Max", op("Div", readings["bearing_std"], small(STRAY)), small(1e-3))
-        one = small(np.ones(1))
-        wheel = ("wheel_radius", "wheel_width")
-        held = (*wheel, "bearing_modulus", "cohesion_max", "shear_modulus_max")
-        logs = op("Log", op("Concat", *[readings[name] for name in held], axis=0))
-        n, lever = readings["n"], op("Mul", readings["n"], op("Log", readings["wheel_radius"]))
-        # features by the logarithms of r, b, k, c max, K max; by n, and n log r
-        by_held = np.zeros((7, 5))
-        by_held[:, 1] = [-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, -1.0]
-        by_held[:, 2] = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-        by_held[:, 3] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
-        by_held[5, 4] = 1.0
-        same = op("MatMul", op("Concat", logs, n, lever, axis=0), small(by_held))
-        both = op("Concat", readings["slip"], readings["load"], axis=0)
-        by_row = graph.reshaped(op("Log", op("Max", both, small(TINY))), 2, -1)
-        by_driven = [[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0]]
-        torque, rise = draw_log_torque(graph, readings, readings["wheel_radius"])
-        return Context(
-            features=op("Gemm", by_row, small(by_driven), same, transA=1),
+    def add_context(self, readings: dict[str, Value]) -> ContextValues:
+        """See `WheelFamily`; features are linear in the logarithms of the inputs."""
+        graph, radius, n = readings["slip"].graph, readings["wheel_radius"], readings["n"]
+        normal_std = maximum(readings["bearing_std"] / BEARING_RANGE, LEAST_NORMAL_STD)
+        one = constant(graph, np.ones(1))
+        scales = ("cohesion_max", "shear_modulus_max")
+        context = ("wheel_radius", "wheel_width", "bearing_modulus", *scales)
+        log_context = log(concat([readings[name] for name in context], axis=0))
+        n_log_radius = n * log(radius)
+        # rows: the logarithms of r, b, k, c max, K max, then n and n log r; columns: the features
+        of_context = np.zeros((7, 5))
+        of_context[:, 1] = [-1.0, -1.0, -1.0, 0.0, 0.0, 0.0, -1.0]
+        of_context[:, 2] = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+        of_context[:, 3] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
+        of_context[5, 4] = 1.0
+        shared = concat([log_context, n, n_log_radius], axis=0) @ of_context
+        operating = concat([readings["slip"], readings["load"]], axis=0)
+        log_operating = log(maximum(operating, SMALLEST)).reshape(2, -1)
+        of_operating = np.asarray([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0]])
+        torque, torque_slope = add_log_torque(readings, radius)
+        features = gemm(log_operating, of_operating, shared, transpose_a=True)
+        target_scale = concat([readings[scales[0]], one, readings[scales[1]]], axis=0)
+        return ContextValues(
+            features=features,
             torque=torque,
-            rise=rise,
-            clear=CLEAR,
-            length=readings["wheel_radius"],
-            scale=graph.reshaped(
-                op("Concat", readings["cohesion_max"], one, readings["shear_modulus_max"], axis=0),
-                -1,
-                1,
-            ),
-            width=graph.reshaped(op("Concat", one, one, one, near, near, axis=0), -1, 1),
+            torque_slope=torque_slope,
+            most_torque_noise=MOST_RELATIVE_NOISE,
+            length=radius,
+            target_scale=target_scale.reshape(-1, 1),
+            axis_std=concat([one, one, one, normal_std, normal_std], axis=0).reshape(-1, 1),
         )
 
     def metadata(self) -> dict[str, Any]:
@@ -286,5 +291,5 @@ class DimensionlessFamily:
             "friction_angle": list(self.axes[1].ends),
             "sinkage_over_radius": list(self.sinkage),
             "ground_pressure": list(self.pressure),
-            "bearing_std": [0.0, WIDEST],
+            "bearing_std": [0.0, MOST_BEARING_STD],
         }

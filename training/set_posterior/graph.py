@@ -1,4 +1,4 @@
-"""The whole set posterior as a part of a graph: readings and memory in, answers and memory out."""
+"""The whole set posterior as part of a graph: readings and memory in, estimates and memory out."""
 
 from __future__ import annotations
 
@@ -7,69 +7,89 @@ from typing import Any
 
 import numpy as np
 
+from soilml.onboard.set_contract import (
+    MEMORY_INPUTS,
+    MEMORY_OUTPUTS,
+    READING_INPUTS,
+    REQUIRED_READINGS,
+    ROW_IN_RANGE,
+    SET_PREFIX,
+    STD_INPUTS,
+    empty_memory,
+)
 from training.onnx_graph.builder import Graph, Output
-from training.set_posterior.importance_sampler import draw_sample
-from training.set_posterior.posterior_summary import Limits, draw_answers
-from training.set_posterior.residual_system import READINGS, SPREADS, draw_rows, draw_unbiased
+from training.onnx_graph.value import Value, concat
+from training.set_posterior.importance_sampler import add_importance_sampler
+from training.set_posterior.misfit_test import MisfitLimits
+from training.set_posterior.posterior_summary import add_posterior_outputs
+from training.set_posterior.residual_system import add_residual_system, integrate_out_bias
 from training.set_posterior.response_surface import Response
 from training.set_posterior.wheel_family import WheelFamily
+
+#: ONNX's numbers of the element types of outputs.
+_FLOAT, _BOOL = 1, 9
 
 
 @dataclass(frozen=True)
 class SetPosteriorGraph:
-    """A family of wheels, how they answer, and how large the misfit of a set may be."""
+    """A family of wheels, its response surface, and the largest misfit of a set that is
+    accepted."""
 
     family: WheelFamily
     response: Response
-    limits: Limits
+    limits: MisfitLimits
 
     @property
     def inputs(self) -> dict[str, list[Any]]:
         """Inputs of the graph and their shapes, all float32."""
-        rows: dict[str, list[Any]] = {name: ["rows"] for name in (*READINGS, *SPREADS)}
+        rows: dict[str, list[Any]] = {name: ["rows"] for name in (*READING_INPUTS, *STD_INPUTS)}
         context: dict[str, list[Any]] = {name: [1] for name in self.family.inputs()}
-        memory: dict[str, list[Any]] = {
-            "memory": ["kept", len(self.response.these) + 1],
-            "counted": [3],
-        }
-        return rows | context | memory
+        shapes: tuple[list[Any], ...] = (["kept", len(self.response.terms) + 1], [3])
+        return rows | context | dict(zip(MEMORY_INPUTS, shapes, strict=True))
 
     @property
     def outputs(self) -> dict[str, Output]:
         """Outputs of the graph."""
-        q, count = self.family.targets, len(self.response.these)
-        shapes: dict[str, Output] = {
-            f"set_{name}": (1, [q]) for name in ("mean", "std", "low", "high")
+        q, terms = self.family.targets, len(self.response.terms)
+        of_set: dict[str, Output] = {
+            "mean": (_FLOAT, [q]),
+            "std": (_FLOAT, [q]),
+            "low": (_FLOAT, [q]),
+            "high": (_FLOAT, [q]),
+            "covariance": (_FLOAT, [q, q]),
+            "in_range": (_BOOL, [1]),
+            "abstains": (_BOOL, [q]),
+            "misfit": (_FLOAT, [1]),
         }
-        return shapes | {
-            "set_covariance": (1, [q, q]),
-            "set_in_range": (9, [1]),
-            "set_abstains": (9, [q]),
-            "set_misfit": (1, [1]),
-            "memory_out": (1, ["kept_out", count + 1]),
-            "counted_out": (1, [3]),
-            "row_in_range": (9, ["rows"]),
+        memory: tuple[Output, ...] = ((_FLOAT, ["kept_out", terms + 1]), (_FLOAT, [3]))
+        return {
+            **{SET_PREFIX + name: output for name, output in of_set.items()},
+            **dict(zip(MEMORY_OUTPUTS, memory, strict=True)),
+            ROW_IN_RANGE: (_BOOL, ["rows"]),
         }
 
     def defaults(self) -> dict[str, Any]:
-        """Values of those inputs that a single reading does not bring."""
-        single = np.ones(1, np.float32)
-        given = {name: single for name in self.inputs if name not in ("slip", "torque", "load")}
-        memory = np.zeros((0, len(self.response.these) + 1), np.float32)
-        return given | {"memory": memory, "counted": np.zeros(3, np.float32)}
+        """Values of those inputs that an estimate from single rows does not feed."""
+        one = np.ones(1, np.float32)
+        values = {name: one for name in self.inputs if name not in REQUIRED_READINGS}
+        return values | dict(
+            zip(MEMORY_INPUTS, empty_memory(len(self.response.terms)), strict=True)
+        )
 
-    def draw(self, graph: Graph, prefix: str = "") -> None:
-        """Draw it; outputs are named `<prefix><output>`.
+    def add_to(self, graph: Graph, prefix: str = "") -> None:
+        """Add all nodes to a graph; outputs are named `<prefix><output>`.
 
-        The memory is what earlier rows of the set left: the system that they made, of which a
-        triangle of as many rows as it has columns says all that it says, and three counts.
+        The memory is the residual system of earlier rows of the set and three counts. Its
+        triangular factor, which has as many rows as columns, is equivalent to it.
         """
-        names = {name: name for name in (*READINGS, *SPREADS, *self.family.inputs())}
-        context, rows = draw_rows(graph, self.family, self.response, names)
-        system = graph.op("Concat", "memory", rows.system, axis=0, out=prefix + "memory_out")
-        counted = graph.op("Add", "counted", rows.counted, out=prefix + "counted_out")
-        graph.op("Identity", rows.inside, out=prefix + "row_in_range")
-        count = len(self.response.these)
-        unbiased = draw_unbiased(graph, system, count)
-        sample = draw_sample(graph, self.family, self.response, context, unbiased)
-        draw_answers(graph, self.family, context, sample, counted, self.limits, prefix)
+        names = (*READING_INPUTS, *STD_INPUTS, *self.family.inputs())
+        inputs = {name: Value(graph, name) for name in (*names, *MEMORY_INPUTS)}
+        context, rows = add_residual_system(self.family, self.response, inputs)
+        memory, counts = (inputs[name] for name in MEMORY_INPUTS)
+        outputs = [prefix + name for name in MEMORY_OUTPUTS]
+        system = concat([memory, rows.system], axis=0).named(outputs[0])
+        counts = (counts + rows.counts).named(outputs[1])
+        rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
+        unbiased = integrate_out_bias(system, len(self.response.terms))
+        sample = add_importance_sampler(self.family, self.response, context, unbiased)
+        add_posterior_outputs(self.family, context, sample, counts, self.limits, prefix)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
+from training.set_posterior.credible_interval import INTERVAL
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.posterior_summary import ENDS
-from training.set_posterior.validation import SetFigures, graph_outputs, opened
-from training.set_posterior.wheel_family import ABSENT, CHANNELS
+from training.set_posterior.validation import SetFigures, graph_outputs, posterior_session
 
 #: Rows of the set that the board tries when it loads a file.
 PROBED = 8
@@ -21,12 +21,12 @@ def metadata_of(
 ) -> dict[str, Any]:
     """For the board: terms of the system, noise by channel, what must be given, and its range."""
     return {
-        "terms": len(posterior.response.these),
+        "terms": len(posterior.response.terms),
         "noise": dict(noise),
         "context": posterior.family.limits(),
         "alone": alone,
-        "error": dict(zip(CHANNELS, posterior.response.error.tolist(), strict=True)),
-        "interval": list(ENDS),
+        "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),
+        "interval": list(INTERVAL),
         "misfit": {
             "readings": posterior.limits.readings.tolist(),
             "most": posterior.limits.misfit.tolist(),
@@ -40,17 +40,17 @@ def probe_of_sets(posterior: SetPosteriorGraph | None) -> list[dict[str, Any]]:
     if posterior is None:
         return []
     sets = posterior.family.sets(16, PROBED, 5)
-    session = opened(posterior)
+    session = posterior_session(posterior)
     for index in range(len(sets.truth)):
         rows = {k: v.astype(np.float32).astype(np.float64) for k, v in sets.rows(index).items()}
         found = graph_outputs(session, posterior.response, sets, index)
-        if found["set_in_range"][0] and (rows["sinkage_std"] == ABSENT).all():
+        if found["set_in_range"][0] and (rows["sinkage_std"] == ABSENT_STD).all():
             break
     names = ("slip", "torque", "load", "torque_std", "torque_bias")
     return [
         {
             "readings": {name: rows[name].tolist() for name in names},
-            "given": sets.given(index),
+            "given": sets.context_of(index),
             "mean": found["set_mean"].tolist(),
             "std": found["set_std"].tolist(),
             "in_range": True,

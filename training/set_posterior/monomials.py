@@ -8,37 +8,70 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+#: Monomials, each as the coordinates (counted from 1) that are multiplied; 0 stands for the factor
+#: 1.
 Terms = tuple[tuple[int, ...], ...]
 
-#: Stands for the constant 1 in a term.
+#: The factor 1 of a monomial.
 ONE = 0
 
 
-def terms(coordinates: int, degree: int, steep: int = 0, steep_degree: int = 0) -> Terms:
-    """All monomials up to a degree, as the coordinates (from 1) that are multiplied; 0 pads.
+def monomial_terms(
+    coordinates: int, degree: int, leading: int = 0, leading_degree: int = 0
+) -> Terms:
+    """All monomials of some coordinates up to a total degree.
 
-    Of the first `steep` coordinates alone, those up to `steep_degree` too. All have one length.
+    Parameters
+    ----------
+    coordinates : int
+        Number of coordinates.
+    degree : int
+        Largest total degree of a monomial of any coordinates.
+    leading, leading_degree : int
+        Monomials of the first `leading` coordinates alone are included up to this degree.
+
+    Returns
+    -------
+    tuple of tuple of int
+        One ascending tuple for each monomial, all of length `max(degree, leading_degree)`; `ONE`
+        fills monomials of a lower degree.
+
+    Examples
+    --------
+    >>> monomial_terms(2, 2)
+    ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     """
-    length = max(degree, steep_degree)
-    chosen = combinations_with_replacement(range(coordinates + 1), length)
+    length = max(degree, leading_degree)
+    candidates = combinations_with_replacement(range(coordinates + 1), length)
     return tuple(
-        term for term in chosen if np.count_nonzero(term) <= degree or (max(term) <= steep)
+        term for term in candidates if np.count_nonzero(term) <= degree or (max(term) <= leading)
     )
 
 
-def monomials(x: Floats, these: Terms) -> Floats:
+def monomials(x: Floats, terms: Terms) -> Floats:
     """Values (..., terms) of the monomials at coordinates x (..., p)."""
-    one = np.concatenate([np.ones_like(x[..., :1]), x], axis=-1)
-    return np.asarray(np.prod(one[..., np.asarray(these)], axis=-1))
+    with_one = np.concatenate([np.ones_like(x[..., :1]), x], axis=-1)
+    return np.asarray(np.prod(with_one[..., np.asarray(terms)], axis=-1))
 
 
-def derivative(these: Terms, coordinate: int) -> Floats:
+def derivative(terms: Terms, coordinate: int) -> Floats:
     """Matrix (terms, terms) D with which the derivative of the monomials b is D b."""
-    found = np.zeros((len(these), len(these)))
-    for row, term in enumerate(these):
+    matrix = np.zeros((len(terms), len(terms)))
+    for row, term in enumerate(terms):
         power = term.count(coordinate)
         if power:
-            rest = list(term)
-            rest[rest.index(coordinate)] = ONE
-            found[row, these.index(tuple(sorted(rest)))] = power
-    return found
+            factors = list(term)
+            factors[factors.index(coordinate)] = ONE
+            matrix[row, terms.index(tuple(sorted(factors)))] = power
+    return matrix
+
+
+def pair_factors(terms: Terms) -> list[tuple[tuple[int, int], ...]]:
+    """Each monomial as a product of pairs of coordinates, at least two; all have as many pairs.
+
+    A graph computes a table of all pairs that occur once, and multiplies entries of it: of degree
+    four, each monomial costs one multiplication instead of three.
+    """
+    length = max(4, len(terms[0]) + len(terms[0]) % 2)
+    padded = [(ONE,) * (length - len(term)) + term for term in terms]
+    return [tuple((term[i], term[i + 1]) for i in range(0, length, 2)) for term in padded]

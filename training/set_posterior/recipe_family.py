@@ -13,34 +13,33 @@ from scipy.stats import qmc
 from datagen.recipe import Recipe
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
+from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
 from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.run_patterns import draw_patterns
+from training.set_posterior.run_patterns import run_patterns
 from training.set_posterior.wheel_family import (
-    ABSENT,
-    CHANNELS,
-    CLEAR,
-    TINY,
-    Context,
+    MOST_RELATIVE_NOISE,
+    SMALLEST,
+    ContextValues,
     Origin,
     SimulatedSets,
-    draw_log_torque,
+    add_log_torque,
 )
 
 Floats = NDArray[np.float64]
 
 #: Unknowns that polynomials of the third degree can still follow.
-MOST_AXES = 6
+MOST_UNKNOWNS = 6
 #: Slips and loads are learned a little beyond the recipe's ends, for sensors stray.
-MARGIN = 0.02
+RANGE_MARGIN = 0.02
 #: Share of simulated sets in which sinkage and drawbar pull are measured beside torque.
-TOLD = 0.3
+SHARE_ALL_CHANNELS = 0.3
 #: Up to so many unknowns are followed to the fourth degree, and the estimated ones always.
-FEW_AXES = 4
+FEW_UNKNOWNS = 4
 #: Least share of noise for which torque is answered, where its noise is constant.
-STEADY = 0.2
+LEAST_SHARE = 0.2
 #: Without a logarithm a torque may have any noise.
 ANY_NOISE = 1e5
 
@@ -54,7 +53,7 @@ class RecipeFamily:
     targets: int
     free: int
     degree: tuple[int, int]
-    bend: float = 0.0  # N m, the torque at which its answer turns from a line to a logarithm
+    linear_torque: float = 0.0  # N m, below which the torque scale is nearly linear; 0: logarithm
 
     @staticmethod
     def of(recipe: Recipe, targets: Sequence[str]) -> RecipeFamily:
@@ -63,9 +62,9 @@ class RecipeFamily:
         names = [*targets, *(name for name in prior if name not in targets)]
         if missing := [name for name in targets if name not in prior]:
             raise InputError(f"set_posterior: the recipe has no prior of {missing[0]}")
-        if len(names) > MOST_AXES:
+        if len(names) > MOST_UNKNOWNS:
             raise InputError(
-                f"set_posterior: the recipe has {len(names)} unknowns, more than {MOST_AXES}"
+                f"set_posterior: the recipe has {len(names)} unknowns, more than {MOST_UNKNOWNS}"
             )
         if recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
             raise InputError(
@@ -73,17 +72,17 @@ class RecipeFamily:
                 "slip, load and soil alone; leave it out of the spec"
             )
         axes = tuple(Coordinate.of(name, prior[name]) for name in names)
-        degree = (4, 4) if len(axes) <= FEW_AXES else (3, 4)
+        degree = (4, 4) if len(axes) <= FEW_UNKNOWNS else (3, 4)
         family = RecipeFamily(recipe, axes, len(targets), len(axes), degree)
         noise = recipe.case.noise.get(column("torque"), Noise(share=1.0))
         if noise.constant == 0.0:
             return family
-        return replace(family, bend=noise.constant / max(noise.share, STEADY))
+        return replace(family, linear_torque=noise.constant / max(noise.share, LEAST_SHARE))
 
     def designs(self, count: int, seed: int) -> Floats:
         """Slips and loads (count, 2)."""
         u = qmc.Sobol(2, rng=seed).random(1 << (count - 1).bit_length())[:count]
-        u = u * (1.0 + 2.0 * MARGIN) - MARGIN
+        u = u * (1.0 + 2.0 * RANGE_MARGIN) - RANGE_MARGIN
         slip = self.recipe.slip.at(u[:, 0])
         load = self.recipe.load.at(u[:, 1])
         slip = np.clip(slip, 0.5 * self.recipe.slip.lower, 0.999)
@@ -93,7 +92,7 @@ class RecipeFamily:
         """Logarithms of slip and load."""
         return np.log(designs)
 
-    def answers(self, designs: Floats, x: Floats) -> Floats:
+    def responses(self, designs: Floats, x: Floats) -> Floats:
         r"""See `Family`; the length is 1 m.
 
         Torque is answered as its logarithm over load where its noise is a share of it, and else as
@@ -110,8 +109,8 @@ class RecipeFamily:
         slip, load = (designs[:, None, k] for k in (0, 1))
         force = case.model(case.soil, Operating(slip=slip, load=load))
         with np.errstate(invalid="ignore", divide="ignore"):
-            if self.bend:
-                torque = np.arcsinh(force.torque / (2.0 * self.bend))
+            if self.linear_torque:
+                torque = np.arcsinh(force.torque / (2.0 * self.linear_torque))
             else:
                 torque = np.log(force.torque / load)
             return np.stack([torque, np.log(force.sinkage), force.drawbar_pull / load], axis=-1)
@@ -124,53 +123,52 @@ class RecipeFamily:
         """None, for there are no inputs."""
         return {}
 
-    def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
-        """See `Family`."""
-        both = graph.op("Concat", readings["slip"], readings["load"], axis=0)
-        logs = graph.op("Log", graph.op("Max", both, graph.small(TINY)))
-        length = graph.small(1.0)
-        torque, rise = self._torque(graph, readings, length)
-        return Context(
-            features=graph.op("Transpose", graph.reshaped(logs, 2, -1)),
+    def add_context(self, readings: dict[str, Value]) -> ContextValues:
+        """See `WheelFamily`."""
+        operating = concat([readings["slip"], readings["load"]], axis=0)
+        log_operating = log(maximum(operating, SMALLEST))
+        length = constant(operating.graph, 1.0)
+        torque, torque_slope = self._torque(readings, length)
+        return ContextValues(
+            features=log_operating.reshape(2, -1).node("Transpose"),
             torque=torque,
-            rise=rise,
-            clear=ANY_NOISE if self.bend else CLEAR,
+            torque_slope=torque_slope,
+            most_torque_noise=ANY_NOISE if self.linear_torque else MOST_RELATIVE_NOISE,
             length=length,
-            scale=graph.small(np.ones((self.targets, 1))),
-            width=graph.small(np.ones((len(self.axes), 1))),
+            target_scale=constant(operating.graph, np.ones((self.targets, 1))),
+            axis_std=constant(operating.graph, np.ones((len(self.axes), 1))),
         )
 
-    def _torque(self, graph: Graph, readings: dict[str, str], length: str) -> tuple[str, str]:
-        """The torque as it is answered, and what that gains with torque, (rows,)."""
-        if not self.bend:
-            return draw_log_torque(graph, readings, length)
-        op, small, torque = graph.op, graph.small, readings["torque"]
-        bent = op("Asinh", op("Div", torque, small(2.0 * self.bend)))
-        square = op("Add", op("Mul", torque, torque), small(4.0 * self.bend**2))
-        return bent, op("Div", small(1.0), op("Sqrt", square))
+    def _torque(self, readings: dict[str, Value], length: Value) -> tuple[Value, Value]:
+        """Torque on the scale of the response, and the derivative of that scale, (rows,)."""
+        if not self.linear_torque:
+            return add_log_torque(readings, length)
+        torque, twice = readings["torque"], 2.0 * self.linear_torque
+        response = asinh(torque / twice)
+        return response, 1.0 / sqrt(torque * torque + 4.0 * self.linear_torque**2)
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
         """See `Family`; the noise is the recipe's, and channels without noise are not read."""
         rng = np.random.default_rng((seed, rows))
-        slip = self.recipe.slip.at(draw_patterns(count, rows, rng))
-        load = self.recipe.load.at(draw_patterns(count, rows, rng))
-        x = np.stack([axis.drawn(rng.random(count)) for axis in self.axes], axis=1)
-        y = self.answers(
+        slip = self.recipe.slip.at(run_patterns(count, rows, rng))
+        load = self.recipe.load.at(run_patterns(count, rows, rng))
+        x = np.stack([axis.quantile(rng.random(count)) for axis in self.axes], axis=1)
+        y = self.responses(
             np.stack([slip, load], axis=-1).reshape(-1, 2), np.repeat(x, rows, axis=0)[:, None]
         ).reshape(count, rows, 3)
         kept = np.isfinite(y).all(axis=(1, 2))
         slip, load, y, x = slip[kept], load[kept], y[kept], x[kept]
         readings = {"slip": slip, "load": load}
-        bent = 2.0 * self.bend * np.sinh(y[..., 0])
-        torque = bent if self.bend else np.exp(y[..., 0]) * load
+        bent = 2.0 * self.linear_torque * np.sinh(y[..., 0])
+        torque = bent if self.linear_torque else np.exp(y[..., 0]) * load
         true = (torque, np.exp(y[..., 1]), y[..., 2] * load)
-        told = rng.random((len(x), 1)) < TOLD
-        for name, value in zip(CHANNELS, true, strict=True):
+        told = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
+        for name, value in zip(RESPONSE_CHANNELS, true, strict=True):
             noise = self.recipe.case.noise.get(column(name))
             read = (noise is not None) & (told | (name == "torque"))
-            std = np.full_like(value, ABSENT) if noise is None else noise.std(value)
+            std = np.full_like(value, ABSENT_STD) if noise is None else noise.std(value)
             readings[name] = np.where(read, value + std * rng.standard_normal(std.shape), 1.0)
-            readings[f"{name}_std"] = np.where(read, std, ABSENT)
+            readings[f"{name}_std"] = np.where(read, std, ABSENT_STD)
         bias = self.recipe.bias.get(column("torque"), Noise())
         readings["torque_bias"] = bias.std(true[0])
         readings["torque"] += readings["torque_bias"] * rng.standard_normal((len(x), 1))
@@ -179,11 +177,11 @@ class RecipeFamily:
         origin = Origin(
             designs=np.stack([slip, load], axis=-1),
             x=x,
-            near=np.zeros(len(x)),
+            normal_std=np.zeros(len(x)),
             length=np.ones(len(x)),
             noise={
                 name: (np.full_like(slip, own.constant), np.full_like(slip, own.share))
-                for name in (*CHANNELS, "torque_bias")
+                for name in (*RESPONSE_CHANNELS, "torque_bias")
                 if (own := sources.get(name if name == "torque_bias" else column(name)))
             },
         )

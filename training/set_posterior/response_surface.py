@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from soilml.errors import InputError
-from training.onnx_graph.builder import Graph
+from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from training.onnx_graph.value import Value, gemm, tanh
 from training.regressors.standardisation import Standardisation
-from training.set_posterior.monomials import Terms, monomials, terms
-from training.set_posterior.wheel_family import CHANNELS, WheelFamily
+from training.set_posterior.monomials import Terms, monomial_terms, monomials
+from training.set_posterior.wheel_family import WheelFamily
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -23,7 +24,7 @@ Progress = Callable[[str, int, int], None]
 #: Points of the unknowns at which each design is simulated, for each term of the polynomial.
 POINTS_PER_TERM = 2.5
 #: Nearly known axes are simulated within this many standard deviations of their widest.
-NEAR = 2.5
+NORMAL_TRUNCATION = 2.5
 #: Designs simulated in one piece; batch of the descent; share held out.
 PIECE, BATCH, HELD_OUT = 512, 256, 0.08
 #: Weight of each channel's error in the fit.
@@ -50,7 +51,7 @@ class Response:
     one soil share x: what they say of it adds up row by row, whatever their number and order.
     """
 
-    these: Terms
+    terms: Terms
     scaling: Standardisation
     layers: tuple[Floats, ...]  # weights and biases in turn; the last gives (terms * channels)
     lower: Floats  # (f,) ends of the features that were learned from
@@ -64,25 +65,25 @@ class Response:
         for weights, bias in pairs[:-1]:
             h = np.tanh(h @ weights + bias)
         weights, bias = pairs[-1]
-        return np.asarray(h @ weights + bias).reshape(len(features), len(self.these), -1)
+        return np.asarray(h @ weights + bias).reshape(len(features), len(self.terms), -1)
 
     def predict(self, features: Floats, x: Floats) -> Floats:
         """Channels (n, m, channels) at features (n, f) and coordinates (n, m, p) or (m, p)."""
-        return np.asarray(monomials(x, self.these) @ self.coefficients(features))
+        return np.asarray(monomials(x, self.terms) @ self.coefficients(features))
 
-    def draw(self, graph: Graph, features: str) -> str:
-        """Coefficients (channels * rows, terms + 1), float32, channel by channel; the last is 0."""
-        op, small = graph.op, graph.small
-        h = op(
-            "Mul", op("Sub", features, small(self.scaling.mean)), small(1.0 / self.scaling.scale)
-        )
+    def add_coefficients(self, features: Value) -> Value:
+        """Add the network to a graph: coefficients (channels * rows, terms + 1), float32.
+
+        Rows are in the order of channels, then of readings; the last column is 0.
+        """
+        hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
         pairs = list(zip(self.layers[0::2], self.layers[1::2], strict=True))
         for weights, bias in pairs[:-1]:
-            h = op("Tanh", op("Gemm", h, small(weights), small(bias)))
-        count = len(self.these) + 1
-        weights, bias = (_by_channel(layer, count - 1) for layer in pairs[-1])
-        found = graph.reshaped(op("Gemm", h, small(weights), small(bias)), -1, len(CHANNELS), count)
-        return graph.reshaped(op("Transpose", found, perm=[1, 0, 2]), -1, count)
+            hidden = tanh(gemm(hidden, weights, bias))
+        columns = len(self.terms) + 1
+        weights, bias = (_by_channel(layer, columns - 1) for layer in pairs[-1])
+        output = gemm(hidden, weights, bias).reshape(-1, len(RESPONSE_CHANNELS), columns)
+        return output.node("Transpose", perm=[1, 0, 2]).reshape(-1, columns)
 
 
 def _by_channel(layer: Floats, count: int) -> Floats:
@@ -93,19 +94,19 @@ def _by_channel(layer: Floats, count: int) -> Floats:
 
 
 def fit_response(family: WheelFamily, size: ResponseSettings, progress: Progress) -> Response:
-    """Simulate designs at points of the unknowns, fit each by a polynomial, and learn these.
+    """Simulate designs at points of the unknowns, fit each by a polynomial, and learn terms.
 
     Raises `InputError` where fewer than half of the designs carry their load on all soils.
     """
-    these = terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
-    x = _points(family, int(POINTS_PER_TERM * len(these)), size.seed)
-    basis = monomials(x, these)
+    terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
+    x = _points(family, int(POINTS_PER_TERM * len(terms)), size.seed)
+    basis = monomials(x, terms)
     project = np.linalg.pinv(basis)
     designs = family.designs(size.designs, size.seed)
     found, left, answered = [], [], []
     for first in range(0, len(designs), PIECE):
         progress("simulating", first, len(designs))
-        y = family.answers(designs[first : first + PIECE], x[None])
+        y = family.responses(designs[first : first + PIECE], x[None])
         whole = np.isfinite(y).all(axis=(1, 2))
         a = np.einsum("rp,npk->nrk", project, y[whole])
         found.append(a)
@@ -121,12 +122,12 @@ def fit_response(family: WheelFamily, size: ResponseSettings, progress: Progress
     features = family.features(designs[kept])
     weigh = np.sqrt(np.mean(basis**2, axis=0))[:, None] * WEIGHTS
     wanted = np.concatenate(found)
-    response = _fitted(these, features, wanted, weigh, size, progress)
+    response = _fitted(terms, features, wanted, weigh, size, progress)
     unseen = slice(0, int(HELD_OUT * len(features)))
     off = basis @ (response.coefficients(features[unseen]) - wanted[unseen])
-    surplus = np.concatenate(left)[unseen] * len(x) / (len(x) - len(these))
+    surplus = np.concatenate(left)[unseen] * len(x) / (len(x) - len(terms))
     error = np.sqrt(np.mean(off**2, axis=(0, 1)) + surplus.mean(axis=0))
-    return Response(these, response.scaling, response.layers, response.lower, response.upper, error)
+    return Response(terms, response.scaling, response.layers, response.lower, response.upper, error)
 
 
 def _points(family: WheelFamily, count: int, seed: int) -> Floats:
@@ -134,13 +135,20 @@ def _points(family: WheelFamily, count: int, seed: int) -> Floats:
     from scipy.special import ndtri
 
     u = qmc.Sobol(len(family.axes), rng=seed).random(1 << (count - 1).bit_length())[:count]
-    columns = [axis.drawn(u[:, i]) for i, axis in enumerate(family.axes[: family.free])]
-    near = np.clip(ndtri(np.clip(u[:, family.free :], 1e-9, 1.0 - 1e-9)), -NEAR, NEAR) / NEAR
+    columns = [axis.quantile(u[:, i]) for i, axis in enumerate(family.axes[: family.free])]
+    near = (
+        np.clip(
+            ndtri(np.clip(u[:, family.free :], 1e-9, 1.0 - 1e-9)),
+            -NORMAL_TRUNCATION,
+            NORMAL_TRUNCATION,
+        )
+        / NORMAL_TRUNCATION
+    )
     return np.concatenate([np.stack(columns, axis=1), near], axis=1)
 
 
 def _fitted(
-    these: Terms,
+    terms: Terms,
     features: Floats,
     wanted: Floats,
     weigh: Floats,
@@ -189,7 +197,7 @@ def _fitted(
     arrays[-2] = arrays[-2] * spread / flat
     arrays[-1] = (arrays[-1] * spread + middle) / flat
     ends = features.min(axis=0), features.max(axis=0)
-    return Response(these, scaling, tuple(arrays), *ends, np.zeros(len(CHANNELS)))
+    return Response(terms, scaling, tuple(arrays), *ends, np.zeros(len(RESPONSE_CHANNELS)))
 
 
 def _initial(sizes: list[int], generator: Any) -> list[Any]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def draw_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
+def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
     """Shares of the range (count, rows): anywhere, at three levels, or steady, by chance."""
     anywhere = rng.random((count, rows))
     levels = rng.random((count, 3))[np.arange(count)[:, None], rng.integers(3, size=(count, rows))]

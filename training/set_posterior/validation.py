@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from training.onnx_graph.builder import Graph, session_of
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.posterior_summary import Limits
+from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.response_surface import Response
 from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
@@ -37,15 +37,17 @@ class SetFigures:
     refused: float
 
 
-def with_limits(family: WheelFamily, response: Response, progress: Progress) -> SetPosteriorGraph:
+def calibrate_misfit_limits(
+    family: WheelFamily, response: Response, progress: Progress
+) -> SetPosteriorGraph:
     """The set posterior with limits of the misfit that refuse at most one sound set in a hundred.
 
     The number of readings orders them; torque alone and torque with other channels are measured
     together. Rows that are driven steadily fix no more than one combination of the unknowns: what
     is left of n readings follows a chi-squared distribution of n - 1, and no limit lies below its.
     """
-    free = Limits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    session = opened(SetPosteriorGraph(family, response, free))
+    free = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
+    session = posterior_session(SetPosteriorGraph(family, response, free))
     readings, misfit = [], []
     for i, rows in enumerate(SIZES):
         progress("measuring misfit", i, len(SIZES))
@@ -64,12 +66,12 @@ def with_limits(family: WheelFamily, response: Response, progress: Progress) -> 
             steady = chi2.ppf(1.0 - FALSE, size - 1) if size > 1 else 0.0
             limits.append(max(float(np.quantile(value[near], 1.0 - FALSE)), float(steady)))
     rising = np.maximum.accumulate(limits)
-    return SetPosteriorGraph(family, response, Limits(np.asarray(knots), rising))
+    return SetPosteriorGraph(family, response, MisfitLimits(np.asarray(knots), rising))
 
 
-def validated(posterior: SetPosteriorGraph, progress: Progress) -> dict[int, SetFigures]:
+def validate_posterior(posterior: SetPosteriorGraph, progress: Progress) -> dict[int, SetFigures]:
     """Figures on fresh sets, by rows of a set; a set that is refused counts with the prior."""
-    session, found = opened(posterior), {}
+    session, found = posterior_session(posterior), {}
     for i, rows in enumerate(SIZES):
         progress("measuring errors", i, len(SIZES))
         sets = posterior.family.sets(FIGURE_SETS, rows, 77)
@@ -97,17 +99,17 @@ def validated(posterior: SetPosteriorGraph, progress: Progress) -> dict[int, Set
 def _spread(family: WheelFamily, sets: SimulatedSets) -> Floats:
     """Standard deviation of the prior of each set, (sets, q)."""
     u = (np.arange(4096) + 0.5) / 4096
-    own = np.asarray([axis.value(axis.drawn(u)).std() for axis in family.axes[: family.targets]])
+    own = np.asarray([axis.value(axis.quantile(u)).std() for axis in family.axes[: family.targets]])
     scale = np.ones_like(sets.truth)
     for k, axis in enumerate(family.axes[: family.targets]):
         scale[:, k] = sets.context.get(f"{axis.name}_max", scale[:, k])
     return np.asarray(own * scale)
 
 
-def opened(posterior: SetPosteriorGraph) -> Any:
+def posterior_session(posterior: SetPosteriorGraph) -> Any:
     """An onnxruntime session of the set posterior alone."""
     graph = Graph()
-    posterior.draw(graph)
+    posterior.add_to(graph)
     return session_of(graph.model(posterior.inputs, posterior.outputs))
 
 
@@ -116,8 +118,10 @@ def graph_outputs(
 ) -> dict[str, Any]:
     """All outputs for one set, by name."""
     feed = {name: values.astype(np.float32) for name, values in sets.rows(index).items()}
-    feed |= {name: np.asarray([value], np.float32) for name, value in sets.given(index).items()}
-    feed["memory"] = np.zeros((0, len(response.these) + 1), np.float32)
+    feed |= {
+        name: np.asarray([value], np.float32) for name, value in sets.context_of(index).items()
+    }
+    feed["memory"] = np.zeros((0, len(response.terms) + 1), np.float32)
     feed["counted"] = np.zeros(3, np.float32)
     names = [output.name for output in session.get_outputs()]
     return dict(zip(names, session.run(names, feed), strict=True))

@@ -1,4 +1,4 @@
-"""What a set posterior must know of the wheels and soils that it is for."""
+"""What a set posterior needs to know of the wheels and soils for which it is trained."""
 
 from __future__ import annotations
 
@@ -8,51 +8,59 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from training.onnx_graph.builder import Graph
+from soilml.onboard.set_contract import LEAST_STD
+from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.coordinates import Coordinate
 
 Floats = NDArray[np.float64]
 
-#: Channels of a row, in the order in which a response predicts them.
-CHANNELS = ("torque", "sinkage", "drawbar_pull")
-#: Standard deviation that says that a channel was not measured; the reading is then 1.
-ABSENT = 1e6
+#: Logarithms are taken of nothing smaller: slip, load, torque or sinkage of zero or less is then
+#: far out of range.
+SMALLEST = LEAST_STD
+#: A torque or sinkage whose relative noise is larger than this is left out where its logarithm is
+#: taken: the logarithm of a normal variable that may be negative is not normal (zero is 3 sigma
+#: away here).
+MOST_RELATIVE_NOISE = 1.0 / 3.0
+#: Largest correction of the logarithm's bias, that of 20 % noise: its series in the noise holds
+#: there.
+MOST_LOG_CORRECTION = 0.02
 
 
 @dataclass(frozen=True)
-class Context:
-    """Names of graph values that a family computes from its inputs, float32."""
+class ContextValues:
+    """Graph values that a family computes from its inputs, float32."""
 
-    features: str  # (rows, f)
-    torque: str  # (rows,) the reading as the response answers it
-    rise: str  # (rows,) what that gains with torque, 1 / (N m)
-    clear: float  # a torque with more noise than this share of it counts for nothing
-    length: str  # that sinkage, and torque over load, are measured in, m
-    scale: str  # (q, 1) by which the values of the estimated axes are multiplied
-    width: str  # (p, 1) of each axis: 1, or the standard deviation where it is nearly known
+    features: Value  # (rows, f) inputs of the response surface
+    torque: Value  # (rows,) the torque reading on the scale of the response
+    torque_slope: Value  # (rows,) derivative of that scale by torque, 1 / (N m)
+    most_torque_noise: float  # readings with more noise on that scale are left out
+    length: Value  # unit of sinkage, and of torque over load, m
+    target_scale: Value  # (q, 1) factors of the values of the estimated axes
+    axis_std: Value  # (p, 1) standard deviation of nearly known coordinates, 1 for all others
 
 
 @dataclass(frozen=True)
 class Origin:
-    """How simulated sets came about, for who wants their exact posterior.
+    """How simulated sets were made, for the computation of their exact posterior.
 
-    `noise` has for each channel that was read, and for `torque_bias`, its constant part and its
-    share of the true value, (sets, rows) each.
+    `noise` has for each measured channel, and for `torque_bias`, its constant part and its share of
+    the true value, (sets, rows) each.
     """
 
     designs: Floats  # (sets, rows, d)
     x: Floats  # (sets, p) coordinates of all unknowns
-    near: Floats  # (sets,) standard deviation of the coordinates of nearly known axes
-    length: Floats  # (sets,) that sinkage, and torque over load, are measured in, m
+    normal_std: Floats  # (sets,) prior standard deviation of the nearly known coordinates
+    length: Floats  # (sets,) unit of sinkage, and of torque over load, m
     noise: dict[str, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
 class SimulatedSets:
-    """Simulated sets of one size: the true way they were driven, and what is not known of them.
+    """Simulated sets of one size.
 
-    `readings` are what the sensors say, by input name (sets, rows); `context` what holds for a
-    whole set, by input name (sets,); `truth` the estimated parameters (sets, q).
+    `readings` are sensor readings and their standard deviations by input name, (sets, rows);
+    `context` are the inputs that hold for a whole set, (sets,); `truth` are the estimated
+    parameters (sets, q).
     """
 
     readings: dict[str, Floats]
@@ -64,11 +72,11 @@ class SimulatedSets:
         """The readings of one set (rows,)."""
         return {name: values[index] for name, values in self.readings.items()}
 
-    def given(self, index: int) -> dict[str, float]:
-        """The context of one set."""
+    def context_of(self, index: int) -> dict[str, float]:
+        """The context inputs of one set."""
         return {name: float(values[index]) for name, values in self.context.items()}
 
-    def only(self, index: int) -> SimulatedSets:
+    def select(self, index: int) -> SimulatedSets:
         """One of the sets."""
         own, part = self.origin, slice(index, index + 1)
         noise = {name: (a[part], b[part]) for name, (a, b) in own.noise.items()}
@@ -76,36 +84,32 @@ class SimulatedSets:
             {name: values[part] for name, values in self.readings.items()},
             {name: values[part] for name, values in self.context.items()},
             self.truth[part],
-            Origin(own.designs[part], own.x[part], own.near[part], own.length[part], noise),
+            Origin(own.designs[part], own.x[part], own.normal_std[part], own.length[part], noise),
         )
 
 
-#: Stands for what has no logarithm, and is out of range.
-TINY = 1e-12
-#: A torque or sinkage with more noise than this share of it has no logarithm to be believed.
-CLEAR = 1.0 / 3.0
+def add_log_torque(readings: dict[str, Value], length: Value) -> tuple[Value, Value]:
+    r"""Logarithm of torque over load and length (rows,), and its derivative by torque.
 
+    .. math:: y = \log \frac{T}{W r} + \min\left(\tfrac12 \left(\sigma / T\right)^2, 0.02\right),
+        \qquad \frac{dy}{dT} = \frac1T
 
-def draw_log_torque(graph: Graph, readings: dict[str, str], length: str) -> tuple[str, str]:
-    """Logarithm of torque over load and length (rows,), and what it gains with torque.
-
-    The mean of the logarithm of a noisy reading lies below that of the truth by half of the squared
-    share of noise, which is added.
+    The expectation of the logarithm of a noisy reading lies below the logarithm of the truth by
+    half of the squared relative noise (Taylor series of second order), which is added.
     """
-    op, small = graph.op, graph.small
-    torque = op("Max", readings["torque"], small(TINY))
-    share = op("Div", readings["torque_std"], torque)
-    short = op("Min", op("Mul", op("Mul", share, share), small(0.5)), small(0.02))
-    grip = op("Div", torque, op("Mul", readings["load"], length))
-    return op("Add", op("Log", grip), short), op("Div", small(1.0), torque)
+    torque = maximum(readings["torque"], SMALLEST)
+    relative_noise = readings["torque_std"] / torque
+    correction = minimum(relative_noise * relative_noise * 0.5, MOST_LOG_CORRECTION)
+    torque_ratio = torque / (readings["load"] * length)
+    return log(torque_ratio) + correction, 1.0 / torque
 
 
 class WheelFamily(Protocol):
-    """Wheels on soils: how they are driven, how they answer, and what a graph reads of them.
+    """Wheels on soils: operating conditions, response of the wheel, and its inputs in a graph.
 
-    A design is one way to drive one wheel, a row (n, d) of numbers whose meaning is the family's
-    own. Axes come in three kinds: first those that are estimated, then others that lie anywhere in
-    their range, and last those that are nearly known, with a normal prior around 0.
+    A design is one operating condition of one wheel, a row (n, d) of numbers that the family
+    defines. Axes are the unknowns: first those that are estimated, then nuisance parameters
+    anywhere in their range, and last nearly known nuisance parameters with a normal prior around 0.
     """
 
     @property
@@ -115,49 +119,49 @@ class WheelFamily(Protocol):
 
     @property
     def targets(self) -> int:
-        """How many of them are estimated."""
+        """Number of axes that are estimated."""
         ...
 
     @property
     def free(self) -> int:
-        """How many lie anywhere in their range."""
+        """Number of axes that lie anywhere in their range; the others have a normal prior."""
         ...
 
     @property
     def degree(self) -> tuple[int, int]:
-        """Of the polynomial, and of its terms of the estimated axes alone."""
+        """Degree of the polynomial, and of its terms of the estimated axes alone."""
         ...
 
     def designs(self, count: int, seed: int) -> Floats:
-        """Ways to drive (count, d), which the soil carries, spread over the range."""
+        """Operating conditions (count, d) that the soil carries, spread over the range."""
         ...
 
     def features(self, designs: Floats) -> Floats:
-        """What the response depends on, smooth and of order one, (n, f)."""
+        """Inputs of the response surface, smooth and of order one, (n, f)."""
         ...
 
-    def answers(self, designs: Floats, x: Floats) -> Floats:
+    def responses(self, designs: Floats, x: Floats) -> Floats:
         """Channels (n, m, 3) at coordinates x (n, m, p).
 
-        They are a rising function of torque along which its noise is the same everywhere, the
-        logarithm of sinkage over length, and drawbar pull over load; NaN without equilibrium.
+        They are a rising function of torque along which its noise is nearly constant, the logarithm
+        of sinkage over length, and drawbar pull over load; NaN without equilibrium.
         """
         ...
 
     def inputs(self) -> dict[str, str]:
-        """What the graph reads beside the readings and holds for all rows: name -> unit."""
+        """Context inputs of the graph, which hold for all rows of a set: name -> unit."""
         ...
 
     def limits(self) -> dict[str, list[float]]:
-        """Least and most of each of `inputs`."""
+        """Least and largest value of each context input."""
         ...
 
-    def draw(self, graph: Graph, readings: dict[str, str]) -> Context:
-        """Computes the context from graph values of the readings (rows,) and of `inputs`."""
+    def add_context(self, readings: dict[str, Value]) -> ContextValues:
+        """Add nodes that compute the context from readings (rows,) and from `inputs`."""
         ...
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
-        """Sets of rows as a rover may drive them, with all noise; soils of the prior."""
+        """Sets of rows under operating conditions of a rover, with noise; soils of the prior."""
         ...
 
     def metadata(self) -> dict[str, Any]:

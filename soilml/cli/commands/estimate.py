@@ -207,7 +207,7 @@ def _all_rows(estimator: Estimator, usable: NDArray[np.bool_], table: Table) -> 
     """An estimate for every row; one that is not usable counts as out of range."""
     result = estimator.unknown(len(table))
     if usable.any():
-        alone = estimator.sets is not None and estimator.sets.alone
+        alone = estimator.sets is not None and estimator.sets.sets_only
         readings = (joint_readings if alone else row_readings)(estimator, table.rows(usable))
         estimate = estimator(**readings)
         for key in ("mean", "std", "covariance", "low", "high", "in_range"):

@@ -297,5 +297,6 @@ def test_the_runtime_loads_numpy_and_onnxruntime_and_nothing_of_the_ground(small
         "soilml.onboard.model_file",
         "soilml.onboard.estimator",
         "soilml.quantities",
+        "soilml.onboard.set_contract",
         "soilml.onboard.set_posterior",
     }

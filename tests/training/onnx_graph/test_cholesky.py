@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from training.onnx_graph.builder import Graph, session_of
-from training.onnx_graph.cholesky import draw_factor
+from training.onnx_graph.cholesky import cholesky_columns
+from training.onnx_graph.value import Value
 
 
 @pytest.mark.parametrize("p", [2, 4, 6])
@@ -13,7 +14,7 @@ def test_the_factor_of_moments_is_that_of_numpy(p):
     points = np.concatenate([np.ones((50, 1)), rng.normal(0.3, 0.4, (50, p - 1))], axis=1)
     moments = points.T @ points / 50.0
     graph = Graph()
-    graph.op("Identity", draw_factor(graph, "moments", p), out="factor")
+    cholesky_columns(Value(graph, "moments"), p).named("factor")
     session = session_of(graph.model({"moments": [p, p]}, {"factor": (1, [p, p])}))
     found = session.run(None, {"moments": moments.astype(np.float32)})[0]
     assert found == pytest.approx(np.linalg.cholesky(moments), abs=1e-4)

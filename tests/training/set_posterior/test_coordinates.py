@@ -27,12 +27,12 @@ def test_values_run_from_one_end_of_the_range_to_the_other(prior):
 def test_fractions_of_the_prior_lie_below_what_is_drawn(prior):
     u = np.linspace(0.0, 1.0, 101)
     axis = Coordinate.of("x", prior)
-    assert axis.value(axis.drawn(u)) == pytest.approx(prior.at(u), abs=1e-12 * prior.upper)
+    assert axis.value(axis.quantile(u)) == pytest.approx(prior.at(u), abs=1e-12 * prior.upper)
 
 
 @pytest.mark.parametrize("prior", PRIORS.values(), ids=PRIORS)
 def test_the_density_is_the_slope_of_the_fraction_below(prior):
     axis, step = Coordinate.of("x", prior), 1e-6
     u = np.linspace(0.01, 0.99, 31)
-    slope = 2.0 * step / (axis.drawn(u + step) - axis.drawn(u - step))
-    assert np.log(slope) == pytest.approx(axis.log_density + axis.tilt * axis.drawn(u), abs=1e-6)
+    slope = 2.0 * step / (axis.quantile(u + step) - axis.quantile(u - step))
+    assert np.log(slope) == pytest.approx(axis.log_density + axis.tilt * axis.quantile(u), abs=1e-6)

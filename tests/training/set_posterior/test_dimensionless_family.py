@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from training.set_posterior.validation import graph_outputs, opened
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value
+from training.set_posterior.validation import graph_outputs, posterior_session
 
 
 def larger(sets, size):
@@ -22,7 +24,7 @@ def larger(sets, size):
 
 
 def test_a_larger_wheel_at_the_same_pressure_answers_alike(any_posterior):
-    family, session = any_posterior.family, opened(any_posterior)
+    family, session = any_posterior.family, posterior_session(any_posterior)
     small, large = (family.sets(12, 6, 7) for _ in range(2))
     large = larger(large, 1.3)
     sound = 0
@@ -47,20 +49,19 @@ def test_designs_of_one_size_ratio_have_the_same_features_and_answers(any_poster
     k *= 1.7**-n
     assert family.features(scaled) == pytest.approx(family.features(base))
     x = np.zeros((20, 1, 5))
-    assert family.answers(scaled, x) == pytest.approx(family.answers(base, x), rel=1e-6)
+    assert family.responses(scaled, x) == pytest.approx(family.responses(base, x), rel=1e-6)
 
 
 def test_features_in_the_graph_are_those_that_were_learned_from(any_posterior):
-    from training.onnx_graph.builder import Graph, session_of
-
     family = any_posterior.family
     sets = family.sets(10, 4, 3)
     names = [*sets.readings, *sets.context]
     graph = Graph()
-    graph.op("Identity", family.draw(graph, {n: n for n in names}).features, out="features")
+    inputs = {name: Value(graph, name) for name in names}
+    family.add_context(inputs).features.node("Identity").named("features")
     shapes = {n: ["rows"] if n in sets.readings else [1] for n in names}
     session = session_of(graph.model(shapes, {"features": (1, ["rows", 5])}))
     feed = {n: v.astype(np.float32) for n, v in sets.rows(2).items()}
-    feed |= {n: np.asarray([v], np.float32) for n, v in sets.given(2).items()}
+    feed |= {n: np.asarray([v], np.float32) for n, v in sets.context_of(2).items()}
     wanted = family.features(sets.origin.designs[2])
     assert session.run(None, feed)[0] == pytest.approx(wanted, abs=2e-5)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from soilml.onboard.set_contract import ABSENT_STD
 from training.benchmark.posterior_summary import FRACTIONS
 from training.benchmark.sets.stream_posterior import posterior_of_memory
-from training.set_posterior.posterior_summary import ENDS
-from training.set_posterior.validation import graph_outputs, opened
-from training.set_posterior.wheel_family import ABSENT
+from training.set_posterior.credible_interval import INTERVAL
+from training.set_posterior.validation import graph_outputs, posterior_session
 
 
 def compared(posterior, sets, index, session):
@@ -16,13 +16,13 @@ def compared(posterior, sets, index, session):
     found = posterior_of_memory(
         posterior.family, answer["memory_out"].astype(np.float64), sets, index
     )
-    ends = found.quantiles[[FRACTIONS.index(end) for end in ENDS]]
+    ends = found.quantiles[[FRACTIONS.index(end) for end in INTERVAL]]
     return answer, found.mean, np.sqrt(np.diag(found.covariance)), ends
 
 
 @pytest.mark.parametrize("rows", [1, 4, 16, 32])
 def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior, rows):
-    session, sets = opened(wheel_posterior), wheel_posterior.family.sets(8, rows, 9)
+    session, sets = posterior_session(wheel_posterior), wheel_posterior.family.sets(8, rows, 9)
     apart, ratios, ends = [], [], []
     for index in range(len(sets.truth)):
         answer, mean, std, both = compared(wheel_posterior, sets, index, session)
@@ -38,7 +38,7 @@ def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior
 
 
 def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
-    family, session = wheel_posterior.family, opened(wheel_posterior)
+    family, session = wheel_posterior.family, posterior_session(wheel_posterior)
     drawn = family.sets(60, 16, 2)
     steady = np.flatnonzero(
         (np.ptp(drawn.readings["slip"], axis=1) == 0.0)
@@ -54,17 +54,17 @@ def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
 
 @pytest.mark.parametrize("corner", [(0.97, 0.97, -0.97), (-0.97, -0.97, 0.97)])
 def test_a_soil_in_a_corner_of_the_prior_is_found(wheel_posterior, corner):
-    family, session = wheel_posterior.family, opened(wheel_posterior)
+    family, session = wheel_posterior.family, posterior_session(wheel_posterior)
     sets, rng = family.sets(4, 16, 21), np.random.default_rng(0)
     apart = []
     for index in range(len(sets.truth)):
         x = np.broadcast_to(corner, (16, 1, 3))
-        answers = family.answers(sets.origin.designs[index], x)[:, 0]
+        answers = family.responses(sets.origin.designs[index], x)[:, 0]
         torque = np.exp(answers[:, 0]) * sets.readings["load"][index]
         sets.readings["torque_std"][index] = 0.02 * torque
         sets.readings["torque"][index] = torque * (1.0 + 0.02 * rng.standard_normal(16))
         for name in ("sinkage", "drawbar_pull"):
-            sets.readings[name][index], sets.readings[f"{name}_std"][index] = 1.0, ABSENT
+            sets.readings[name][index], sets.readings[f"{name}_std"][index] = 1.0, ABSENT_STD
         answer, mean, std, _ = compared(wheel_posterior, sets, index, session)
         if answer["set_in_range"][0]:
             apart.append((answer["set_mean"] - mean) / std)

@@ -5,23 +5,31 @@ import math
 import numpy as np
 import pytest
 
-from training.set_posterior.monomials import derivative, monomials, terms
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import constant
+from training.set_posterior.monomials import (
+    derivative,
+    monomial_terms,
+    monomials,
+    pair_factors,
+)
+from training.set_posterior.polynomial_residuals import PolynomialResiduals
 
 
 def test_there_are_as_many_monomials_as_combinations():
-    assert len(terms(3, 4)) == math.comb(3 + 4, 4)
-    assert len(set(terms(5, 3, 3, 4))) == math.comb(5 + 3, 3) + math.comb(3 + 3, 4)
+    assert len(monomial_terms(3, 4)) == math.comb(3 + 4, 4)
+    assert len(set(monomial_terms(5, 3, 3, 4))) == math.comb(5 + 3, 3) + math.comb(3 + 3, 4)
 
 
 def test_monomials_are_the_products_that_their_terms_name():
     x = np.asarray([0.5, -2.0, 3.0])
-    for term, value in zip(terms(3, 3), monomials(x, terms(3, 3)), strict=True):
+    for term, value in zip(monomial_terms(3, 3), monomials(x, monomial_terms(3, 3)), strict=True):
         assert value == pytest.approx(math.prod(x[k - 1] for k in term if k))
 
 
 @pytest.mark.parametrize("axis", [1, 2, 3])
 def test_the_derivative_is_that_of_finite_differences(axis):
-    these, step = terms(3, 3, 2, 4), 1e-6
+    these, step = monomial_terms(3, 3, 2, 4), 1e-6
     x = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 3))
     move = step * np.eye(3)[axis - 1]
     slope = (monomials(x + move, these) - monomials(x - move, these)) / (2.0 * step)
@@ -29,3 +37,28 @@ def test_the_derivative_is_that_of_finite_differences(axis):
     if axis == 3:  # the steep terms are of the first two axes alone
         assert np.isfinite(found).all()
     assert found == pytest.approx(slope, abs=1e-8)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
+def test_pairs_of_factors_have_the_product_of_the_monomial(degree):
+    terms = monomial_terms(3, degree)
+    x = np.random.default_rng(degree).uniform(-1.0, 1.0, 3)
+    with_one = np.concatenate([[1.0], x])
+    factors = pair_factors(terms)
+    products = [math.prod(with_one[a] * with_one[b] for a, b in term) for term in factors]
+    assert products == pytest.approx(monomials(x, terms))
+    assert len({len(term) for term in factors}) == 1
+
+
+@pytest.mark.parametrize("degree", [1, 4, 5])
+def test_the_misfit_in_the_graph_is_that_of_all_factors_of_the_monomials(degree):
+    terms = monomial_terms(2, degree)
+    rng = np.random.default_rng(degree)
+    system, x = rng.normal(size=(7, len(terms))), rng.uniform(-1.0, 1.0, (5, 2))
+    graph = Graph()
+    value = constant(graph, system)
+    residuals = PolynomialResiduals(value, value, terms, (1, 0))
+    points = constant(graph, np.concatenate([np.ones((1, 5)), x.T[[1, 0]]]))
+    residuals.squared_norm(points).named("misfit")
+    found = session_of(graph.model({}, {"misfit": (1, [1, 5])})).run(None, {})[0][0]
+    assert found == pytest.approx(((monomials(x, terms) @ system.T) ** 2).sum(axis=1), rel=1e-4)

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from training.set_posterior.posterior_summary import prior_of
-from training.set_posterior.validation import graph_outputs, opened
+from training.set_posterior.posterior_summary import prior_summary
+from training.set_posterior.validation import graph_outputs, posterior_session
 
 
 def test_the_prior_is_answered_where_no_soil_explains_the_readings(wheel_posterior):
     sets = wheel_posterior.family.sets(4, 8, 1)
     sets.readings["torque"][0, ::2] *= 2.0
-    answer = graph_outputs(opened(wheel_posterior), wheel_posterior.response, sets, 0)
-    prior = prior_of(wheel_posterior.family)
+    answer = graph_outputs(posterior_session(wheel_posterior), wheel_posterior.response, sets, 0)
+    prior = prior_summary(wheel_posterior.family)
     assert not answer["set_in_range"][0] and answer["set_abstains"].all()
     for name in ("mean", "std", "low", "high"):
         assert answer[f"set_{name}"] == pytest.approx(prior[name], rel=1e-5)
@@ -19,17 +19,17 @@ def test_the_prior_is_answered_where_no_soil_explains_the_readings(wheel_posteri
 
 
 def test_the_prior_holds_nine_tenths_between_its_ends(wheel_posterior):
-    prior, axes = prior_of(wheel_posterior.family), wheel_posterior.family.axes
+    prior, axes = prior_summary(wheel_posterior.family), wheel_posterior.family.axes
     u = np.random.default_rng(0).random(100_000)
     for k, axis in enumerate(axes):
-        values = axis.value(axis.drawn(u))
+        values = axis.value(axis.quantile(u))
         assert values.mean() == pytest.approx(prior["mean"][k], rel=0.01)
         inside = (values > prior["low"][k]) & (values < prior["high"][k])
         assert inside.mean() == pytest.approx(0.9, abs=0.005)
 
 
 def test_mean_and_covariance_belong_together(wheel_posterior):
-    sets, session = wheel_posterior.family.sets(6, 8, 1), opened(wheel_posterior)
+    sets, session = wheel_posterior.family.sets(6, 8, 1), posterior_session(wheel_posterior)
     for index in range(6):
         answer = graph_outputs(session, wheel_posterior.response, sets, index)
         covariance = answer["set_covariance"]

@@ -35,9 +35,9 @@ def test_simulated_torque_strays_by_the_noise_of_the_recipe(wheel_posterior):
     family = wheel_posterior.family
     sets = family.sets(400, 8, 4)
     true = np.exp(
-        family.answers(sets.origin.designs.reshape(-1, 2), np.repeat(sets.origin.x, 8, 0)[:, None])[
-            :, 0, 0
-        ]
+        family.responses(
+            sets.origin.designs.reshape(-1, 2), np.repeat(sets.origin.x, 8, 0)[:, None]
+        )[:, 0, 0]
     )
     true = true.reshape(-1, 8) * sets.readings["load"]
     off = (sets.readings["torque"] - true) / sets.readings["torque_std"]

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value
 from training.set_posterior.monomials import monomials
-from training.set_posterior.residual_system import draw_unbiased
-from training.set_posterior.validation import graph_outputs, opened
+from training.set_posterior.residual_system import integrate_out_bias
+from training.set_posterior.validation import graph_outputs, posterior_session
 
 
 @pytest.fixture(scope="module")
 def session(wheel_posterior):
-    return opened(wheel_posterior)
+    return posterior_session(wheel_posterior)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_the_system_is_misfit_over_noise_row_by_row(wheel_posterior, session, se
     }
     stray = (share, own["sinkage_std"] / own["sinkage"], own["drawbar_pull_std"] / own["load"])
     for k, (values, std) in enumerate(zip(off.values(), stray, strict=True)):
-        found = system[6 * k : 6 * k + 6, :-1] @ monomials(x, response.these)
+        found = system[6 * k : 6 * k + 6, :-1] @ monomials(x, response.terms)
         assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
 
 
@@ -48,7 +49,7 @@ def test_the_sensors_bias_is_integrated_out_of_the_likelihood():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 1)), rng.normal(size=5)
     graph = Graph()
-    graph.op("Identity", draw_unbiased(graph, "system", 5), out="out")
+    integrate_out_bias(Value(graph, "system"), 5).named("out")
     session = session_of(graph.model({"system": ["m", 6]}, {"out": (1, ["m", 5])}))
     system = np.concatenate([a, g], axis=1).astype(np.float32)
     found = session.run(None, {"system": system})[0] @ b

@@ -10,8 +10,8 @@ def test_the_response_is_off_by_the_error_that_it_states(wheel_posterior):
     family, response = wheel_posterior.family, wheel_posterior.response
     designs = family.designs(200, 99)
     rng = np.random.default_rng(1)
-    x = np.stack([axis.drawn(rng.random(30)) for axis in family.axes], axis=1)
-    true = family.answers(designs, np.broadcast_to(x, (200, 30, 3)))
+    x = np.stack([axis.quantile(rng.random(30)) for axis in family.axes], axis=1)
+    true = family.responses(designs, np.broadcast_to(x, (200, 30, 3)))
     off = response.predict(family.features(designs), x) - true
     rms = np.sqrt(np.nanmean(off**2, axis=(0, 1)))
     assert (rms < 1.5 * response.error).all()
@@ -24,7 +24,7 @@ def test_what_the_response_learns_is_the_wheel_of_the_recipe(wheel_posterior):
     values = {axis.name: float(axis.value(np.zeros(1))[0]) for axis in family.axes}
     case = family.recipe.case.with_values(values)
     force = Model(case.model.gear, case.model.effects)(case.soil, Operating(slip=0.3, load=60.0))
-    torque, depth, pull = family.answers(design, x)[0, 0]
+    torque, depth, pull = family.responses(design, x)[0, 0]
     assert np.isclose(np.exp(torque) * 60.0, force.torque)
     assert np.isclose(np.exp(depth), force.sinkage)
     assert np.isclose(pull * 60.0, force.drawbar_pull)

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.set_contract import ABSENT_STD
 from training.benchmark.bayes_limit_file import BayesLimit
 from training.benchmark.sets.posterior_comparison import GaussianEstimates, PosteriorComparison
 from training.benchmark.sets.reference_sets import PROCESSES, ReferenceSet
 from training.benchmark.sets.set_unknowns import RankedPosterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
-from training.set_posterior.wheel_family import ABSENT
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -61,8 +61,8 @@ def _run_file(
         sets = reference.sets
         rows = sets.rows(0)
         for name in ("sinkage", "drawbar_pull"):
-            rows[name] = np.where(rows[f"{name}_std"] < ABSENT, rows[name], np.nan)
-        configured = estimator.on(None, **sets.given(0)) if sets.context else estimator
+            rows[name] = np.where(rows[f"{name}_std"] < ABSENT_STD, rows[name], np.nan)
+        configured = estimator.on(None, **sets.context_of(0)) if sets.context else estimator
         estimate, memory = configured.step(configured.start(), **rows)
         estimates.append(estimate)
         system = memory.system.astype(np.float64)
@@ -108,22 +108,22 @@ def _priors(group: Sequence[ReferenceSet]) -> tuple[Floats, Floats, Floats]:
     lower, upper, std = [], [], []
     u = (np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS
     for reference in group:
-        context = reference.sets.given(0)
+        context = reference.sets.context_of(0)
         axes = reference.family.axes[: reference.family.targets]
         scale = np.asarray([context.get(f"{axis.name}_max", 1.0) for axis in axes])
         lower.append(scale * [axis.ends[0] for axis in axes])
         upper.append(scale * [axis.ends[1] for axis in axes])
-        std.append(scale * [axis.value(axis.drawn(u)).std() for axis in axes])
+        std.append(scale * [axis.value(axis.quantile(u)).std() for axis in axes])
     return np.stack(lower), np.stack(upper), np.stack(std)
 
 
 def _conditions(group: Sequence[ReferenceSet]) -> dict[str, Flags]:
     """For each measurement condition, the sets (n,) that it holds for."""
     origins = [r.sets.origin for r in group]
-    uncertain_bearing = np.asarray([float(o.near[0]) > 0.0 for o in origins])
+    uncertain_bearing = np.asarray([float(o.normal_std[0]) > 0.0 for o in origins])
     biases = [o.noise.get("torque_bias", (np.zeros(1), np.zeros(1))) for o in origins]
     biased = np.asarray([bool(np.max(a) > 0.0 or np.max(b) > 0.0) for a, b in biases])
-    more = np.asarray([bool((r.sets.readings["sinkage_std"] < ABSENT).any()) for r in group])
+    more = np.asarray([bool((r.sets.readings["sinkage_std"] < ABSENT_STD).any()) for r in group])
     return {
         "torque only": ~uncertain_bearing & ~biased & ~more,
         "uncertain bearing": uncertain_bearing,

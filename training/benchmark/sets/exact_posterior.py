@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
 from training.benchmark.posterior_summary import systematic_resample
 from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
-from training.set_posterior.monomials import monomials, terms
-from training.set_posterior.response_surface import NEAR
-from training.set_posterior.wheel_family import ABSENT, CHANNELS, SimulatedSets, WheelFamily
+from training.set_posterior.monomials import monomial_terms, monomials
+from training.set_posterior.response_surface import NORMAL_TRUNCATION
+from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) ->
 
     def physics(x: Floats) -> Floats:
         batches = np.split(x, range(BATCH, len(x), BATCH))
-        return np.concatenate([family.answers(designs, batch[None]) for batch in batches], axis=1)
+        return np.concatenate([family.responses(designs, batch[None]) for batch in batches], axis=1)
 
     surrogate = _fit_surrogate(unknowns, designs)
     likelihood = log_likelihood(sets, index, surrogate or physics)
@@ -73,8 +74,8 @@ def log_likelihood(
     def evaluate(x: Floats) -> Floats:
         values = _si_values(sets, index, response(x))
         total = np.zeros(values.shape[1])
-        for k, name in enumerate(CHANNELS):
-            read = rows[f"{name}_std"] < ABSENT
+        for k, name in enumerate(RESPONSE_CHANNELS):
+            read = rows[f"{name}_std"] < ABSENT_STD
             if not read.any():
                 continue
             value, y = values[read, :, k], rows[name][read, None]
@@ -113,16 +114,16 @@ def _noise_std(
 def _fit_surrogate(unknowns: Unknowns, designs: Floats) -> Callable[[Floats], Floats] | None:
     """Channels (rows, n, 3) as polynomials of coordinates; None where a soil carries no load."""
     family, p = unknowns.family, unknowns.count
-    these = terms(p, DEGREES[p])
+    these = monomial_terms(p, DEGREES[p])
     half_width = np.ones(p)
     if p > family.free:
-        half_width[family.free :] = NEAR * unknowns.near
+        half_width[family.free :] = NORMAL_TRUNCATION * unknowns.near
     count = int(POINTS_PER_TERM * len(these))
     u = qmc.Sobol(p, rng=1).random(1 << (count - 1).bit_length())[:count]
     nodes = -np.cos(np.pi * u)  # arcsine density: denser at the ends, as Chebyshev nodes are
     x = np.zeros((count, len(family.axes)))
     x[:, :p] = nodes * half_width
-    y = family.answers(designs, x[None])
+    y = family.responses(designs, x[None])
     if not np.isfinite(y).all():
         return None
     coefficients = np.linalg.pinv(monomials(nodes, these)) @ y
@@ -137,8 +138,8 @@ def _rms_error_over_noise(sets: SimulatedSets, index: int, y: Floats, true: Floa
     """Rms difference of two responses over the noise, of the channels that are read."""
     a, b = _si_values(sets, index, y), _si_values(sets, index, true)
     rows, squares = sets.rows(index), []
-    for k, name in enumerate(CHANNELS):
-        read = rows[f"{name}_std"] < ABSENT
+    for k, name in enumerate(RESPONSE_CHANNELS):
+        read = rows[f"{name}_std"] < ABSENT_STD
         if read.any():
             std = _noise_std(sets, index, name, read, b[read, :, k])
             squares.append(((a[read, :, k] - b[read, :, k]) / std) ** 2)

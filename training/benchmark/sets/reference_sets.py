@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from datagen.recipe import read_recipe
+from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
 from soilml.quantities import SHEAR
 from training.benchmark.designs import HASHED_DIGITS
@@ -20,7 +21,7 @@ from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.set_unknowns import RankedPosterior
 from training.export.any_wheel_file import read_any_spec
 from training.set_posterior.recipe_family import RecipeFamily
-from training.set_posterior.wheel_family import ABSENT, SimulatedSets, WheelFamily
+from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Progress = Callable[[str, int, int], None]
 
@@ -84,9 +85,9 @@ def generate_reference_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
     for label, family in families().items():
         for rows in SIZES:
             sets = family.sets(CANDIDATES * COUNT, rows, SEED)
-            accepted = [i for i in range(len(sets.truth)) if _in_range(family, sets.given(i))]
+            accepted = [i for i in range(len(sets.truth)) if _in_range(family, sets.context_of(i))]
             references += [
-                ReferenceSet(label, i, family, sets.only(i)) for i in accepted[:max_sets]
+                ReferenceSet(label, i, family, sets.select(i)) for i in accepted[:max_sets]
             ]
     return references
 
@@ -159,6 +160,6 @@ def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceS
             channel = "torque" if name == "torque_bias" else name
             key = name if name == "torque_bias" else f"{name}_std"
             std = np.hypot(constant, share * np.abs(readings[channel]))
-            readings[key] = np.where(readings[key] < ABSENT, std, ABSENT)
+            readings[key] = np.where(readings[key] < ABSENT_STD, std, ABSENT_STD)
         converted.append(replace(reference, sets=replace(sets, readings=readings)))
     return converted

@@ -16,7 +16,7 @@ from training.benchmark.posterior_summary import (
     PosteriorSummary,
     systematic_resample,
 )
-from training.set_posterior.response_surface import NEAR
+from training.set_posterior.response_surface import NORMAL_TRUNCATION
 from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
@@ -51,10 +51,10 @@ class Unknowns:
     @staticmethod
     def of(family: WheelFamily, sets: SimulatedSets, index: int) -> Unknowns:
         """The unknowns of a simulated set."""
-        context = sets.given(index)
+        context = sets.context_of(index)
         upper_ends = [f"{axis.name}_max" for axis in family.axes[: family.targets]]
         scale = np.asarray([context.get(name, 1.0) for name in upper_ends])
-        return Unknowns(family, float(sets.origin.near[index]), scale)
+        return Unknowns(family, float(sets.origin.normal_std[index]), scale)
 
     @property
     def count(self) -> int:
@@ -66,9 +66,9 @@ class Unknowns:
         free = self.family.free
         x = np.zeros((len(u), len(self.family.axes)))
         for i, axis in enumerate(self.family.axes[:free]):
-            x[:, i] = axis.drawn(u[:, i])
-        if self.near > 0.0:  # a normal prior, truncated at NEAR standard deviations
-            low, high = ndtr(-NEAR), ndtr(NEAR)
+            x[:, i] = axis.quantile(u[:, i])
+        if self.near > 0.0:  # a normal prior, truncated at NORMAL_TRUNCATION standard deviations
+            low, high = ndtr(-NORMAL_TRUNCATION), ndtr(NORMAL_TRUNCATION)
             x[:, free:] = self.near * ndtri(low + (high - low) * u[:, free:])
         return x
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
-from training.set_posterior.monomials import Terms, monomials, terms
+from training.set_posterior.monomials import Terms, monomial_terms, monomials
 from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 def response_terms(family: WheelFamily) -> Terms:
     """The monomials of a learned response of the family."""
-    return terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
+    return monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
 
 
 def posterior_of_memory(

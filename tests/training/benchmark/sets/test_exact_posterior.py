@@ -76,13 +76,13 @@ def test_uncertain_bearing_is_marginalised():
     sets = family.sets(300, 1, 9)
     o = sets.origin
     more = sets.readings["sinkage_std"][:, 0] < 1.0
-    uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.near > 0.2) & ~more
+    uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.normal_std > 0.2) & ~more
     index = int(np.flatnonzero(uncertain)[0])
     found = exact_set_posterior(family, sets, index)
     rng = np.random.default_rng(2)
     n = 30_000
-    x = np.stack([a.drawn(rng.random(n)) for a in family.axes[:3]], axis=1)
-    near = np.clip(rng.standard_normal((n, 2)), -2.5, 2.5) * o.near[index]
+    x = np.stack([a.quantile(rng.random(n)) for a in family.axes[:3]], axis=1)
+    near = np.clip(rng.standard_normal((n, 2)), -2.5, 2.5) * o.normal_std[index]
     force = family.force(o.designs[index], np.concatenate([x, near], axis=1)[None])
     noise, bias = o.noise["torque"][1][index, 0], o.noise["torque_bias"][1][index, 0]
     off = sets.readings["torque"][index, 0] / force.torque[0] - 1.0

@@ -54,7 +54,7 @@ def test_both_families_have_the_same_response_of_the_reference_wheel(some):
     for one, other in zip(own, as_any_wheel_sets(own), strict=True):
         design = np.broadcast_to(
             [
-                other.sets.given(0)[k]
+                other.sets.context_of(0)[k]
                 for k in (
                     "wheel_radius",
                     "wheel_width",
@@ -70,14 +70,14 @@ def test_both_families_have_the_same_response_of_the_reference_wheel(some):
         designs = np.column_stack(
             [rows["slip"], design[:, :2], rows["load"], design[:, 2:4], design[:, 4:]]
         )
-        as_any = other.family.answers(designs, x[None])
-        alone = one.family.answers(one.sets.origin.designs[0], one.sets.origin.x[None])
+        as_any = other.family.responses(designs, x[None])
+        alone = one.family.responses(one.sets.origin.designs[0], one.sets.origin.x[None])
         shift = np.log([0.15, 0.15, np.e]) * [1.0, 1.0, 0.0]
         assert np.allclose(as_any + shift, alone, atol=1e-9)
 
 
 def test_bearing_is_known_in_some_sets_of_any_wheel_only(some):
-    near = [r.sets.origin.near[0] > 0.0 for r in some if r.label == ANY_WHEEL]
+    near = [r.sets.origin.normal_std[0] > 0.0 for r in some if r.label == ANY_WHEEL]
     assert any(near) and not all(near)
 
 

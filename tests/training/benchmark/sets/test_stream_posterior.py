@@ -8,10 +8,10 @@ from soilml.quantities import SHEAR
 from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.posterior_summary import Limits
+from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import ResponseSettings, fit_response
-from training.set_posterior.validation import graph_outputs, opened
+from training.set_posterior.validation import graph_outputs, posterior_session
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +19,8 @@ def triples():
     """(output of the graph, posterior of its memory, exact posterior) of sets; small response."""
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
     response = fit_response(family, ResponseSettings(1024, 32, 250, 0), lambda *args: None)
-    free = Limits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    session = opened(SetPosteriorGraph(family, response, free))
+    free = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
+    session = posterior_session(SetPosteriorGraph(family, response, free))
     found = []
     for rows in (1, 6):
         sets = family.sets(14, rows, 21)

@@ -1,0 +1,285 @@
+"""Values of a graph under construction, with the operators of numpy.
+
+`a + b`, `a @ b` or `exp(a)` appends one ONNX node and returns its output. Numbers and arrays on
+either side of an operator become constants of the value's own floating-point type. Nodes and
+constants are numbered in the order in which Python evaluates the expression, so the order of
+evaluation fixes the bytes of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.onnx_graph.builder import Graph
+
+#: ONNX's numbers of element types (onnx.TensorProto.DataType).
+_ELEMENT_TYPES: dict[type, int] = {
+    np.float32: 1,
+    np.int32: 6,
+    np.bool_: 9,
+    np.float64: 11,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Value:
+    """A tensor of a graph: the name of an input, a constant or a node's output.
+
+    Parameters
+    ----------
+    graph : Graph
+        The graph to which operators append their nodes.
+    name : str
+        Name of the tensor in the graph.
+    dtype : type
+        numpy.float32 or numpy.float64: the type of constants that it is combined with.
+
+    Examples
+    --------
+    >>> from training.onnx_graph.builder import Graph
+    >>> graph = Graph()
+    >>> x = Value(graph, "x")
+    >>> (2.0 * exp(-x) + 1.0).name
+    'v3'
+    """
+
+    graph: Graph
+    name: str
+    dtype: type = np.float32
+
+    #: numpy leaves `array + value` to the operators below.
+    __array_ufunc__ = None
+
+    def __add__(self, other: Operand) -> Value:
+        return self._binary("Add", self, other)
+
+    def __radd__(self, other: Operand) -> Value:
+        return self._binary("Add", other, self)
+
+    def __sub__(self, other: Operand) -> Value:
+        return self._binary("Sub", self, other)
+
+    def __rsub__(self, other: Operand) -> Value:
+        return self._binary("Sub", other, self)
+
+    def __mul__(self, other: Operand) -> Value:
+        return self._binary("Mul", self, other)
+
+    def __rmul__(self, other: Operand) -> Value:
+        return self._binary("Mul", other, self)
+
+    def __truediv__(self, other: Operand) -> Value:
+        return self._binary("Div", self, other)
+
+    def __rtruediv__(self, other: Operand) -> Value:
+        return self._binary("Div", other, self)
+
+    def __matmul__(self, other: Operand) -> Value:
+        return self._binary("MatMul", self, other)
+
+    def __rmatmul__(self, other: Operand) -> Value:
+        return self._binary("MatMul", other, self)
+
+    def __neg__(self) -> Value:
+        return self.node("Neg")
+
+    def __lt__(self, other: Operand) -> Value:  # type: ignore[misc]
+        return self._binary("Less", self, other)
+
+    def __le__(self, other: Operand) -> Value:  # type: ignore[misc]
+        return self._binary("LessOrEqual", self, other)
+
+    def __gt__(self, other: Operand) -> Value:  # type: ignore[misc]
+        return self._binary("Greater", self, other)
+
+    def __ge__(self, other: Operand) -> Value:  # type: ignore[misc]
+        return self._binary("GreaterOrEqual", self, other)
+
+    def __and__(self, other: Value) -> Value:
+        return self.node("And", other)
+
+    def __or__(self, other: Value) -> Value:
+        return self.node("Or", other)
+
+    def __invert__(self) -> Value:
+        return self.node("Not")
+
+    def node(self, kind: str, *others: Operand, **attributes: Any) -> Value:
+        """The output of one node whose first input is this value."""
+        inputs = [self.operand(other).name for other in others]
+        return self._output(self.graph.op(kind, self.name, *inputs, **attributes))
+
+    def operand(self, other: Operand) -> Value:
+        """A value as it is; a number or an array as a constant of this value's type."""
+        return other if isinstance(other, Value) else constant(self.graph, other, self.dtype)
+
+    def indices(self, numbers: Sequence[int]) -> Value:
+        """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
+        return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
+
+    def astype(self, dtype: type) -> Value:
+        """The value cast to another element type."""
+        name = self.graph.op("Cast", self.name, to=_ELEMENT_TYPES[dtype])
+        floating = dtype if dtype in (np.float32, np.float64) else self.dtype
+        return Value(self.graph, name, floating)
+
+    def reshape(self, *shape: int) -> Value:
+        """The value in a new shape; 0 keeps a dimension, one -1 is computed."""
+        return self.node("Reshape", self.indices(shape))
+
+    def take(self, indices: Sequence[int], axis: int) -> Value:
+        """The entries at these indices along an axis, as `numpy.take`."""
+        return self.node("Gather", self.indices(indices), axis=axis)
+
+    def split(self, parts: int | Sequence[int], axis: int) -> list[Value]:
+        """Consecutive parts along an axis: so many of equal size, or of these sizes."""
+        if isinstance(parts, int):
+            names = self.graph.ops("Split", parts, self.name, axis=axis, num_outputs=parts)
+        else:
+            sizes = self.indices(parts)
+            names = self.graph.ops("Split", len(parts), self.name, sizes.name, axis=axis)
+        return [self._output(name) for name in names]
+
+    def largest(self, count: int, axis: int) -> Value:
+        """The largest entries along an axis, in descending order."""
+        values, _ = self.graph.ops("TopK", 2, self.name, self.indices([count]).name, axis=axis)
+        return self._output(values)
+
+    def clip(self, lower: Operand, upper: Operand | None = None) -> Value:
+        """The value limited to an interval, which may have no upper end."""
+        return self.node("Clip", *([lower] if upper is None else [lower, upper]))
+
+    def sum(self, axis: int | None = None, keepdims: bool | None = None) -> Value:
+        """The sum over one axis or all; see `reduce`."""
+        return self.reduce("ReduceSum", axis, keepdims)
+
+    def sum_of_squares(self, axis: int | None = None, keepdims: bool | None = None) -> Value:
+        """The sum of squares over one axis or all; see `reduce`."""
+        return self.reduce("ReduceSumSquare", axis, keepdims)
+
+    def reduce(self, kind: str, axis: int | None = None, keepdims: bool | None = None) -> Value:
+        """A reduction over one axis or all.
+
+        Without `keepdims` the attribute is not written, and ONNX keeps all dimensions.
+        """
+        axes = [] if axis is None else [self.indices([axis])]
+        return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
+
+    def named(self, name: str) -> Value:
+        """The value under the name of a graph output; only for the output of the last node."""
+        self.graph.rename_last(self.name, name)
+        return self._output(name)
+
+    def _binary(self, kind: str, left: Operand, right: Operand) -> Value:
+        first, second = self.operand(left), self.operand(right)
+        return self._output(self.graph.op(kind, first.name, second.name))
+
+    def _output(self, name: str) -> Value:
+        return Value(self.graph, name, self.dtype)
+
+
+#: What stands on either side of an operator.
+Operand = Value | float | NDArray[Any]
+
+
+def constant(graph: Graph, value: Any, dtype: type = np.float32) -> Value:
+    """A constant number or array of a floating-point type."""
+    return Value(graph, graph.constant(np.asarray(value, dtype=dtype), exact=True), dtype)
+
+
+def exp(x: Value) -> Value:
+    """Exponential."""
+    return x.node("Exp")
+
+
+def log(x: Value) -> Value:
+    """Natural logarithm."""
+    return x.node("Log")
+
+
+def sqrt(x: Value) -> Value:
+    """Square root."""
+    return x.node("Sqrt")
+
+
+def tanh(x: Value) -> Value:
+    """Hyperbolic tangent."""
+    return x.node("Tanh")
+
+
+def asinh(x: Value) -> Value:
+    """Inverse hyperbolic sine."""
+    return x.node("Asinh")
+
+
+def absolute(x: Value) -> Value:
+    """Absolute value."""
+    return x.node("Abs")
+
+
+def floor(x: Value) -> Value:
+    """Largest whole number that is not above the value."""
+    return x.node("Floor")
+
+
+def reciprocal(x: Value) -> Value:
+    """One over the value."""
+    return x.node("Reciprocal")
+
+
+def softmax(x: Value, axis: int) -> Value:
+    """`exp(x)` over its sum along an axis, computed without overflow."""
+    return x.node("Softmax", axis=axis)
+
+
+def maximum(x: Value, other: Operand) -> Value:
+    """The larger of two values, element by element."""
+    return x.node("Max", other)
+
+
+def minimum(x: Value, other: Operand) -> Value:
+    """The smaller of two values, element by element."""
+    return x.node("Min", other)
+
+
+def where(condition: Value, x: Value, otherwise: Operand) -> Value:
+    """`x` where the condition is true, else the other value, element by element."""
+    inputs = (condition.name, x.name, x.operand(otherwise).name)
+    return Value(x.graph, x.graph.op("Where", *inputs), x.dtype)
+
+
+def concat(values: Sequence[Value], axis: int) -> Value:
+    """Values one after another along an axis."""
+    first = values[0]
+    name = first.graph.op("Concat", *[value.name for value in values], axis=axis)
+    return Value(first.graph, name, first.dtype)
+
+
+def add_all(values: Sequence[Value]) -> Value:
+    """The sum of several values, as one node."""
+    return values[0].node("Sum", *values[1:])
+
+
+def gemm(
+    a: Value,
+    b: Operand,
+    c: Operand | None = None,
+    *,
+    transpose_a: bool = False,
+    transpose_b: bool = False,
+    alpha: float = 1.0,
+) -> Value:
+    """`alpha a b + c` of matrices as one node, with a or b transposed."""
+    attributes: dict[str, Any] = {}
+    if alpha != 1.0:
+        attributes["alpha"] = alpha
+    if transpose_a:
+        attributes["transA"] = 1
+    if transpose_b:
+        attributes["transB"] = 1
+    return a.node("Gemm", *([b] if c is None else [b, c]), **attributes)

@@ -1,0 +1,134 @@
+"""Importance weights of samples: log weights, tempering and effective sample sizes, as graph
+nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from training.onnx_graph.value import (
+    Value,
+    concat,
+    constant,
+    floor,
+    gemm,
+    log,
+    minimum,
+    softmax,
+    sqrt,
+)
+from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
+from training.set_posterior.proposals import ProposalDraws
+
+#: Standard deviations of the proposal of the solved coordinate over those of its conditional
+#: posterior: a proposal somewhat too wide costs samples, one too narrow makes weights unbounded.
+PROPOSAL_SCALE = 1.3
+#: A distribution is tempered until its 16 largest weights differ by no more than a factor of exp(3)
+#: = 20: with fewer samples the moments of the next proposal would rest on a handful of points.
+TEMPERING_SAMPLES, TEMPERING_RANGE = 16, 3.0
+#: Decrease of the log weight by distance from the box: large against any log likelihood, and
+#: finite.
+OUTSIDE_PENALTY = 1e9
+
+
+@dataclass(frozen=True)
+class WeightedRound:
+    """Samples of one round of importance sampling."""
+
+    points: Value  # (1 + p, n) limited to the box
+    boxed_log_weight: Value  # (1, n) of the points as limited to the box
+    log_weight: Value  # (1, n) vanishing weight for samples outside of the box
+    misfit: Value  # (1, n) sum of squared residuals
+
+
+def sample_round(
+    residuals: PolynomialResiduals,
+    axes: tuple[Coordinate, ...],
+    others: Value,
+    solved: tuple[Value, Value],
+    draws: ProposalDraws,
+    log_jacobian: Value | None = None,
+) -> WeightedRound:
+    r"""Draw the solved coordinate around its conditional mode, and weigh the samples.
+
+    .. math:: s = \hat s + c \kappa^{-1/2} t, \qquad
+        \log w = \underbrace{\sum_i \lambda_i x_i - \tfrac12 |A b(x)|^2}_{\log p(x | y)}
+        - \underbrace{\left(\log q(z, t) + \tfrac12 \log \kappa
+        - \sum_i \log(1 - x_i^2)\right)}_{\log q(x)}
+
+    up to constants, with t a draw of the t distribution and c the scale of the proposal. The last
+    sum is there if the other coordinates are hyperbolic tangents of the draws z.
+
+    Parameters
+    ----------
+    residuals : PolynomialResiduals
+        The system of the set.
+    axes : tuple of Coordinate
+        The axes of the family, whose `tilt` is the lambda of their prior.
+    others : Value
+        The other coordinates (p - 1, n).
+    solved : tuple of Value
+        Mode and precision of the solved coordinate given the others, (1, n) each.
+    draws : ProposalDraws
+        The draws t of the round, and the log density of all draws.
+    log_jacobian : Value, optional
+        log(1 - x_i^2) of the other coordinates (p - 1, n).
+    """
+    mode, precision = solved
+    ones = constant(mode.graph, np.ones((1, len(draws.t))))
+    proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
+    unlimited = concat([ones, others, proposed], axis=0)
+    points = within_box(unlimited)
+    misfit = residuals.squared_norm(points)
+    distance = (unlimited - points).reduce("ReduceL1", axis=0, keepdims=True)
+    # one matrix product adds up the parts of the log weight, with these coefficients
+    parts = [
+        (points, [0.0, *[axes[i].tilt for i in residuals.order]]),
+        (log(precision), [-0.5]),
+        (misfit, [-0.5]),
+    ]
+    if log_jacobian is not None:
+        parts.append((log_jacobian, [1.0] * (len(residuals.order) - 1)))
+    stacked = concat([*[part for part, _ in parts], distance], axis=0)
+    coefficients = [coefficient for _, own in parts for coefficient in own]
+    both = gemm(
+        constant(mode.graph, [[*coefficients, 0.0], [*coefficients, -OUTSIDE_PENALTY]]),
+        stacked,
+        -draws.log_density,
+    )
+    boxed_log_weight, log_weight = both.split(2, axis=0)
+    return WeightedRound(points, boxed_log_weight, log_weight, misfit)
+
+
+def tempering_power(log_weight: Value) -> Value:
+    r"""The largest power beta <= 1 of the density that several samples share, (1, 1).
+
+    .. math:: \beta = \min\left(1, \frac{3}{\log w_{(1)} - \log w_{(16)}}\right)
+
+    with the log weights in descending order. Under weights :math:`w^\beta` the 16 best samples
+    differ by no more than exp(3).
+    """
+    largest = log_weight.largest(TEMPERING_SAMPLES, axis=1)
+    first_less_last = np.eye(TEMPERING_SAMPLES)[:, :1] - np.eye(TEMPERING_SAMPLES)[:, -1:]
+    log_range = largest @ constant(log_weight.graph, first_less_last)
+    return minimum(TEMPERING_RANGE / log_range, 1.0)
+
+
+def tempered_weights(log_weight: Value, power: Value) -> Value:
+    """Weights (1, n) of a power of the density, which sum to 1."""
+    return softmax(log_weight * power, axis=1)
+
+
+def weights_by_effective_size(weights: Value, power: Value | None = None) -> Value:
+    r"""Weights times the effective sample size of their round (Kish), with which rounds are pooled.
+
+    .. math:: n_{eff} = \frac{1}{\sum_i w_i^2}
+
+    With a power, a round that had to be tempered (power below 1) gets the weight 0: its samples are
+    those of another distribution.
+    """
+    if power is None:
+        return weights / weights.sum_of_squares(keepdims=True)
+    return weights * (floor(power) / weights.sum_of_squares(keepdims=True))

@@ -1,0 +1,60 @@
+"""Whether the readings of a set are consistent with one soil, as nodes of a graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.onnx_graph.value import Value, log, maximum, minimum
+from training.set_posterior.importance_sampler import WeightedSample
+
+Floats = NDArray[np.float64]
+
+#: A set is estimated only if at least this share of its rows is in range; the other rows are left
+#: out.
+LEAST_SHARE_IN_RANGE = 0.9
+#: The limit beyond the largest calibrated number of readings n grows by 1 + 3 / sqrt(n) a reading:
+#: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
+#: deviations, roughly, and a straight line through it lies above it.
+CHI_SQUARED_MARGIN = 3.0
+
+
+@dataclass(frozen=True)
+class MisfitLimits:
+    """Largest accepted misfit of a set, calibrated on simulated sets by number of readings,
+    rising."""
+
+    readings: Floats
+    misfit: Floats
+
+
+def add_consistency_test(sample: WeightedSample, counts: Value, limits: MisfitLimits) -> Value:
+    """Whether the set is in range, and one soil explains its readings, (1, 1).
+
+    The least misfit of the samples is compared with a limit, which is linear in the logarithm of
+    the number of readings between the calibrated numbers.
+
+    Parameters
+    ----------
+    sample : WeightedSample
+        The sample with its least misfit.
+    counts : Value
+        Readings in the system, rows, and rows in range, (3,).
+    limits : MisfitLimits
+        The limits.
+    """
+    readings, rows, rows_in_range = counts.split([1, 1, 1], axis=0)
+    knots = np.log(limits.readings)
+    log_readings = log(maximum(readings, limits.readings[0]))
+    # a piecewise linear function is the sum of the parts of its segments that are passed
+    slopes = np.diff(limits.misfit) / np.diff(knots)
+    passed = minimum((log_readings.reshape(1, 1) - knots[:-1]).clip(0.0), np.diff(knots))
+    interpolated = (passed * slopes).sum(keepdims=False).reshape(1) + limits.misfit[:1]
+    beyond = maximum(readings - limits.readings[-1], 0.0)
+    limit: Value = interpolated + beyond * (1.0 + CHI_SQUARED_MARGIN / np.sqrt(limits.readings[-1]))
+    fits: Value = sample.misfit <= limit
+    enough_in_range = rows_in_range >= rows * LEAST_SHARE_IN_RANGE
+    any_reading = readings > 0.5  # a count in float32
+    return (fits & enough_in_range & any_reading).reshape(1, 1)

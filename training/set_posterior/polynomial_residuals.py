@@ -1,0 +1,128 @@
+"""Residuals of a set at sample points, and Gauss-Newton steps along one unknown, as nodes of a
+graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from operator import mul
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.onnx_graph.value import Value, concat, constant, exp, gemm, log
+from training.set_posterior.monomials import Terms, derivative, monomials, pair_factors
+from training.set_posterior.response_surface import NORMAL_TRUNCATION, Response
+from training.set_posterior.wheel_family import ContextValues, WheelFamily
+
+Floats = NDArray[np.float64]
+
+#: Standard deviation of a normal prior that regularises the step where readings do not constrain
+#: the solved coordinate: a little more than that of the uniform prior on [-1, 1], 0.58, so that it
+#: matters there only.
+REGULARISING_STD = 0.7
+
+
+@dataclass(frozen=True)
+class PolynomialResiduals:
+    """Residuals A b(x) (m, n) at points x, with the axes in an order in which the solved one is
+    last.
+
+    A point is a column of (1 + p, n): 1, and the coordinates in this order, each within [-1, 1].
+    """
+
+    system: Value  # A, (m, terms)
+    with_derivative: Value  # A, and A D of the derivative along the solved axis, (2, m, terms)
+    terms: Terms
+    order: tuple[int, ...]
+
+    @staticmethod
+    def of(family: WheelFamily, response: Response, system: Value) -> PolynomialResiduals:
+        """Of a system of standardised coordinates; solved for the friction angle if it is unknown.
+
+        Torque follows the friction angle almost linearly, so that one Gauss-Newton step comes
+        close.
+        """
+        names = [axis.name for axis in family.axes]
+        solved = names.index("friction_angle") if "friction_angle" in names else 0
+        order = (*(i for i in range(len(names)) if i != solved), solved)
+        slope = derivative(response.terms, solved + 1)
+        with_derivative = system @ np.stack([np.eye(len(slope)), slope])
+        return PolynomialResiduals(system, with_derivative, response.terms, order)
+
+    def squared_norm(self, points: Value) -> Value:
+        """The misfit |A b(x)|^2 (1, n), which is -2 log likelihood up to a constant."""
+        return (self.system @ self._basis(points)).sum_of_squares(axis=0, keepdims=True)
+
+    def at_fixed_points(self, points: Floats) -> tuple[Value, Value]:
+        """Residuals and their derivative (1, m, n) at fixed coordinates (p, n), in this order."""
+        basis = monomials(points[np.argsort(self.order)].T, self.terms)
+        residual, slope = (self.with_derivative @ basis.T).split(2, axis=0)
+        return residual, slope
+
+    def step(self, others: Value, solved: Value, count: int) -> tuple[Value, Value]:
+        """The solved coordinate after a Gauss-Newton step, and its precision, (1, n) each."""
+        ones = constant(solved.graph, np.ones((1, count)))
+        points = within_box(concat([ones, others, solved], axis=0))
+        residual, slope = (self.with_derivative @ self._basis(points)).split(2, axis=0)
+        return gauss_newton(solved, residual, slope)
+
+    def _basis(self, points: Value) -> Value:
+        """Monomials (terms, n) at points (1 + p, n), as products of pairs of coordinates."""
+        row_of = [0, *(1 + self.order.index(i) for i in range(len(self.order)))]
+        factors = pair_factors(self.terms)
+        pairs = sorted({pair for term in factors for pair in term})
+        left, right = (points.take([row_of[pair[k]] for pair in pairs], axis=0) for k in (0, 1))
+        table = left * right
+        per_term = [
+            table.take([pairs.index(term[k]) for term in factors], axis=0)
+            for k in range(len(factors[0]))
+        ]
+        return reduce(mul, per_term)
+
+
+def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, Value]:
+    r"""A Gauss-Newton step in one unknown, for n points at once.
+
+    .. math:: \kappa = |r'|^2 + \sigma_0^{-2}, \qquad s \leftarrow s - \frac{r^T r'}{\kappa}
+
+    with r the residuals and r' their derivative (1, m, n), and the regularising standard deviation
+    :math:`\sigma_0`. Steps stay within the box.
+
+    Returns
+    -------
+    tuple of Value
+        The new s and the precision kappa of its conditional posterior, (1, n) each.
+    """
+    precision = slope.sum_of_squares(axis=1, keepdims=False) + REGULARISING_STD**-2
+    gradient = (residual * slope).sum(axis=1, keepdims=False)
+    return within_box(solved - gradient / precision), precision
+
+
+def within_box(x: Value) -> Value:
+    """Coordinates limited to [-1, 1]."""
+    return x.clip(-1.0, 1.0)
+
+
+def standardised_system(
+    family: WheelFamily, response: Response, context: ContextValues, system: Value
+) -> Value:
+    r"""The system (m, terms) with nearly known coordinates standardised, and their prior as rows of
+    it.
+
+    With :math:`z = x / (c \sigma)`, c the truncation in standard deviations, the coefficient of a
+    monomial is multiplied by :math:`(c \sigma)^k` for its power k of the coordinate, and the prior
+    is the residual
+    :math:`c z`. All coordinates then lie between -1 and 1.
+    """
+    unknowns, free, terms = len(family.axes), family.free, response.terms
+    if free == unknowns:
+        return system
+    powers = np.asarray([[term.count(axis) for term in terms] for axis in range(1, unknowns + 1)])
+    powers[:free] = 0
+    log_std = log(context.axis_std * NORMAL_TRUNCATION)
+    factors = exp(gemm(log_std, powers, transpose_a=True))
+    padding = (0,) * (len(terms[0]) - 1)
+    linear = [terms.index((*padding, axis)) for axis in range(free + 1, unknowns + 1)]
+    prior = constant(system.graph, NORMAL_TRUNCATION * np.eye(len(terms))[linear])
+    return concat([system * factors, prior], axis=0)
