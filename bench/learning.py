@@ -16,11 +16,11 @@ from soilml.quantities import SHEAR
 from training.benchmark.acceptance import goals
 from training.benchmark.report import LEGEND, format_goals, format_tables
 from training.benchmark.suite import RECIPE, benchmark
-from training.calibration.scores import scored
-from training.data.dataset import read_dataset, split
+from training.calibration.metrics import compute_metrics
+from training.data.dataset import read_dataset, split_by_run
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.lssvm import GAMMAS, LSSVM, Factored
+from training.regressors.lssvm import GAMMAS, LSSVM, KernelEigensystem
 from training.regressors.rbf_kernel import rbf
 
 ROOT = Path(__file__).parents[1]
@@ -81,8 +81,8 @@ def parity() -> str:
 def centres(folder: Path) -> str:
     """Error of regressors of one reading against the number of support vectors (centres)."""
     generate(read_recipe("wheel"), folder / "data.parquet")
-    parts = split(read_dataset(folder / "data.parquet", FEATURES, SHEAR), seed=0)
-    train, check = parts.train, parts.calibrate.thinned()
+    parts = split_by_run(read_dataset(folder / "data.parquet", FEATURES, SHEAR), seed=0)
+    train, check = parts.train, parts.calibration.limit_rows_per_run()
     spread = train.targets.std(axis=0)
     regressors = {
         f"fixed-size LS-SVM, {m} centres": (FixedSizeLSSVM(centres=m), len(train))
@@ -100,7 +100,7 @@ def centres(folder: Path) -> str:
         regressor.fit(train.features[:rows], train.targets[:rows])
         seconds = time.perf_counter() - started
         mean, std = regressor.predict(check.features, return_std=True)
-        s = scored(check.targets, mean, std, spread)
+        s = compute_metrics(check.targets, mean, std, spread)
         errors = " | ".join(f"{v:.4f}" for v in s.relative)
         lines.append(f"| {label} | {rows} | {errors} | {s.nll.sum():.3f} | {seconds:.1f} |")
     return "\n".join(lines) + f"\n\nOn {len(check)} held-out rows."
@@ -112,15 +112,15 @@ def leave_one_out() -> str:
     x, y = rng.normal(size=(300, 3)), rng.normal(size=(300, 3))
     kernel = rbf(x, x, 1.0)
     started = time.perf_counter()
-    factored = Factored.of(kernel)
-    closed = [np.mean(factored.solved(y, g)[2] ** 2) for g in GAMMAS]
+    eigensystem = KernelEigensystem.of(kernel)
+    closed = [np.mean(eigensystem.solve(y, g)[2] ** 2) for g in GAMMAS]
     fast = time.perf_counter() - started
     started = time.perf_counter()
     gamma, errors = GAMMAS[8], []
     for i in range(len(x)):
         rest = np.arange(len(x)) != i
-        some = Factored.of(kernel[np.ix_(rest, rest)])
-        alpha, bias, _ = some.solved(y[rest], gamma)
+        some = KernelEigensystem.of(kernel[np.ix_(rest, rest)])
+        alpha, bias, _ = some.solve(y[rest], gamma)
         errors.append(y[i] - kernel[i, rest] @ alpha - bias)
     slow = (time.perf_counter() - started) * len(GAMMAS)
     off = abs(np.mean(np.square(errors)) / closed[8] - 1.0)

@@ -120,11 +120,13 @@ LENIENT = ((1.0, 8.0, 64.0, 512.0), (15.0, 30.0, 120.0, 700.0))
 
 
 def _exported(folder: Path, family, posterior, noise) -> Path:
-    from training.export.any_wheel_file import AnySpec, export
+    from training.export.any_wheel_file import export_any_wheel
     from training.set_posterior.response_surface import ResponseSettings
+    from training.spec import AnyWheelSpec
 
     path = folder / "small.onnx"
-    export(AnySpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}"), posterior, {}, path)
+    spec = AnyWheelSpec(family, ResponseSettings(0, 0, 0, 0), noise, "{}")
+    export_any_wheel(spec, posterior, {}, path)
     return path
 
 

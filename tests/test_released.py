@@ -12,8 +12,7 @@ from datagen.recipe import Block, read_recipe
 from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import column
-from training.export.any_wheel_file import read_any_spec
-from training.spec import read_spec
+from training.spec import read_any_wheel_spec, read_spec
 
 ROOT = Path(__file__).parents[1]
 RELEASED = {
@@ -110,7 +109,7 @@ def test_readings_repeated_and_points_held_claim_no_more_than_they_tell(name):
 
 def test_the_file_for_any_wheel_comes_from_its_spec():
     metadata = Estimator.load(ROOT / "exported" / "any_wheel.onnx").metadata
-    assert metadata["spec"] == read_any_spec("any_wheel").text
+    assert metadata["spec"] == read_any_wheel_spec("any_wheel").text
     assert metadata["spec_sha256"] in (ROOT / "exported" / "any_wheel.md").read_text()
 
 

@@ -1,4 +1,4 @@
-"""A training spec: what to learn, from what, with which regressors."""
+"""Training specs: features, targets and regressors, or the ranges of a file for any wheel."""
 
 from __future__ import annotations
 
@@ -8,23 +8,27 @@ from dataclasses import dataclass
 from typing import Any
 
 from datagen.recipe import packaged_file
+from soilml.config.measurement_noise import take_noise
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.features import inputs_of
-from soilml.quantities import SHEAR
+from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from soilml.quantities import SHEAR, column
 from training.data.targets import PER_ROW, check_targets
 from training.regressors.feature_subset import FeatureSubset
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
+from training.regressors.gaussian_regressor import GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM
+from training.set_posterior.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
 from training.set_posterior.settings import take_response_settings
 
-#: Regressor by the name that `[[regressor]] type` takes: one new file and one line here.
-REGRESSORS: dict[str, type] = {
-    cls.kind: cls
+#: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
+REGRESSORS: dict[str, type[GaussianRegressor]] = {
+    cls.type_name: cls
     for cls in (
         LSSVM,
         FixedSizeLSSVM,
@@ -33,13 +37,31 @@ REGRESSORS: dict[str, type] = {
     )
 }
 
-#: What a seed must be, for the generators of all libraries.
+#: Allowed seeds: those of the random generators of all libraries.
 SEED = "a whole number from 0 to 2^32 - 1"
 
 
 @dataclass(frozen=True)
 class Spec:
-    """Seed, features, targets, regressors (unfitted) and the rule that joins them."""
+    """What to train from data.
+
+    Attributes
+    ----------
+    name : str
+        File name without suffix.
+    seed : int
+        Of the split, and of regressors without a seed of their own.
+    features, targets : tuple of str
+        Inputs of the regressors, such as ``torque/load``, and estimated quantities.
+    regressors : tuple of FeatureSubset
+        Not fitted yet.
+    rule : str
+        Fusion rule of several regressors.
+    text : str
+        Content of the file as JSON with sorted keys.
+    set_posterior : ResponseSettings or None
+        Settings of the set posterior, for targets with one value per run.
+    """
 
     name: str
     seed: int
@@ -52,17 +74,42 @@ class Spec:
 
     @property
     def per_row(self) -> bool:
-        """Whether a target differs from row to row of a run."""
+        """Whether a target differs between the rows of a run."""
         return any(name in PER_ROW for name in self.targets)
 
 
+@dataclass(frozen=True)
+class AnyWheelSpec:
+    """What to train for wheels of any size, from simulated rows.
+
+    Attributes
+    ----------
+    family : DimensionlessFamily
+        Ranges of wheels, loads and soils.
+    response : ResponseSettings
+        Settings of the learned response of the wheel.
+    noise : dict of str to [float, float]
+        Default noise of the file: constant part in SI units and share of the reading.
+    text : str
+        Content of the file as JSON with sorted keys.
+    """
+
+    family: DimensionlessFamily
+    response: ResponseSettings
+    noise: dict[str, list[float]]
+    text: str
+
+
 def read_spec(path: str | os.PathLike[str]) -> Spec:
-    """The spec in a TOML file, or a packaged one by name; raises `InputError` naming the key."""
+    """Read a spec from a TOML file, or a packaged one by name.
+
+    Raises `InputError` with the key of the first invalid entry.
+    """
     file = packaged_file(path, "training", "specs")
     settings = read_settings(file)
-    features = _words(settings, "features", ["slip", "torque/load", "load"])
-    inputs_of(features)  # names the first that cannot be read
-    targets = _words(settings, "targets", list(SHEAR))
+    features = _take_names(settings, "features", ["slip", "torque/load", "load"])
+    inputs_of(features)  # raises for an unknown feature
+    targets = _take_names(settings, "targets", list(SHEAR))
     try:
         check_targets(targets, features)
     except InputError as error:
@@ -75,13 +122,13 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
         settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
     regressors: list[FeatureSubset] = []
     for entry in settings.tables("regressor"):
-        regressors.append(_reader(entry, seed, features, [r.kind for r in regressors]))
+        regressors.append(_take_subset(entry, seed, features, [r.name for r in regressors]))
     if not regressors:
         settings.fail("[[regressor]] is missing; give one or more")
-    read = {k for r in regressors for k in r.columns or range(len(features))}
-    for k in set(range(len(features))) - read:
-        settings.fail(f"features: no regressor reads {features[k]!r}; leave it out")
-    size = take_response_settings(settings, seed) if "set_posterior" in settings else None
+    used = {k for r in regressors for k in r.columns or range(len(features))}
+    for k in set(range(len(features))) - used:
+        settings.fail(f"features: no regressor reads {features[k]!r}; remove it")
+    response = take_response_settings(settings, seed) if "set_posterior" in settings else None
     settings.finish()
     return Spec(
         name=file.stem,
@@ -91,57 +138,90 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
         regressors=tuple(regressors),
         rule=rule,
         text=json.dumps(settings.content, sort_keys=True),
-        set_posterior=size,
+        set_posterior=response,
     )
 
 
-def _words(settings: Settings, key: str, default: list[str]) -> list[str]:
-    words = settings.take(key, list, "a list of names", default)
-    if not words or not all(isinstance(word, str) for word in words):
-        settings.fail(f"{key} is {words!r}; needed is a list of names")
-    if len(set(words)) < len(words):
-        settings.fail(f"{key} is {words!r}; a name stands twice")
-    return [str(word) for word in words]
+def is_any_wheel_spec(path: str | os.PathLike[str]) -> bool:
+    """Whether a spec has the table [any_wheel]."""
+    return "any_wheel" in read_settings(packaged_file(path, "training", "specs"))
 
 
-def _reader(settings: Settings, seed: int, features: list[str], taken: list[str]) -> FeatureSubset:
-    """A regressor and what it reads; two that would have one name are numbered."""
-    own = _words(settings, "features", features)
-    for name in own:
-        if name not in features:
-            settings.fail(f"features: {name!r} is none of the spec's: {', '.join(features)}")
-    machine = _machine(settings, seed)
-    kind, columns = machine.kind, None
-    if own != features:
-        kind, columns = f"{kind} of {', '.join(own)}", tuple(features.index(name) for name in own)
-    alike = sum(name == kind or name.startswith(f"{kind} #") for name in taken)
-    return FeatureSubset(f"{kind} #{alike + 1}" if alike else kind, machine, columns)
+def read_any_wheel_spec(path: str | os.PathLike[str]) -> AnyWheelSpec:
+    """Read a spec with [any_wheel] from a TOML file, or a packaged one by name.
 
-
-def _machine(settings: Settings, seed: int) -> Any:
-    kind = settings.text("type")
-    if kind not in REGRESSORS:
-        settings.fail(f"type is {kind!r}; there are: {', '.join(REGRESSORS)}")
-    made = REGRESSORS[kind]()
-    allowed = made.get_params()
-    settings.knows(allowed)
-    given: dict[str, Any] = {}
-    for key, default in allowed.items():
-        if key not in settings:
-            continue
-        if isinstance(default, tuple | list):
-            given[key] = tuple(settings.take(key, list, "a list of whole numbers"))
-            if not all(type(v) is int and 1 <= v <= 4096 for v in given[key]):
-                settings.fail(f"{key} is {list(given[key])}; needed are whole numbers above zero")
-        elif isinstance(default, int):
-            given[key] = settings.count(key)
-        else:
-            given[key] = settings.number(key)
-            if not 1e-12 <= given[key] <= 1e12:
-                settings.fail(
-                    f"{key} is {given[key]:g}; needed is a number above zero, 1e-12 to 1e12"
-                )
+    Raises `InputError` with the key of the first invalid entry.
+    """
+    settings = read_settings(packaged_file(path, "training", "specs"))
+    text = json.dumps(settings.content, sort_keys=True)
+    seed = int(settings.take("seed", int, "a whole number, 0 or more", 0))
+    family = DimensionlessFamily.take(settings.table("any_wheel"))
+    noise_table, noise = settings.table("noise"), {}
+    for name in RESPONSE_CHANNELS:
+        channel_noise = take_noise(noise_table, column(name))
+        noise[name] = [channel_noise.constant, channel_noise.share]
+    noise_table.finish()
+    bias = settings.table("bias")
+    if column("torque") in bias:
+        torque_bias = take_noise(bias, column("torque"))
+        noise["torque_bias"] = [torque_bias.constant, torque_bias.share]
+    bias.finish()
+    response = take_response_settings(settings, seed)
     settings.finish()
-    if "random_state" in allowed and "random_state" not in given:
-        given["random_state"] = seed
-    return made.set_params(**given)
+    return AnyWheelSpec(family, response, noise, text)
+
+
+def _take_names(settings: Settings, key: str, default: list[str]) -> list[str]:
+    names = settings.take(key, list, "a list of names", default)
+    if not names or not all(isinstance(name, str) for name in names):
+        settings.fail(f"{key} is {names!r}; needed is a list of names")
+    if len(set(names)) < len(names):
+        settings.fail(f"{key} is {names!r}; a name is repeated")
+    return [str(name) for name in names]
+
+
+def _take_subset(
+    settings: Settings, seed: int, features: list[str], used_names: list[str]
+) -> FeatureSubset:
+    """A regressor and the features that it reads; further ones of the same name get a number."""
+    own = _take_names(settings, "features", features)
+    for feature in own:
+        if feature not in features:
+            settings.fail(f"features: {feature!r} is none of the spec's: {', '.join(features)}")
+    regressor = _take_regressor(settings, seed)
+    name, columns = regressor.type_name, None
+    if own != features:
+        name, columns = f"{name} of {', '.join(own)}", tuple(features.index(f) for f in own)
+    count = sum(used == name or used.startswith(f"{name} #") for used in used_names)
+    return FeatureSubset(f"{name} #{count + 1}" if count else name, regressor, columns)
+
+
+def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
+    """A regressor with its hyperparameters, which take the type of their default."""
+    type_name = settings.text("type")
+    if type_name not in REGRESSORS:
+        settings.fail(f"type is {type_name!r}; there are: {', '.join(REGRESSORS)}")
+    regressor = REGRESSORS[type_name]()
+    defaults = regressor.get_params()
+    settings.knows(defaults)
+    parameters = {k: _take_parameter(settings, k, v) for k, v in defaults.items() if k in settings}
+    settings.finish()
+    if "random_state" in defaults and "random_state" not in parameters:
+        parameters["random_state"] = seed
+    regressor.set_params(**parameters)
+    return regressor
+
+
+def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
+    """A hyperparameter: whole numbers, a whole number, or a number in a range that is finite."""
+    if isinstance(default, tuple | list):
+        values = tuple(settings.take(key, list, "a list of whole numbers"))
+        if not all(type(v) is int and 1 <= v <= 4096 for v in values):
+            settings.fail(f"{key} is {list(values)}; needed are whole numbers from 1 to 4096")
+        return values
+    if isinstance(default, int):
+        return settings.count(key)
+    value = settings.number(key)
+    if not 1e-12 <= value <= 1e12:
+        settings.fail(f"{key} is {value:g}; needed is a number above zero, 1e-12 to 1e12")
+    return value

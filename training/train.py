@@ -1,4 +1,4 @@
-"""Train what a spec asks for, and measure it on rows that nobody learned from."""
+"""Training: fit, recalibrate and fuse the regressors of a spec, and measure them on unseen rows."""
 
 from __future__ import annotations
 
@@ -12,32 +12,28 @@ from numpy.typing import NDArray
 from datagen.recipe import parse_recipe
 from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import RULES
-from soilml.onboard.estimate import (
-    PoolingCalibration,
-    PoolingRule,
-    PriorSummary,
-    RunConditions,
-    pooled_within_prior,
-)
+from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_pooling import PoolingCalibration, PoolingRule, pool_within_prior
+from training.calibration.metrics import NINETY, Metrics, compute_metrics
 from training.calibration.recalibration import (
-    LEAST_GROUPS,
     CalibratedRegressor,
-    covariances,
-    groups_of,
-    long_groups,
-    measured_of,
-    pooling_calibration,
+    covariance_matrices,
     recalibrate,
-    run_conditions_of,
-    runs_that,
-    without_pooling,
 )
-from training.calibration.scores import NINETY, Score, scored
+from training.calibration.row_pooling import (
+    LEAST_GROUPS,
+    calibrate_pooling,
+    calibrate_single_rows,
+    groups_by_length,
+    measured_rows,
+    row_groups,
+    run_conditions,
+    runs_with_pattern,
+)
 from training.calibration.training_domain import TrainingDomain
-from training.data.dataset import Dataset, Split, split
-from training.ensemble import Ensemble, fuse_members
+from training.data.dataset import Dataset, DataSplit, split_by_run
+from training.ensemble import fuse_members
 from training.regressors.feature_subset import FeatureSubset
-from training.regressors.gaussian_mlp import GaussianMLP
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import fit_response
@@ -46,39 +42,66 @@ from training.set_posterior.validation import (
     calibrate_misfit_limits,
     validate_posterior,
 )
-from training.spec import Spec
+from training.spec import AnyWheelSpec, Spec
 
 Floats = NDArray[np.float64]
+#: Called with the name of a stage, the steps done and the total number of steps.
 Progress = Callable[[str, int, int], None]
+#: A set posterior and its metrics by number of rows.
+TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 
 
 @dataclass(frozen=True)
-class Trained:
-    """A trained estimator, everything its file needs, and its figures on unseen rows."""
+class TrainedModel:
+    """A trained model, what its file needs, and its metrics on unseen rows.
+
+    Attributes
+    ----------
+    spec, data, parts : Spec, Dataset, DataSplit
+        What it was trained from.
+    estimator : CalibratedRegressor
+        The only regressor, or the ensemble of all.
+    members : tuple of CalibratedRegressor
+        The single regressors.
+    domain : TrainingDomain
+        Where estimates are in range.
+    pooling : PoolingCalibration
+        Calibration of several rows of one soil, pooled as Gaussians.
+    prior : PriorSummary
+        Prior of the targets.
+    scores : dict of str to Metrics
+        Of single rows: of each member, of each fusion rule, and of the estimator.
+    pooled_scores : dict of str to dict of int to Metrics
+        Of pooled rows, by pattern of operating conditions and number of rows.
+    set_posterior : SetPosteriorGraph or None
+        Posterior of several rows, where the spec asks for it.
+    set_figures : dict of int to SetFigures
+        Its metrics by number of rows.
+    """
 
     spec: Spec
     estimator: CalibratedRegressor
-    support: TrainingDomain
-    together: PoolingCalibration
+    domain: TrainingDomain
+    pooling: PoolingCalibration
     prior: PriorSummary
     data: Dataset
-    parts: Split
-    scores: dict[str, Score]
-    sets: dict[str, dict[int, Score]]
+    parts: DataSplit
+    scores: dict[str, Metrics]
+    pooled_scores: dict[str, dict[int, Metrics]]
     members: tuple[CalibratedRegressor, ...]
-    posterior: SetPosteriorGraph | None = None
-    figures: dict[int, SetFigures] = field(default_factory=dict)
+    set_posterior: SetPosteriorGraph | None = None
+    set_figures: dict[int, SetFigures] = field(default_factory=dict)
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """Mean, standard deviation (n, q) and in-range flag (n,), as the exported file gives them.
+        """Mean, standard deviation (n, q) and in-range flag (n,), as in the exported file.
 
-        Out of range it knows nothing, and answers with the prior.
+        Out of range, mean and standard deviation are those of the prior.
         """
         mean, std = self.estimator.predict(features)
-        inside = self.support.holds(features)
-        kept = np.clip(mean, self.prior.lower, self.prior.upper)
+        inside = self.domain.contains(features)
+        clipped = np.clip(mean, self.prior.lower, self.prior.upper)
         return (
-            np.where(inside[:, None], kept, self.prior.mean),
+            np.where(inside[:, None], clipped, self.prior.mean),
             np.where(inside[:, None], std, self.prior.std),
             inside,
         )
@@ -86,150 +109,178 @@ class Trained:
 
 def train(
     spec: Spec, data: Dataset, progress: Progress = lambda text, done, total: None
-) -> Trained:
-    """Fit every regressor of the spec, recalibrate it, join them, and score the result.
+) -> TrainedModel:
+    """Fit and recalibrate every regressor of a spec, fuse them, and measure the result.
 
-    Held-out rows are cut in three: on the first, members are recalibrated and the correlation of
-    their errors is measured; on the second, the joined estimate is recalibrated; on the third all
-    figures are taken.
+    The calibration rows are cut in three by run. On the first part the members are recalibrated and
+    the correlation of their errors is measured; on the second the fused estimate is recalibrated;
+    on the third all metrics are measured.
+
+    Parameters
+    ----------
+    spec : Spec
+        From `read_spec`; its regressors are fitted in place.
+    data : Dataset
+        From `read_dataset`, with the features and targets of the spec.
+    progress : callable, optional
+        Called with the name of a stage, the steps done and the total number of steps.
+
+    Returns
+    -------
+    TrainedModel
+
+    Raises
+    ------
+    InputError
+        For too few rows to calibrate intervals on, and where a regressor does not converge.
+
+    Examples
+    --------
+    >>> from training.data.dataset import read_dataset
+    >>> from training.spec import read_spec
+    >>> spec = read_spec("linear")
+    >>> data = read_dataset("data.parquet", spec.features, spec.targets)  # doctest: +SKIP
+    >>> train(spec, data).scores["estimator"].relative  # doctest: +SKIP
+    array([0.943, 0.881, 0.688])
     """
-    parts = split(data, spec.seed)
+    parts = split_by_run(data, spec.seed)
     targets = parts.train.targets
     prior = PriorSummary(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
-    first, second, third = _thirds(parts.calibrate.thinned(), spec.seed)
-    unseen = np.isin(parts.calibrate.run, third.run)
-    _check_enough(data, parts.calibrate.rows(~unseen))
+    first, second, third = _split_in_three(parts.calibration.limit_rows_per_run(), spec.seed)
+    scored = np.isin(parts.calibration.run, third.run)
+    calibration = parts.calibration.rows(~scored)
+    _check_enough(data, calibration)
     members = []
     for regressor in spec.regressors:
-        _fit(regressor, parts, partial(progress, f"fitting {regressor.kind}"))
+        _fit(regressor, parts, partial(progress, f"fitting {regressor.name}"))
         members.append(recalibrate(regressor, first))
-    scores = {m.regressor.kind: _scored(m, third, prior.std) for m in members}
+    scores = {m.regressor.name: _score(m, third, prior.std) for m in members}
     if len(members) > 1:
-        for rule in RULES:
-            joined = fuse_members(members, rule, first)
-            claimed = joined.predict(third.features)
-            scores[f"{rule}, as claimed"] = scored(third.targets, *claimed, prior.std)
-            widened = recalibrate(joined, second)
-            scores[f"{rule}, recalibrated"] = _scored(widened, third, prior.std)
+        scores |= _score_rules(members, first, second, third, prior.std)
         estimator = recalibrate(fuse_members(members, spec.rule, first), second)
     else:
-        seen = parts.calibrate.thinned()
-        estimator = recalibrate(members[0].regressor, seen.rows(~np.isin(seen.run, third.run)))
-    scores["estimator"] = _scored(estimator, third, prior.std)
-    joint = _together(
-        estimator,
-        parts.calibrate.rows(~unseen),
-        prior,
-        run_conditions_of(parts.train),
-        spec.per_row,
-    )
-    posterior, figures = None, {}
-    if spec.set_posterior is not None:
-        family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
-        posterior = calibrate_misfit_limits(
-            family, fit_response(family, spec.set_posterior, progress), progress
-        )
-        figures = validate_posterior(posterior, progress)
-    return Trained(
+        estimator = recalibrate(members[0].regressor, _unscored_rows(parts, third))
+    scores["estimator"] = _score(estimator, third, prior.std)
+    mean, std = estimator.predict(calibration.features)
+    covariance = covariance_matrices(std, estimator.correlation)
+    calibrate = calibrate_single_rows if spec.per_row else calibrate_pooling
+    pooling = calibrate(mean, covariance, calibration, prior, run_conditions(parts.train))
+    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
+    return TrainedModel(
         spec=spec,
         estimator=estimator,
-        support=TrainingDomain.of(parts.train.features, spec.features, spec.seed),
-        together=joint,
+        domain=TrainingDomain.of(parts.train.features, spec.features, spec.seed),
+        pooling=pooling,
         prior=prior,
         data=data,
         parts=parts,
         scores=scores,
-        sets=_set_scores(estimator, joint, parts.calibrate.rows(unseen), prior),
+        pooled_scores=_score_pooling(estimator, pooling, parts.calibration.rows(scored), prior),
         members=tuple(members),
-        posterior=posterior,
-        figures=figures,
+        set_posterior=set_posterior,
+        set_figures=set_figures,
     )
 
 
-def _check_enough(data: Dataset, calibrate: Dataset) -> None:
-    """Raise `InputError` where intervals would be measured on too few rows."""
-    found = len(groups_of(calibrate.runs(), 1))
-    if found < LEAST_GROUPS:
-        needed = int(1.1 * len(data) * LEAST_GROUPS / max(found, 1)) + 1
+def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
+    """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
+    response = fit_response(spec.family, spec.response, progress)
+    posterior = calibrate_misfit_limits(spec.family, response, progress)
+    return posterior, validate_posterior(posterior, progress)
+
+
+def _train_set_posterior(
+    spec: Spec, data: Dataset, progress: Progress
+) -> tuple[SetPosteriorGraph | None, dict[int, SetFigures]]:
+    if spec.set_posterior is None:
+        return None, {}
+    family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
+    response = fit_response(family, spec.set_posterior, progress)
+    posterior = calibrate_misfit_limits(family, response, progress)
+    return posterior, validate_posterior(posterior, progress)
+
+
+def _check_enough(data: Dataset, calibration: Dataset) -> None:
+    """Raise `InputError` where intervals would be calibrated on too few rows."""
+    groups = len(row_groups(calibration.runs(), 1))
+    if groups < LEAST_GROUPS:
+        needed = int(1.1 * len(data) * LEAST_GROUPS / max(groups, 1)) + 1
         raise InputError(
-            f"{len(data)} rows leave {found} to measure the intervals on; needed are "
+            f"{len(data)} rows leave {groups} to calibrate the intervals on; needed are "
             f"{LEAST_GROUPS}: generate about {needed} rows of such runs, or more"
         )
 
 
-def _fit(reader: FeatureSubset, parts: Split, progress: Callable[[int, int], None]) -> None:
+def _fit(regressor: FeatureSubset, parts: DataSplit, progress: Callable[[int, int], None]) -> None:
     progress(0, 1)
-    machine, shown = reader.machine, reader.read(parts.train.features)
-    if isinstance(machine, GaussianMLP):
-        held_out = (reader.read(parts.choose.features), parts.choose.targets)
-        machine.fit(
-            shown,
-            parts.train.targets,
-            held_out=held_out,
-            progress=lambda epoch: progress(epoch, machine.epochs),
-        )
-    else:
-        machine.fit(shown, parts.train.targets)
-    if not np.isfinite(reader.predict(parts.choose.features)).all():
-        raise InputError(f"{reader.kind} did not converge: change its settings in the spec")
+    training = (parts.train.features, parts.train.targets)
+    validation = (parts.validation.features, parts.validation.targets)
+    regressor.fit(training, validation, progress)
+    if not np.isfinite(regressor.predict(parts.validation.features)).all():
+        raise InputError(f"{regressor.name} did not converge: change its settings in the spec")
     progress(1, 1)
 
 
-def _thirds(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
-    """Three parts by run."""
+def _split_in_three(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
+    """Three parts of about equal size, by run."""
     codes = np.unique(data.run)
-    part = np.random.default_rng(seed + 1).permutation(len(codes)) % 3
-    place = part[np.searchsorted(codes, data.run)]
-    return data.rows(place == 0), data.rows(place == 1), data.rows(place == 2)
+    part_of_run = np.random.default_rng(seed + 1).permutation(len(codes)) % 3
+    part = part_of_run[np.searchsorted(codes, data.run)]
+    return data.rows(part == 0), data.rows(part == 1), data.rows(part == 2)
 
 
-def _together(
-    estimator: CalibratedRegressor,
-    data: Dataset,
-    prior: PriorSummary,
-    driven: RunConditions,
-    per_row: bool,
-) -> PoolingCalibration:
-    """What joining rows takes; where they have no one value, the interval of one row alone."""
+def _unscored_rows(parts: DataSplit, scored: Dataset) -> Dataset:
+    """Calibration rows, a few of each run, without the runs that metrics are measured on."""
+    few = parts.calibration.limit_rows_per_run()
+    return few.rows(~np.isin(few.run, scored.run))
+
+
+def _score(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Metrics:
+    return compute_metrics(data.targets, *estimator.predict(data.features), prior_std)
+
+
+def _score_rules(
+    members: list[CalibratedRegressor],
+    first: Dataset,
+    second: Dataset,
+    third: Dataset,
+    prior_std: Floats,
+) -> dict[str, Metrics]:
+    """Metrics of every fusion rule, before and after recalibration."""
+    scores = {}
+    for rule in RULES:
+        ensemble = fuse_members(members, rule, first)
+        claimed = ensemble.predict(third.features)
+        scores[f"{rule}, as claimed"] = compute_metrics(third.targets, *claimed, prior_std)
+        scores[f"{rule}, recalibrated"] = _score(recalibrate(ensemble, second), third, prior_std)
+    return scores
+
+
+def _score_pooling(
+    estimator: CalibratedRegressor, pooling: PoolingCalibration, data: Dataset, prior: PriorSummary
+) -> dict[str, dict[int, Metrics]]:
+    """Metrics of pooled rows by pattern and number of rows, on runs not used for calibration."""
     mean, std = estimator.predict(data.features)
-    covariance = covariances(std, estimator.correlation)
-    return (without_pooling if per_row else pooling_calibration)(
-        mean, covariance, data, prior, driven
-    )
-
-
-def _set_scores(
-    estimator: CalibratedRegressor, joint: PoolingCalibration, data: Dataset, prior: PriorSummary
-) -> dict[str, dict[int, Score]]:
-    """Figures of several rows joined, by what the run varied and the number of rows.
-
-    On runs that joining was not fitted to.
-    """
-    mean, std = estimator.predict(data.features)
-    covariance = covariances(std, estimator.correlation)
-    found: dict[str, dict[int, Score]] = {}
-    for kind in joint.kinds:
-        scores = found[joint.said(kind)] = {}
-        for groups in long_groups(runs_that(kind.varies, data, joint.driven)):
-            answers = [
-                _joined(mean[rows], covariance[rows], prior, joint.rule(measured_of(data, rows)))
+    covariance = covariance_matrices(std, estimator.correlation)
+    scores: dict[str, dict[int, Metrics]] = {}
+    for pattern in pooling.patterns:
+        by_length = scores[pooling.label(pattern)] = {}
+        runs = runs_with_pattern(pattern.varies, data, pooling.conditions)
+        for groups in groups_by_length(runs):
+            estimates = [
+                _pool(mean[rows], covariance[rows], prior, pooling.rule(measured_rows(data, rows)))
                 for rows in groups
             ]
-            middle, spread = (np.stack(part) for part in zip(*answers, strict=True))
-            scores[groups.shape[1]] = scored(data.targets[groups[:, 0]], middle, spread, prior.std)
-    return found
+            pooled_mean, pooled_std = (np.stack(part) for part in zip(*estimates, strict=True))
+            by_length[groups.shape[1]] = compute_metrics(
+                data.targets[groups[:, 0]], pooled_mean, pooled_std, prior.std
+            )
+    return scores
 
 
-def _joined(
+def _pool(
     mean: Floats, covariance: Floats, prior: PriorSummary, rule: PoolingRule
 ) -> tuple[Floats, Floats]:
-    """Mean, and the standard deviation of a Gaussian with the interval that is answered."""
-    joint = pooled_within_prior(mean, covariance, prior, rule)
-    return joint.mean, np.sqrt(np.diag(joint.covariance)) * rule.reach / NINETY
-
-
-def _scored(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Score:
-    return scored(data.targets, *estimator.predict(data.features), prior_std)
-
-
-__all__ = ["Ensemble", "Trained", "train"]
+    """Pooled mean, and the standard deviation of a Gaussian with the same 90 % interval."""
+    pooled = pool_within_prior(mean, covariance, prior, rule)
+    return pooled.mean, np.sqrt(np.diag(pooled.covariance)) * rule.coverage_factor / NINETY

@@ -18,12 +18,12 @@ from datagen.recipe import packaged_file, read_recipe
 from soilml import Estimator, read_table
 from soilml.io.atomic_files import atomic_output
 from soilml.io.text_tables import format_table
-from soilml.onboard.multi_sensor import ACROSS_FILES, fused_estimates
+from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
 from soilml.quantities import column
 from training.data.dataset import read_dataset
-from training.export.model_file import export
+from training.export.model_file import export_model
 from training.spec import Spec, read_spec
-from training.train import Trained, train
+from training.train import TrainedModel, train
 
 OUT = Path("demo/papers/slip_models.png")
 ROWS, TEST_ROWS = 5000, 2500
@@ -70,18 +70,18 @@ def smaller(name: str) -> Spec:
     """A packaged spec with fewer centres."""
     spec = read_spec(name)
     for reader in spec.regressors:
-        reader.machine.set_params(centres=60)
+        reader.model.set_params(centres=60)
     return spec
 
 
-def halves(name: str, data: Path) -> tuple[Trained, Trained]:
+def halves(name: str, data: Path) -> tuple[TrainedModel, TrainedModel]:
     """The regressors of a packaged spec that read one sensor each, and the last, that reads all."""
     spec = smaller(name)
     each = learned(replace(spec, regressors=spec.regressors[:-1]), data)
     return each, learned(replace(spec, regressors=spec.regressors[-1:]), data)
 
 
-def learned(spec: Spec, data: Path) -> Trained:
+def learned(spec: Spec, data: Path) -> TrainedModel:
     """A spec trained on data."""
     return train(spec, read_dataset(data, spec.features, spec.targets))
 
@@ -107,11 +107,11 @@ def slip_of(folder: Path, changes: dict[str, str]) -> tuple[list[tuple[str, str,
     table = table.rows(table.answered)
     found = {}
     for name in ("slip_torque", "slip_vibration"):
-        export(learned(smaller(name), data), folder / f"{name}.onnx", data)
+        export_model(learned(smaller(name), data), folder / f"{name}.onnx", data)
         estimator = Estimator.load(folder / f"{name}.onnx")
         found[name] = estimator(**{n: table[column(n)] for n in estimator.inputs})
     for rule in ACROSS_FILES:
-        found[f"two files: {rule}"] = fused_estimates([*found.values()][:2], rule).estimate
+        found[f"two files: {rule}"] = fuse_estimates([*found.values()][:2], rule).estimate
     names = {"slip_torque": "torque alone", "slip_vibration": "vibration alone"}
     for place, (name, estimate) in enumerate(found.items()):
         off = estimate.mean[:, 0] - table["slip"]
@@ -127,7 +127,7 @@ def soil_of(folder: Path, changes: dict[str, str]) -> dict[str, np.ndarray]:
     data = made(folder, changes, ROWS, 1)
     each, at_once = halves("leg_soil", data)
     found = {
-        name: each.scores[member.regressor.kind]
+        name: each.scores[member.regressor.name]
         for name, member in zip(("torque", "vibration", "sinkage"), each.members, strict=True)
     }
     for rule in RULES:

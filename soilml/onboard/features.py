@@ -27,7 +27,7 @@ READABLE: dict[str, tuple[float, float]] = {
 }
 
 
-def parts(feature: str) -> tuple[str, str | None]:
+def numerator_denominator(feature: str) -> tuple[str, str | None]:
     """(numerator, denominator) of `torque/load`; no denominator for `slip`."""
     top, slash, bottom = feature.partition("/")
     for name in (top, bottom if slash else top):
@@ -38,20 +38,20 @@ def parts(feature: str) -> tuple[str, str | None]:
 
 def inputs_of(features: Sequence[str]) -> tuple[str, ...]:
     """The measured quantities that these features need, in nomenclature order."""
-    needed = {name for feature in features for name in parts(feature) if name}
+    needed = {name for feature in features for name in numerator_denominator(feature) if name}
     return tuple(name for name in READABLE if name in needed)
 
 
-def computed(features: Sequence[str], measured: Mapping[str, Floats]) -> Floats:
+def compute_features(features: Sequence[str], measured: Mapping[str, Floats]) -> Floats:
     """The features (rows, d) of measured columns (rows,)."""
     columns = []
     for feature in features:
-        top, bottom = parts(feature)
+        top, bottom = numerator_denominator(feature)
         columns.append(measured[top] / measured[bottom] if bottom else measured[top])
     return np.stack(columns, axis=-1)
 
 
-def readings(
+def flatten_readings(
     names: Sequence[str], measured: Mapping[str, Any]
 ) -> tuple[list[Floats], tuple[int, ...]]:
     """The named quantities as flat arrays of one length, and the shape they had in common.

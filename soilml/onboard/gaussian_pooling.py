@@ -1,40 +1,248 @@
-"""The estimates of single readings joined, where a model file has no set posterior."""
+"""Pooling of single-row estimates of one soil as Gaussians, with measured calibration.
+
+This is what a model file without a set posterior does for a run of several rows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.estimate import Estimate, pooled_within_prior
-
-if TYPE_CHECKING:
-    from soilml.onboard.estimator import Estimator
+from soilml.onboard.estimate import Estimate, PriorSummary
 
 Floats = NDArray[np.float64]
 
-#: A run of which less than this share is in range is not estimated.
-LEAST_SOUND = 0.9
+#: Least ratio of a row's standard deviation to the prior's, along any direction.
+LEAST_STD_RATIO = 1e-3
+#: Bins along the trained range of slip and of load; rows in the same or in adjacent bins have the
+#: same operating conditions, and their errors are taken as fully correlated.
+BINS = 50
+#: Information, relative to the prior's, below which a row cannot disagree with the pooled mean.
+LEAST_INFORMATION = 0.05
+#: A run of which a smaller share of rows lies in the training domain is not estimated.
+LEAST_SHARE_IN_RANGE = 0.9
 
 
-def pooled_run(estimator: Estimator, measured: Mapping[str, Floats]) -> Estimate:
-    """One estimate of an `Estimator` from readings (rows,) of one soil, each estimated by itself.
+@dataclass(frozen=True)
+class RunConditions:
+    """Operating conditions of a reading, slip and load, and their spread over the training rows."""
 
-    Rows of nearly the same slip and load count as one. Where too many are out of range, or they
-    contradict each other as rows of one soil hardly ever do, the answer is the prior.
+    names: tuple[str, ...]
+    lower: Floats  # (d,)
+    upper: Floats
+    std: Floats
+
+    def row_weights(self, measured: Mapping[str, Floats]) -> Floats:
+        """Weight (m,) of each row: one over the number of rows in its bin and the adjacent ones.
+
+        The sum of the weights is the effective number of rows. A reading that is repeated, with or
+        without new noise, counts once.
+        """
+        position = (self._conditions(measured) - self.lower) / (self.upper - self.lower)
+        # one empty bin on either side, so that np.roll carries nothing across the ends
+        index = tuple(np.clip(position * BINS, 0, BINS).astype(int).T + 1)
+        count = np.zeros((BINS + 3,) * len(self.names))
+        np.add.at(count, index, 1.0)
+        for axis in range(count.ndim):
+            count = count + np.roll(count, 1, axis) + np.roll(count, -1, axis)
+        return np.asarray(1.0 / count[index])
+
+    def variation(self, measured: Mapping[str, Floats], weights: Floats) -> Floats:
+        """How much a run varied each condition, (d,): 0 steady, 1 as much as the training rows.
+
+        The ratio of weighted standard deviations, smoothed by the cubic 3 r^2 - 2 r^3.
+        """
+        conditions, count = self._conditions(measured), weights.sum()
+        deviation = conditions - weights @ conditions / count
+        variance = weights @ deviation**2 / max(count - 1.0, 0.5)
+        ratio = np.minimum(np.sqrt(variance) / self.std, 1.0)
+        return np.asarray(ratio**2 * (3.0 - 2.0 * ratio))
+
+    def _conditions(self, measured: Mapping[str, Floats]) -> Floats:
+        return np.stack([measured[name] for name in self.names], axis=-1)
+
+
+@dataclass(frozen=True)
+class RunPattern:
+    """Calibration of pooling for runs that vary the same operating conditions."""
+
+    varies: tuple[bool, ...]  # (d,) whether each condition varies
+    rows: Floats  # (k,) effective numbers of rows at which it was measured: 1, then rising
+    information: Floats  # (k,) share of a row's information that is independent of other rows
+    std_scale: Floats  # (k, q) factor on the pooled standard deviation
+    coverage_factor: Floats  # (k, q) half-width of the 90 % interval in standard deviations
+
+    def interpolate(self, rows: float) -> Floats:
+        """Log information share, std scale and coverage factor, (1 + 2 q,).
+
+        Interpolated linearly in the logarithm of the effective number of rows. Beyond the largest
+        number that was measured, more rows do not reduce the uncertainty any further.
+        """
+        columns = np.column_stack([np.log(self.information), self.std_scale, self.coverage_factor])
+        log_rows, grid = np.log(max(rows, 1.0)), np.log(self.rows)
+        values = np.asarray([np.interp(log_rows, grid, column) for column in columns.T])
+        values[0] -= max(log_rows - grid[-1], 0.0)
+        return values
+
+
+@dataclass(frozen=True)
+class PoolingRule:
+    """Weights and factors for pooling the rows of one run."""
+
+    weights: Floats  # (m,) share of each row's information that is used
+    std_scale: Floats  # (q,), as in `RunPattern`
+    coverage_factor: Floats  # (q,)
+
+
+@dataclass(frozen=True)
+class PoolingCalibration:
+    """Calibration of pooling for runs of any pattern of operating conditions."""
+
+    conditions: RunConditions
+    patterns: tuple[RunPattern, ...]
+    single_row_coverage_factor: Floats  # (q,) of the 90 % interval of one row
+    inconsistency_limits: Floats  # (2,) that rows of one soil hardly ever exceed
+
+    def label(self, pattern: RunPattern) -> str:
+        """Name of a pattern: "steady", "slip free", "slip and load free"."""
+        pairs = zip(self.conditions.names, pattern.varies, strict=True)
+        names = [name for name, varies in pairs if varies]
+        return f"{' and '.join(names)} free" if names else "steady"
+
+    def rule(self, measured: Mapping[str, Floats]) -> PoolingRule:
+        """Rule for the rows (m,) of one run, interpolated between the calibrated patterns."""
+        row_weights = self.conditions.row_weights(measured)
+        variation = self.conditions.variation(measured, row_weights)
+        shares = [
+            np.prod(np.where(pattern.varies, variation, 1.0 - variation))
+            for pattern in self.patterns
+        ]
+        effective_rows = row_weights.sum()
+        mixture = shares @ np.stack([p.interpolate(effective_rows) for p in self.patterns])
+        q = self.single_row_coverage_factor.size
+        log_information, std_scale, coverage_factor = np.split(mixture, [1, 1 + q])
+        return PoolingRule(row_weights * np.exp(log_information), std_scale, coverage_factor)
+
+
+@dataclass(frozen=True)
+class PooledEstimate:
+    """Pooled mean (..., q), covariance (..., q, q), and inconsistency (..., 2).
+
+    The first measure of inconsistency is the weighted mean over rows of the squared difference
+    between the row's estimate and the pooled mean, in standard deviations of what the row adds to
+    the prior. The second is how far the pooled mean lies outside the prior's range, in the prior's
+    standard deviations. Both are small for rows of one soil of the training domain.
     """
-    single, together = estimator(**measured), estimator.together
-    sound = single.in_range
-    if sound.size == 1:
-        parts = (single.mean[0], single.covariance[0], single.std[0], sound[0])
-        return estimator.estimate(*parts, together.alone)
-    if sound.sum() < LEAST_SOUND * sound.size:
-        return estimator.unknown()
-    rule = together.rule({name: values[sound] for name, values in measured.items()})
-    joint = pooled_within_prior(single.mean[sound], single.covariance[sound], estimator.prior, rule)
-    if bool((joint.doubt > together.doubt).any()):
-        return estimator.unknown()
-    std = np.sqrt(np.diag(joint.covariance))
-    return estimator.estimate(joint.mean, joint.covariance, std, np.asarray(True), rule.reach)
+
+    mean: Floats
+    covariance: Floats
+    inconsistency: Floats
+
+
+def pool(mean: Floats, covariance: Floats, prior: PriorSummary, weights: Floats) -> PooledEstimate:
+    r"""Pool the estimates of m rows of one soil, counting their common prior once.
+
+    .. math::
+        P^{-1} = P_0^{-1} + \sum_i w_i (P_i^{-1} - P_0^{-1}), \quad
+        P^{-1} \mu = P_0^{-1} \mu_0 + \sum_i w_i (P_i^{-1} \mu_i - P_0^{-1} \mu_0)
+
+    Directions in which a row is no more certain than the prior contribute nothing.
+
+    Parameters
+    ----------
+    mean, covariance : ndarray, shapes (..., m, q) and (..., m, q, q)
+        Estimates of the single rows.
+    prior : PriorSummary
+        The prior that every row's estimate contains.
+    weights : ndarray, shape (..., m)
+        Share w of each row's information that is used; below 1 where the errors of rows are
+        correlated because their operating conditions, or an unknown bearing, are the same.
+
+    References
+    ----------
+    Tresp, Neural Computation 12, 2000: product rule for conditionally independent measurements.
+    It treats the posterior of a row as Gaussian, which it is not; `PoolingCalibration` holds
+    measured corrections.
+    """
+    q = mean.shape[-1]
+    scaled_mean = (mean - prior.mean) / prior.std
+    scaled = covariance / np.outer(prior.std, prior.std)
+    variance, axes = np.linalg.eigh(scaled)  # along the principal axes of each row
+    variance = np.clip(variance, LEAST_STD_RATIO**2, 1.0 - LEAST_STD_RATIO)
+    information = 1.0 / variance - 1.0  # in addition to the prior's, which is 1
+    projected = np.einsum("...ji,...j->...i", axes, scaled_mean) / variance
+    inverse = np.linalg.inv(
+        np.eye(q) + np.einsum("...m,...mij,...mj,...mkj->...ik", weights, axes, information, axes)
+    )
+    weighted = np.einsum("...m,...mij,...mj->...i", weights, axes, projected)
+    centre = np.einsum("...ij,...j->...i", inverse, weighted)
+    residual = projected - information * np.einsum("...mji,...j->...mi", axes, centre)
+    disagreement = np.sum(
+        weights
+        / weights.sum(axis=-1, keepdims=True)
+        * np.sum(residual**2 / (information + LEAST_INFORMATION), axis=-1),
+        axis=-1,
+    )
+    pooled_mean = prior.mean + prior.std * centre
+    outside = np.maximum(prior.lower - pooled_mean, pooled_mean - prior.upper) / prior.std
+    return PooledEstimate(
+        mean=pooled_mean,
+        covariance=np.asarray(inverse * np.outer(prior.std, prior.std)),
+        inconsistency=np.stack([disagreement, np.maximum(outside.max(axis=-1), 0.0)], axis=-1),
+    )
+
+
+def pool_within_prior(
+    mean: Floats, covariance: Floats, prior: PriorSummary, rule: PoolingRule
+) -> PooledEstimate:
+    """Pool rows (m, q) and (m, q, q) by a rule, with the mean clipped to the prior's range.
+
+    The scaled standard deviation is at most the prior's, unless the unscaled one is larger.
+    """
+    estimate = pool(mean, covariance, prior, rule.weights)
+    unscaled = np.sqrt(np.diag(estimate.covariance))
+    scale = np.minimum(rule.std_scale, np.maximum(prior.std / unscaled, 1.0))
+    return PooledEstimate(
+        mean=np.clip(estimate.mean, prior.lower, prior.upper),
+        covariance=estimate.covariance * np.outer(scale, scale),
+        inconsistency=estimate.inconsistency,
+    )
+
+
+def pool_run(
+    single: Estimate, measured: Mapping[str, Floats], calibration: PoolingCalibration
+) -> Estimate | None:
+    """Pool the single-row estimates (m,) of a run of one soil into one estimate.
+
+    Parameters
+    ----------
+    single : Estimate
+        Estimates of the m rows, each by itself.
+    measured : mapping of str to ndarray, shape (m,)
+        The readings, among them the operating conditions of the calibration.
+    calibration : PoolingCalibration
+        Calibration from held-out runs.
+
+    Returns
+    -------
+    Estimate or None
+        None where more than a tenth of the rows are out of range, or where the rows are less
+        consistent with each other than rows of one soil hardly ever are.
+    """
+    valid = single.in_range
+    head = single.names, single.units, single.prior
+    if valid.size == 1:
+        parts = (single.mean[0], single.covariance[0], single.std[0], valid[0])
+        return Estimate.gaussian(*head, *parts, calibration.single_row_coverage_factor)
+    if valid.sum() < LEAST_SHARE_IN_RANGE * valid.size:
+        return None
+    rule = calibration.rule({name: values[valid] for name, values in measured.items()})
+    pooled = pool_within_prior(single.mean[valid], single.covariance[valid], single.prior, rule)
+    if bool((pooled.inconsistency > calibration.inconsistency_limits).any()):
+        return None
+    std = np.sqrt(np.diag(pooled.covariance))
+    parts = (pooled.mean, pooled.covariance, std, np.asarray(True))
+    return Estimate.gaussian(*head, *parts, rule.coverage_factor)

@@ -11,52 +11,160 @@ from typing import Any
 
 import numpy as np
 import onnxruntime as ort
-from numpy.typing import NDArray
 
 from soilml.errors import ModelFileError
-from soilml.onboard.estimate import PoolingCalibration, RunConditions, RunPattern
+from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
+from soilml.onboard.set_posterior import SetPosterior
 
-Floats = NDArray[np.float64]
-
-#: Version of the file's contract: input and output names, metadata keys.
+#: Version of the file format: names of inputs and outputs, keys of the metadata.
 FORMAT = "3"
-#: Keys of what the metadata says of what is driven, and of joining rows in each kind of run.
-DRIVEN = ("lower", "upper", "std")
-KIND = ("rows", "worth", "widening", "reach")
+#: Metadata key of each array of `RunConditions`, and of `RunPattern`.
+CONDITION_KEYS = {"lower": "lower", "upper": "upper", "std": "std"}
+PATTERN_KEYS = {
+    "rows": "rows",
+    "worth": "information",
+    "widening": "std_scale",
+    "reach": "coverage_factor",
+}
 
 
-def opened(path: str | os.PathLike[str]) -> tuple[ort.InferenceSession, dict[str, str]]:
-    """The session and the metadata of a file.
+def open_model(path: str | os.PathLike[str]) -> tuple[ort.InferenceSession, dict[str, str]]:
+    """Open a model file and verify its checksums.
 
-    Raises `ModelFileError` for one that is not ours, of another format, or damaged.
+    Returns
+    -------
+    session : onnxruntime.InferenceSession
+        On the CPU, with one thread.
+    metadata : dict of str to str
+        All metadata of the file.
+
+    Raises
+    ------
+    ModelFileError
+        For a file that cannot be read, was not written by `soilml train`, has another format, or
+        is damaged.
     """
     file = Path(path)
-    content = _content(file)
-    session, metadata = _session(file, content)
+    content = _read_content(file)
+    session, metadata = _create_session(file, content)
     if "soilml_format" not in metadata:
-        raise ModelFileError(f"{file} is an ONNX model, but none that soilml train wrote")
+        raise ModelFileError(
+            f"{file} is an ONNX model without soilml metadata; needed is one that soilml train "
+            "wrote"
+        )
     if metadata["soilml_format"] != FORMAT:
         raise ModelFileError(
-            f"{file} has format {metadata['soilml_format']}, this soilml reads {FORMAT}"
+            f"{file} has format {metadata['soilml_format']}; this version of soilml reads format "
+            f"{FORMAT}"
         )
-    if not _whole(content, metadata):
-        raise ModelFileError(f"{file} is damaged: its checksum does not hold; export it again")
+    if not _is_intact(content, metadata):
+        raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")
     return session, metadata
 
 
-def checksum(metadata: Mapping[str, str]) -> str:
-    """Hash of all metadata but the hash itself."""
+def metadata_checksum(metadata: Mapping[str, str]) -> str:
+    """SHA-256 of all metadata entries except the checksum itself."""
     entries = sorted((k, v) for k, v in metadata.items() if k != "metadata_sha256")
     return hashlib.sha256(json.dumps(entries).encode()).hexdigest()
 
 
-def behind(metadata: Mapping[str, str]) -> bytes:
-    """The metadata as it stands behind the graph in the file: entries of field 14, by key."""
-    found = b""
+def serialise_metadata(metadata: Mapping[str, str]) -> bytes:
+    """The metadata as the bytes that follow the graph in the file.
+
+    Entries of field 14 (`metadata_props`) of the protobuf message ModelProto, sorted by key.
+    """
+    content = b""
     for key, value in sorted(metadata.items()):
-        entry = _field(1, key.encode()) + _field(2, value.encode())
-        found += _field(14, entry)
-    return found
+        content += _field(14, _field(1, key.encode()) + _field(2, value.encode()))
+    return content
+
+
+def read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Fields of an `Estimator` from the metadata of its file, by field name.
+
+    Raises `KeyError`, `TypeError` or `ValueError` where an entry is missing or malformed.
+    """
+    inputs, outputs = json.loads(metadata["inputs"]), json.loads(metadata["outputs"])
+    _check_provenance(metadata)
+    return {
+        "inputs": tuple(entry["name"] for entry in inputs),
+        "names": tuple(entry["name"] for entry in outputs),
+        "units": tuple(entry["unit"] for entry in outputs),
+        "per_row": tuple(entry["name"] for entry in outputs if entry.get("per_row", False)),
+        "prior": read_prior(metadata, {}),
+        "pooling": read_pooling(json.loads(metadata["together"])),
+        "sets": SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None,
+    }
+
+
+def read_prior(metadata: Mapping[str, str], context: Mapping[str, float]) -> PriorSummary:
+    """The prior of the outputs, where need be scaled by the context value that an output names."""
+    outputs = json.loads(metadata["outputs"])
+    scale = np.asarray([context.get(entry.get("scale", ""), 1.0) for entry in outputs])
+    return PriorSummary(
+        *(
+            scale * np.asarray([entry[key] for entry in outputs], dtype=np.float64)
+            for key in ("prior_mean", "prior_std", "lower", "upper")
+        )
+    )
+
+
+def read_probe(metadata: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Readings with the answers that the file must reproduce."""
+    probe = json.loads(metadata["probe"])
+    if not (isinstance(probe, list) and probe):
+        raise ValueError("no probe")
+    return probe
+
+
+def read_pooling(entry: Mapping[str, Any]) -> PoolingCalibration:
+    """The pooling calibration from the metadata entry "together"."""
+    conditions = RunConditions(
+        names=tuple(entry["over"]),
+        **{field: np.asarray(entry[key], float) for key, field in CONDITION_KEYS.items()},
+    )
+    patterns = tuple(
+        RunPattern(
+            varies=tuple(pattern["varies"]),
+            **{field: np.asarray(pattern[key], float) for key, field in PATTERN_KEYS.items()},
+        )
+        for pattern in entry["kinds"]
+    )
+    return PoolingCalibration(
+        conditions=conditions,
+        patterns=patterns,
+        single_row_coverage_factor=np.asarray(entry["alone"], float),
+        inconsistency_limits=np.asarray(entry["doubt"], float),
+    )
+
+
+def write_pooling(pooling: PoolingCalibration) -> dict[str, Any]:
+    """The metadata entry "together" of a pooling calibration; the inverse of `read_pooling`."""
+    conditions = pooling.conditions
+    return {
+        "over": conditions.names,
+        **{key: getattr(conditions, field).tolist() for key, field in CONDITION_KEYS.items()},
+        "kinds": [
+            {"varies": pattern.varies}
+            | {key: getattr(pattern, field).tolist() for key, field in PATTERN_KEYS.items()}
+            for pattern in pooling.patterns
+        ],
+        "alone": pooling.single_row_coverage_factor.tolist(),
+        "doubt": pooling.inconsistency_limits.tolist(),
+    }
+
+
+def _check_provenance(metadata: Mapping[str, str]) -> None:
+    """Raise `ValueError` where the gear or the recipe in the metadata is malformed.
+
+    The runtime does not use them; commands compare them with a user's model file.
+    """
+    gear, recipe = json.loads(metadata["gear"]), json.loads(metadata["recipe"])
+    sizes = [float(gear[name]) for name in ("radius", "width") if name in gear]
+    names = [str(effect["name"]) for effect in recipe.get("effect", [])]
+    if not (isinstance(gear, dict) and all(size > 0.0 for size in sizes) and all(names)):
+        raise ValueError("gear or recipe")
 
 
 def _field(number: int, content: bytes) -> bytes:
@@ -68,27 +176,18 @@ def _field(number: int, content: bytes) -> bytes:
     return bytes((number << 3 | 2, *length, size)) + content
 
 
-def _whole(content: bytes, metadata: Mapping[str, str]) -> bool:
-    """Whether the file is the graph and the metadata that were written, and not a byte more."""
-    told = behind(metadata)
-    graph = content.removesuffix(told)
+def _is_intact(content: bytes, metadata: Mapping[str, str]) -> bool:
+    """Whether the file is exactly the graph and the metadata that were written."""
+    tail = serialise_metadata(metadata)
+    graph = content.removesuffix(tail)
     return (
-        len(graph) + len(told) == len(content)
+        len(graph) + len(tail) == len(content)
         and hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256")
-        and checksum(metadata) == metadata.get("metadata_sha256")
+        and metadata_checksum(metadata) == metadata.get("metadata_sha256")
     )
 
 
-def check_origin(metadata: Mapping[str, str]) -> None:
-    """Raise where gear and recipe, which commands look into, are not as they are written."""
-    gear, recipe = json.loads(metadata["gear"]), json.loads(metadata["recipe"])
-    sizes = [float(gear[name]) for name in ("radius", "width") if name in gear]
-    names = [str(effect["name"]) for effect in recipe.get("effect", [])]
-    if not (isinstance(gear, dict) and all(size > 0.0 for size in sizes) and all(names)):
-        raise ValueError("gear or recipe")
-
-
-def _content(file: Path) -> bytes:
+def _read_content(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except FileNotFoundError:
@@ -97,7 +196,7 @@ def _content(file: Path) -> bytes:
         raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
 
 
-def _session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str, str]]:
+def _create_session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str, str]]:
     options = ort.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -109,23 +208,4 @@ def _session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str
         return session, dict(session.get_modelmeta().custom_metadata_map)
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ModelFileError(f"{file} is not a whole ONNX model: {first[:160]}") from None
-
-
-def together_of(said: dict[str, Any]) -> PoolingCalibration:
-    """How rows are joined, as the metadata say it."""
-    driven = RunConditions(tuple(said["over"]), *(np.asarray(said[key], float) for key in DRIVEN))
-    return PoolingCalibration(
-        driven,
-        tuple(
-            RunPattern(tuple(kind["varies"]), *(np.asarray(kind[key], float) for key in KIND))
-            for kind in said["kinds"]
-        ),
-        np.asarray(said["alone"], float),
-        np.asarray(said["doubt"], float),
-    )
-
-
-def numbers(entries: list[dict[str, Any]], key: str) -> Floats:
-    """One number of each entry of the metadata, (entries,)."""
-    return np.asarray([entry[key] for entry in entries], dtype=np.float64)
+        raise ModelFileError(f"{file} is not a valid ONNX model: {first[:160]}") from None

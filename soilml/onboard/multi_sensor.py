@@ -1,4 +1,4 @@
-"""Estimates of the same quantities from different files as one: slip by torque and by vibration."""
+"""Fusion of estimates of the same quantities from different files, for example of slip."""
 
 from __future__ import annotations
 
@@ -10,70 +10,86 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES
-from soilml.onboard.estimate import Estimate, pooled
+from soilml.onboard.estimate import GAUSSIAN_90, Estimate, PriorSummary
+from soilml.onboard.gaussian_pooling import pool
 
 Floats = NDArray[np.float64]
 
-#: The rule for estimates of independent errors under one prior: each brings what it adds to that.
+#: Fusion of estimates with independent errors and a common prior, which is counted once.
 PRIOR_ONCE = "prior-once"
-#: Rules by which estimates of different files can be fused.
+#: Rules by which estimates of different files can be fused; `best-linear` needs the correlation of
+#: their errors, which is known only within one file.
 ACROSS_FILES = (PRIOR_ONCE, *(rule for rule in RULES if rule != BEST_LINEAR))
-#: Estimates that differ by more standard deviations of their difference contradict each other.
-APART = 4.0
-#: Half-width of a Gaussian's 90 % interval, in standard deviations.
-GAUSSIAN_90 = 1.645
-#: Priors that differ by less than this share of their width are one.
+#: Estimates further apart than this are contradictory, in standard deviations of the difference.
+CONTRADICTION = 4.0
+#: Priors that differ by less than this share of their standard deviation count as the same.
 SAME_PRIOR = 0.05
 
 
 @dataclass(frozen=True)
 class MultiSensorEstimate:
-    """Several estimates as one, and which of them took part in each row, (m, ...)."""
+    """A fused estimate (...), and which of the m estimates it used in each row, (m, ...)."""
 
     estimate: Estimate
     used: NDArray[np.bool_]
 
 
-def fused_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> MultiSensorEstimate:
-    r"""Estimates (...) of the same quantities under the same prior, made from different sensors.
+def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> MultiSensorEstimate:
+    r"""Fuse estimates of the same quantities and prior that were made from different sensors.
 
-    An estimate that is out of range takes no part. One that is left alone is passed on as it is;
-    where none is left, or where two differ by more than `APART` standard deviations of their
-    difference, the answer is the prior and `in_range` false. The rule `prior-once`,
+    Estimates out of range are not used. A single remaining one is returned unchanged. Where none
+    remains, or where two differ by more than `CONTRADICTION` standard deviations of their
+    difference, the result is the prior and `in_range` is false.
 
-    .. math:: P^{-1} = P_0^{-1} + \sum_i (P_i^{-1} - P_0^{-1}),
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        All of one shape (...), with the same names and prior.
+    rule : str
+        One of `ACROSS_FILES`. `prior-once`,
 
-    is right where errors of the sensors are independent: every estimate holds the prior, which
-    must count once. `inverse-variance` (Comin and Saaj 2017, eq. 26) and `pairwise` (eq. 30) count
-    it each time: the same where a reading says far more than the prior, too sure where it does
-    not. `covariance-intersection` holds whatever the errors have in common, such as a soil that is
-    known to none of them. Errors that files share are not known here, and the intervals are those
-    of a Gaussian: a single file that joins all sensors knows both, and is measured. Raises
-    `InputError` for estimates that are not of one kind.
+        .. math:: P^{-1} = P_0^{-1} + \sum_i (P_i^{-1} - P_0^{-1}),
+
+        is exact for Gaussian estimates whose errors are independent. `inverse-variance` (Comin and
+        Saaj 2017, eq. 26) and `pairwise` (eq. 30) count the prior in every estimate: they are
+        overconfident unless the readings are far more informative than the prior.
+        `covariance-intersection` is conservative whatever the correlation of the errors, for
+        example through a soil that none of the files knows.
+
+    Returns
+    -------
+    MultiSensorEstimate
+        Its intervals are Gaussian. A single file trained on all sensors accounts for correlated
+        errors and has calibrated intervals.
+
+    Raises
+    ------
+    InputError
+        For an unknown rule, and for estimates of different quantities, shapes or priors.
     """
     if rule not in ACROSS_FILES:
-        raise InputError(f"rule is {rule!r}; for estimates of several files: {_list(ACROSS_FILES)}")
-    _check_alike(estimates)
+        raise InputError(f"rule is {rule!r}; for estimates of several files: {_join(ACROSS_FILES)}")
+    _check_compatible(estimates)
     first = estimates[0]
     q, shape = len(first.names), first.in_range.shape
     used = np.stack([e.in_range.reshape(-1) for e in estimates])
     mean = np.stack([e.mean.reshape(-1, q) for e in estimates])
     covariance = np.stack([e.covariance.reshape(-1, q, q) for e in estimates])
     ends = np.stack([np.stack([e.low, e.high]).reshape(2, -1, q) for e in estimates])
-    used = used & ~_contradicts(mean, covariance, used)
+    used = used & ~_contradictory(mean, covariance, used)
     prior, n = first.prior, used.shape[1]
     out_mean = np.tile(prior.mean, (n, 1))
     out_covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
     out_ends = np.stack([out_mean - GAUSSIAN_90 * prior.std, out_mean + GAUSSIAN_90 * prior.std])
     for pattern in np.unique(used, axis=1).T:
-        rows, those = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
-        if those.size == 1:
-            (only,) = those
+        rows, members = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
+        if members.size == 1:
+            (only,) = members
             out_mean[rows], out_covariance[rows] = mean[only, rows], covariance[only, rows]
             out_ends[:, rows] = ends[only][:, rows]
-        elif those.size > 1:
-            parts = mean[those][:, rows], covariance[those][:, rows]
-            out_mean[rows], out_covariance[rows] = _fused(*parts, first, rule)
+        elif members.size > 1:
+            parts = mean[members][:, rows], covariance[members][:, rows]
+            out_mean[rows], out_covariance[rows] = _fuse(*parts, prior, rule)
             half = GAUSSIAN_90 * np.sqrt(np.diagonal(out_covariance[rows], axis1=1, axis2=2))
             out_ends[:, rows] = out_mean[rows] - half, out_mean[rows] + half
     low, high = np.clip(out_ends, prior.lower, prior.upper).reshape(2, *shape, q)
@@ -93,37 +109,39 @@ def fused_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mu
     )
 
 
-def _fused(mean: Floats, covariance: Floats, like: Estimate, rule: str) -> tuple[Floats, Floats]:
+def _fuse(
+    mean: Floats, covariance: Floats, prior: PriorSummary, rule: str
+) -> tuple[Floats, Floats]:
     """Mean (n, q) and covariance (n, q, q) of estimates (m, n, q) and (m, n, q, q)."""
     if rule == PRIOR_ONCE:
-        share = np.ones((mean.shape[1], mean.shape[0]))
-        joint = pooled(np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1), like.prior, share)
-        return joint.mean, joint.covariance
+        weights = np.ones((mean.shape[1], mean.shape[0]))
+        pooled = pool(np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1), prior, weights)
+        return pooled.mean, pooled.covariance
     std = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
     fused = RULES[rule](mean, std)
     correlation = np.mean(covariance / (std[..., None] * std[..., None, :]), axis=0)
     return fused.mean, correlation * fused.std[:, :, None] * fused.std[:, None, :]
 
 
-def _contradicts(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Rows (n,) in which two estimates that are in range cannot both be right."""
+def _contradictory(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows (n,) in which two estimates that are in range contradict each other."""
     variance = np.diagonal(covariance, axis1=2, axis2=3)
-    found = np.zeros(used.shape[1], dtype=bool)
+    contradictory = np.zeros(used.shape[1], dtype=bool)
     for i in range(len(mean)):
         for j in range(i):
-            off = (mean[i] - mean[j]) ** 2 > APART**2 * (variance[i] + variance[j])
-            found |= used[i] & used[j] & off.any(axis=-1)
-    return found
+            apart = (mean[i] - mean[j]) ** 2 > CONTRADICTION**2 * (variance[i] + variance[j])
+            contradictory |= used[i] & used[j] & apart.any(axis=-1)
+    return contradictory
 
 
-def _check_alike(estimates: Sequence[Estimate]) -> None:
+def _check_compatible(estimates: Sequence[Estimate]) -> None:
     if not estimates:
         raise InputError("no estimate given; needed is one or more")
     first = estimates[0]
     for other in estimates[1:]:
         if other.names != first.names:
             raise InputError(
-                f"one file estimates {_list(first.names)}, another {_list(other.names)}: only "
+                f"one file estimates {_join(first.names)}, another {_join(other.names)}: only "
                 "estimates of the same quantities, in the same order, can be fused"
             )
         if other.in_range.shape != first.in_range.shape:
@@ -135,16 +153,16 @@ def _check_alike(estimates: Sequence[Estimate]) -> None:
             own, its = getattr(first.prior, key), getattr(other.prior, key)
             if (np.abs(own - its) > SAME_PRIOR * first.prior.std).any():
                 raise InputError(
-                    f"the files have other priors of {_list(first.names)}: one from "
-                    f"{_numbers(first.prior.lower)} to {_numbers(first.prior.upper)}, another from "
-                    f"{_numbers(other.prior.lower)} to {_numbers(other.prior.upper)}; train both "
+                    f"the files have different priors of {_join(first.names)}: "
+                    f"{_format_range(first.prior)} and {_format_range(other.prior)}; train both "
                     "from one recipe"
                 )
 
 
-def _numbers(values: Floats) -> str:
-    return ", ".join(f"{v:g}" for v in values)
+def _format_range(prior: PriorSummary) -> str:
+    lower, upper = (", ".join(f"{v:g}" for v in end) for end in (prior.lower, prior.upper))
+    return f"from {lower} to {upper}"
 
 
-def _list(words: Sequence[str]) -> str:
+def _join(words: Sequence[str]) -> str:
     return ", ".join(words)

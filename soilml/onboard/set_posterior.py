@@ -15,7 +15,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.features import READABLE, readings
+from soilml.onboard.features import READABLE, flatten_readings
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
@@ -175,7 +175,7 @@ class SetPosterior:
             if name not in known:
                 raise InputError(f"{name!r} is not read by this model; it reads {', '.join(known)}")
         required = {name: measured[name] for name in measured if name in REQUIRED_READINGS}
-        flat, shape = readings(REQUIRED_READINGS, required)
+        flat, shape = flatten_readings(REQUIRED_READINGS, required)
         rows = dict(zip(REQUIRED_READINGS, flat, strict=True))
         for name in OPTIONAL_READINGS:
             value = _broadcast(name, measured.get(name, np.nan), shape)

@@ -5,7 +5,7 @@ import pytest
 from conftest import MODEL, RECIPE
 
 from soilml.cli import main
-from soilml.onboard.model_file import checksum
+from soilml.onboard.model_file import metadata_checksum
 
 SPEC = '[[regressor]]\ntype = "linear"\n'
 EFFECT = '[[effect]]\nname = "slip-sinkage"\nn1 = 0.1\n'
@@ -20,10 +20,10 @@ MODELS = {
 }
 SPECS = {
     "seed": ("seed = -1\n" + SPEC, "seed is -1"),
-    "text as target": ('targets = ["run"]\n' + SPEC, "'run' is no soil parameter"),
-    "status as target": ('targets = ["status"]\n' + SPEC, "'status' is no soil parameter"),
-    "reading as target": ('targets = ["torque"]\n' + SPEC, "'torque' is no soil parameter"),
-    "target twice": ('targets = ["cohesion", "cohesion"]\n' + SPEC, "a name stands twice"),
+    "text as target": ('targets = ["run"]\n' + SPEC, "'run' cannot be estimated"),
+    "status as target": ('targets = ["status"]\n' + SPEC, "'status' cannot be estimated"),
+    "reading as target": ('targets = ["torque"]\n' + SPEC, "'torque' cannot be estimated"),
+    "target twice": ('targets = ["cohesion", "cohesion"]\n' + SPEC, "a name is repeated"),
     "half a ratio": ('features = ["torque/"]\n' + SPEC, "feature 'torque/'"),
     "truth as a width": ('[[regressor]]\ntype = "mlp"\nhidden = [true]\n', "hidden is [True]"),
     "nothing as a width": ('[[regressor]]\ntype = "lssvm"\nwidth = 1e-300\n', "width is 1e-300"),
@@ -81,7 +81,7 @@ def test_specs(tmp_path, capsys, small_data, what):
 def test_model_files_signed_again(tmp_path, capsys, small_model, key, value):
     model = onnx.load(small_model)
     metadata = {e.key: e.value for e in model.metadata_props} | {key: value}
-    metadata["metadata_sha256"] = checksum(metadata)
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
     for entry in model.metadata_props:
         entry.value = metadata[entry.key]
     (tmp_path / "m.onnx").write_bytes(model.SerializeToString(deterministic=True))

@@ -44,7 +44,7 @@ def leg_scores(tmp_path_factory):
         spec = read_spec(folder / "s.toml")
         rows = read_dataset(folder / f"{data}.parquet", spec.features, spec.targets)
         trained = train(spec, rows)
-        members = [trained.scores[m.regressor.kind].relative for m in trained.members]
+        members = [trained.scores[m.regressor.name].relative for m in trained.members]
         return np.asarray([*members, trained.scores["estimator"].relative]).T
 
     return of

@@ -10,10 +10,10 @@ from datagen.recipe import read_recipe
 from soilml import Estimator, read_table
 from soilml.cli import main
 from soilml.errors import InputError, TableError
-from soilml.onboard.features import computed
-from soilml.onboard.multi_sensor import fused_estimates
+from soilml.onboard.features import compute_features
+from soilml.onboard.multi_sensor import fuse_estimates
 from training.data.dataset import read_dataset
-from training.export.model_file import export
+from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train
 
@@ -66,7 +66,7 @@ def trained(folder):
                 spec, read_dataset(folder / f"{data}.parquet", spec.features, ("slip",))
             )
             path = folder / f"{len(made)}.onnx"
-            export(original, path, folder / f"{data}.parquet")
+            export_model(original, path, folder / f"{data}.parquet")
             made[text, data] = original, path
         return made[text, data]
 
@@ -97,7 +97,7 @@ def test_each_regressor_reads_its_own_features_and_two_say_more_than_one(trained
     both, path = trained(BOTH + OF_TORQUE + OF_PULL)
     assert [m.regressor.columns for m in both.members] == [(0, 1), (2, 1)]
     assert share(both) < share(one) < share(other)
-    alone = [both.scores[m.regressor.kind].relative[0] for m in both.members]
+    alone = [both.scores[m.regressor.name].relative[0] for m in both.members]
     np.testing.assert_allclose(alone, [share(one), share(other)], atol=0.1)
     card = json.loads(Estimator.load(path).metadata["metrics"])
     assert "fixed-size-lssvm of torque/load, load" in card
@@ -113,7 +113,7 @@ def test_the_fused_file_answers_as_the_original(trained, rule):
         for entry in json.loads(estimator.metadata["inputs"])
     }
     found = estimator(**readings)
-    mean, std, inside = original.predict(computed(original.spec.features, readings))
+    mean, std, inside = original.predict(compute_features(original.spec.features, readings))
     same = found.in_range == inside
     assert same.mean() > 0.999 and 0.1 < inside.mean() < 1.0
     off = np.maximum(np.abs(found.mean - mean), np.abs(found.std - std)) / original.prior.std
@@ -141,7 +141,7 @@ def test_a_channel_that_was_not_measured_is_named(trained):
         estimator(torque=3.2, load=60.0, drawbar_pull=np.nan)
     with pytest.raises(InputError, match="drawbar_pull is missing"):
         estimator(torque=3.2, load=60.0)
-    nothing = estimator.unknown(4)
+    nothing = estimator.prior_estimate(4)
     assert nothing.mean.shape == (4, 1) and not nothing.in_range.any()
     np.testing.assert_array_equal(nothing.std[2], estimator.prior.std)
 
@@ -154,7 +154,7 @@ def test_two_files_on_board_say_what_one_file_of_both_says(trained, folder):
     table = read_table(folder / "other.parquet")
     torque, load, drawbar_pull = (table[k] for k in ("torque_Nm", "load_N", "drawbar_pull_N"))
     parts = one(torque=torque, load=load), other(drawbar_pull=drawbar_pull, load=load)
-    found = fused_estimates(parts).estimate
+    found = fuse_estimates(parts).estimate
     error = [np.sqrt(np.mean((e.mean[:, 0] - table["slip"]) ** 2)) for e in (found, *parts)]
     assert error[0] < min(error[1:])
     assert error[0] / one.prior.std[0] == pytest.approx(share(both), abs=0.06)
@@ -210,8 +210,8 @@ def test_soil_can_be_learned_without_slip_and_is_joined_over_the_load_alone(fold
     command = ["train", str(tmp_path / "s.toml"), str(tmp_path / "d.parquet")]
     assert main([*command, str(tmp_path / "m.onnx")]) == 0
     estimator = Estimator.load(tmp_path / "m.onnx")
-    assert estimator.together.driven.names == ("load",)
-    assert [kind.varies for kind in estimator.together.kinds] == [(False,), (True,)]
+    assert estimator.pooling.conditions.names == ("load",)
+    assert [pattern.varies for pattern in estimator.pooling.patterns] == [(False,), (True,)]
     loads = np.linspace(40.0, 110.0, 8)
     one, many = estimator(torque=3.0, load=60.0), estimator.run(torque=0.05 * loads, load=loads)
     assert bool(many.in_range) and many.std[0] < one.std[0]
@@ -220,12 +220,12 @@ def test_soil_can_be_learned_without_slip_and_is_joined_over_the_load_alone(fold
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('targets = ["slips"]\n' + MACHINE, "'slips' is no soil parameter, nor slip"),
-        ('targets = ["slip"]\n' + MACHINE, "'slip' is read by the features"),
+        ('targets = ["slips"]\n' + MACHINE, "'slips' cannot be estimated"),
+        ('targets = ["slip"]\n' + MACHINE, "'slip' is also read by the features"),
         (TORQUE + OF_PULL, "'drawbar_pull' is none of the spec's: torque/load, load"),
         (BOTH + OF_TORQUE, "no regressor reads 'drawbar_pull'"),
         (TORQUE + MACHINE + "features = []\n", "needed is a list of names"),
-        (TORQUE + MACHINE + 'features = ["load", "load"]\n', "a name stands twice"),
+        (TORQUE + MACHINE + 'features = ["load", "load"]\n', "a name is repeated"),
     ],
 )
 def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
@@ -237,8 +237,8 @@ def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
 
 def test_regressors_of_one_kind_keep_their_own_figures(tmp_path):
     (tmp_path / "s.toml").write_text(TORQUE + 2 * MACHINE)
-    kinds = [reader.kind for reader in read_spec(tmp_path / "s.toml").regressors]
-    assert kinds == ["fixed-size-lssvm", "fixed-size-lssvm #2"]
+    names = [regressor.name for regressor in read_spec(tmp_path / "s.toml").regressors]
+    assert names == ["fixed-size-lssvm", "fixed-size-lssvm #2"]
 
 
 def test_data_that_lack_a_channel_or_measure_slip_badly_are_refused(folder, tmp_path):
@@ -247,5 +247,5 @@ def test_data_that_lack_a_channel_or_measure_slip_badly_are_refused(folder, tmp_
     text = RECIPE.format(rows=300, seed=1, soil=KNOWN)
     (tmp_path / "r.toml").write_text(text + "slip = 0.02\n")
     generate(read_recipe(tmp_path / "r.toml"), tmp_path / "d.parquet")
-    with pytest.raises(InputError, match=r"slip is to be learned, but its column has noise"):
+    with pytest.raises(InputError, match=r"slip is a target, but its column has noise"):
         read_dataset(tmp_path / "d.parquet", ("torque", "load"), ("slip",))

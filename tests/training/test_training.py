@@ -8,14 +8,10 @@ import pytest
 
 from soilml.errors import InputError, TableError
 from soilml.onboard.estimate import PriorSummary
-from training.calibration.recalibration import (
-    covariances,
-    pooling_calibration,
-    recalibrate,
-    run_conditions_of,
-)
-from training.calibration.scores import scored
-from training.data.dataset import read_dataset, split
+from training.calibration.metrics import compute_metrics
+from training.calibration.recalibration import covariance_matrices, recalibrate
+from training.calibration.row_pooling import calibrate_pooling, run_conditions
+from training.data.dataset import read_dataset, split_by_run
 from training.ensemble import fuse_members
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
@@ -31,19 +27,19 @@ def data(small_data):
 
 
 def test_no_soil_stands_in_two_parts_and_nothing_is_lost(data):
-    parts = split(data, seed=3)
-    runs = [set(p.run) for p in (parts.train, parts.choose, parts.calibrate)]
+    parts = split_by_run(data, seed=3)
+    runs = [set(p.run) for p in (parts.train, parts.validation, parts.calibration)]
     assert not (runs[0] & runs[1] or runs[0] & runs[2] or runs[1] & runs[2])
-    assert sum(map(len, (parts.train, parts.choose, parts.calibrate))) == len(data)
+    assert sum(map(len, (parts.train, parts.validation, parts.calibration))) == len(data)
     assert parts.train.run_length.max() == 1  # runs of many rows serve calibration
-    assert (parts.calibrate.run_length > 1).any()
-    assert len(parts.calibrate.thinned(2)) < len(parts.calibrate)
+    assert (parts.calibration.run_length > 1).any()
+    assert len(parts.calibration.limit_rows_per_run(2)) < len(parts.calibration)
 
 
 def test_figures_of_a_known_case():
     rng = np.random.default_rng(0)
     mean, std = rng.normal(size=(20000, 1)), np.full((20000, 1), 0.5)
-    s = scored(mean + 0.5 * rng.normal(size=mean.shape), mean, std, np.asarray([2.0]))
+    s = compute_metrics(mean + 0.5 * rng.normal(size=mean.shape), mean, std, np.asarray([2.0]))
     assert s.rmse[0] == pytest.approx(0.5, rel=0.02)
     assert s.relative[0] == pytest.approx(0.25, rel=0.02)
     assert s.cover50[0] == pytest.approx(0.5, abs=0.012)
@@ -52,16 +48,16 @@ def test_figures_of_a_known_case():
 
 
 def test_recalibration_makes_errors_as_large_as_claimed(data):
-    parts = split(data, seed=0)
+    parts = split_by_run(data, seed=0)
     machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    shrunken = recalibrate(_Overconfident(machine), parts.choose)
-    s = scored(
-        parts.calibrate.thinned().targets,
-        *shrunken.predict(parts.calibrate.thinned().features),
+    shrunken = recalibrate(_Overconfident(machine), parts.validation)
+    s = compute_metrics(
+        parts.calibration.limit_rows_per_run().targets,
+        *shrunken.predict(parts.calibration.limit_rows_per_run().features),
         np.ones(3),
     )
     assert (np.abs(s.cover90 - 0.9) < 0.04).all()
-    np.testing.assert_allclose(shrunken.widen, 5.0, rtol=0.15)
+    np.testing.assert_allclose(shrunken.std_scale, 5.0, rtol=0.15)
 
 
 class _Overconfident:
@@ -74,41 +70,43 @@ class _Overconfident:
 
 
 def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
-    parts = split(data, seed=0)
+    parts = split_by_run(data, seed=0)
     machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    member = recalibrate(machine, parts.choose)
-    single = member.predict(parts.calibrate.features)[1]
-    twice = fuse_members([member, member], "best-linear", parts.choose)
-    np.testing.assert_allclose(twice.predict(parts.calibrate.features)[1], single, rtol=0.02)
-    naive = fuse_members([member, member], "inverse-variance", parts.choose)
+    member = recalibrate(machine, parts.validation)
+    single = member.predict(parts.calibration.features)[1]
+    twice = fuse_members([member, member], "best-linear", parts.validation)
+    np.testing.assert_allclose(twice.predict(parts.calibration.features)[1], single, rtol=0.02)
+    naive = fuse_members([member, member], "inverse-variance", parts.validation)
     np.testing.assert_allclose(
-        naive.predict(parts.calibrate.features)[1], single / np.sqrt(2), rtol=1e-9
+        naive.predict(parts.calibration.features)[1], single / np.sqrt(2), rtol=1e-9
     )
 
 
 def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
-    parts = split(data, seed=0)
+    parts = split_by_run(data, seed=0)
     member = recalibrate(
-        LinearGaussian().fit(parts.train.features, parts.train.targets), parts.choose
+        LinearGaussian().fit(parts.train.features, parts.train.targets), parts.validation
     )
     prior = PriorSummary(
         data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
     )
-    mean, std = member.predict(parts.calibrate.features)
-    covariance = covariances(std, member.correlation)
-    driven = run_conditions_of(parts.train)
-    assert driven.names == ("slip", "load")
-    joint = pooling_calibration(mean, covariance, parts.calibrate, prior, driven)
-    steady, one_slip, one_load, free = joint.kinds
+    mean, std = member.predict(parts.calibration.features)
+    covariance = covariance_matrices(std, member.correlation)
+    conditions = run_conditions(parts.train)
+    assert conditions.names == ("slip", "load")
+    calibration = calibrate_pooling(mean, covariance, parts.calibration, prior, conditions)
+    steady, one_slip, one_load, free = calibration.patterns
     np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
-    assert (free.worth[1:] <= free.worth[0]).all()
-    for kind in (steady, one_slip, one_load):  # none in the data: rows narrow nothing
-        assert kind.rows.tolist() == [1.0]
-        assert np.exp(kind.at(32)[0]) == pytest.approx(1 / 32)
-    alone = parts.calibrate.rows(parts.calibrate.run_length == 1)
+    assert (free.information[1:] <= free.information[0]).all()
+    for pattern in (steady, one_slip, one_load):  # none in the data: rows narrow nothing
+        assert pattern.rows.tolist() == [1.0]
+        assert np.exp(pattern.interpolate(32)[0]) == pytest.approx(1 / 32)
+    alone = parts.calibration.rows(parts.calibration.run_length == 1)
     mean, std = member.predict(alone.features)
-    unknown = pooling_calibration(mean, covariances(std, member.correlation), alone, prior, driven)
-    assert all(np.exp(k.at(32)[0]) == pytest.approx(1 / 32) for k in unknown.kinds)
+    unknown = calibrate_pooling(
+        mean, covariance_matrices(std, member.correlation), alone, prior, conditions
+    )
+    assert all(np.exp(p.interpolate(32)[0]) == pytest.approx(1 / 32) for p in unknown.patterns)
 
 
 def test_rows_of_a_run_are_taken_from_anywhere_in_it(data):
@@ -127,7 +125,7 @@ def test_too_few_rows_for_intervals_are_refused_before_anything_is_fitted(data):
         train(spec, alone)
     enough = int(re.search(r"about (\d+) rows", str(caught.value))[1])
     more = data.rows(np.flatnonzero(data.run_length == 1)[:enough])
-    assert train(read_spec("linear"), more).together.alone.shape == (3,)
+    assert train(read_spec("linear"), more).pooling.single_row_coverage_factor.shape == (3,)
 
 
 def test_train_writes_model_card_and_picture(small_model):
@@ -167,12 +165,12 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
         ("", "regressor]] is missing"),
         ('[[regressor]]\ntype = "forest"\n', "lssvm, fixed-size-lssvm, mlp, linear"),
         ('[[regressor]]\ntype = "mlp"\nlayers = [3]\n', "unknown key 'layers'"),
-        ('[[regressor]]\ntype = "mlp"\nhidden = [0]\n', "whole numbers above zero"),
+        ('[[regressor]]\ntype = "mlp"\nhidden = [0]\n', "whole numbers from 1 to 4096"),
         ('[[regressor]]\ntype = "mlp"\nepochs = 0\n', "1 or more"),
         ('[[regressor]]\ntype = "lssvm"\ngamma = -1.0\n', "above zero"),
         ('rule = "average"\n[[regressor]]\ntype = "mlp"\n', "rule is 'average'"),
         ('features = ["slip", "colour"]\n[[regressor]]\ntype = "mlp"\n', "'colour' is none of"),
-        ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' is no soil parameter"),
+        ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' cannot be estimated"),
     ],
 )
 def test_mistakes_in_a_spec_are_named(tmp_path, text, said):

@@ -20,7 +20,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from training.benchmark.designs import select_channels
 from training.benchmark.method_kind import MethodKind, classify_estimator
-from training.calibration.scores import HALF, NINETY
+from training.calibration.metrics import HALF, NINETY
 
 Floats = NDArray[np.float64]
 
@@ -168,7 +168,7 @@ def model_file_methods(label: str, estimator: Estimator) -> list[Method]:
         return [Method(label, kind, inputs, channels, by(estimator.run, True))]
     pooled = f"{label}{POOLED_SUFFIX}"
     return [
-        Method(pooled, MethodKind.POOLED, inputs, channels, by(estimator.joined, True)),
+        Method(pooled, MethodKind.POOLED, inputs, channels, by(estimator.pooled, True)),
         Method(label, kind, inputs, channels, by(estimator.run, False)),
     ]
 

@@ -1,1 +1,1 @@
-"""Recalibration on unseen rows, the training domain, and scores."""
+"""Recalibration and pooling calibration on held-out rows, the training domain, and metrics."""

@@ -1,4 +1,4 @@
-"""Where the training rows lie: the base of every in-range flag."""
+"""The training domain: where the training rows lie, and what the in-range flag tests."""
 
 from __future__ import annotations
 
@@ -9,85 +9,96 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.calibration.conditional_bounds import ConditionalBounds
-from training.calibration.recalibration import DRIVEN
+from training.calibration.row_pooling import OPERATING_CONDITIONS
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
 
-COVERS = 128
-POOL = 6000
-#: Slack of the box, as a share of its width: the rows do not reach its very ends.
-SLACK = 0.005
+#: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
+CENTRES = 128
+CANDIDATES = 6000
+#: Rows whose distances to the centres are computed at a time.
+CHUNK = 4096
+#: Margin of box and balls, as a share of their size: rows do not reach the very ends of the range.
+MARGIN = 0.005
 
 
 @dataclass(frozen=True)
 class TrainingDomain:
-    """A box around the rows' features, bounds within it, and balls that hold all of the rows.
+    """A box around the training rows' features, conditional bounds, and balls that cover all rows.
 
-    The bounds of what is measured follow slip and load; the box alone would call a torque that no
-    soil gives at this slip in range. The balls do the same, coarsely, between measured features.
+    The bounds of measured features depend on slip and load: the box alone would accept a torque
+    that no soil gives at this slip. The balls do the same, coarsely, between measured features.
     """
 
     lower: Floats  # (d,)
     upper: Floats
     scaling: Standardisation
-    covers: Floats  # (k, d) standardised
+    centres: Floats  # (k, d) standardised
     radius: float
-    envelopes: tuple[ConditionalBounds, ...]
+    bounds: tuple[ConditionalBounds, ...]
 
     @staticmethod
     def of(features: Floats, names: Sequence[str], seed: int = 0) -> TrainingDomain:
-        """Balls by farthest-point selection; the radius is the least that holds every row."""
-        driven = tuple(
-            i for i, n in enumerate(names) if n in DRIVEN and np.ptp(features[:, i]) > 0.0
+        """The domain of features (n, d) with these names.
+
+        Ball centres are selected as farthest points; the radius is the least that covers all rows.
+        """
+        conditions = tuple(
+            i
+            for i, name in enumerate(names)
+            if name in OPERATING_CONDITIONS and np.ptp(features[:, i]) > 0.0
         )
-        measured = set(range(len(names))) - set(driven) if driven else ()
+        measured = set(range(len(names))) - set(conditions) if conditions else ()
         scaling = Standardisation.of(features)
         z = scaling.apply(features)
-        pool = z[np.random.default_rng(seed).permutation(len(z))[:POOL]]
-        chosen = [0]
-        nearest = np.full(len(pool), np.inf)
-        for _ in range(min(COVERS, len(pool)) - 1):
-            nearest = np.minimum(nearest, ((pool - pool[chosen[-1]]) ** 2).sum(axis=1))
-            chosen.append(int(np.argmax(nearest)))
-        covers = pool[chosen]
+        candidates = z[np.random.default_rng(seed).permutation(len(z))[:CANDIDATES]]
+        selected = [0]
+        nearest = np.full(len(candidates), np.inf)
+        for _ in range(min(CENTRES, len(candidates)) - 1):
+            last = candidates[selected[-1]]
+            nearest = np.minimum(nearest, ((candidates - last) ** 2).sum(axis=1))
+            selected.append(int(np.argmax(nearest)))
+        centres = candidates[selected]
         radius = max(
-            float(np.sqrt(_least(z[i : i + 4096], covers).max())) for i in range(0, len(z), 4096)
+            float(np.sqrt(_nearest_squared(z[i : i + CHUNK], centres).max()))
+            for i in range(0, len(z), CHUNK)
         )
         return TrainingDomain(
-            lower=features.min(axis=0) - SLACK * np.ptp(features, axis=0),
-            upper=features.max(axis=0) + SLACK * np.ptp(features, axis=0),
+            lower=features.min(axis=0) - MARGIN * np.ptp(features, axis=0),
+            upper=features.max(axis=0) + MARGIN * np.ptp(features, axis=0),
             scaling=scaling,
-            covers=covers,
-            radius=radius * (1.0 + SLACK),
-            envelopes=tuple(ConditionalBounds.of(features, k, driven) for k in sorted(measured)),
+            centres=centres,
+            radius=radius * (1.0 + MARGIN),
+            bounds=tuple(ConditionalBounds.of(features, k, conditions) for k in sorted(measured)),
         )
 
-    def holds(self, features: Floats) -> NDArray[np.bool_]:
-        """Whether rows (n, d) lie where the training rows lie, (n,)."""
-        boxed = ((features >= self.lower) & (features <= self.upper)).all(axis=1)
-        near = _least(self.scaling.apply(features), self.covers) <= self.radius**2
-        bound = [envelope.holds(features) for envelope in self.envelopes]
-        return np.asarray(np.logical_and.reduce([boxed, near, *bound]))
+    def contains(self, features: Floats) -> NDArray[np.bool_]:
+        """Whether rows (n, d) lie in the training domain, (n,)."""
+        in_box = ((features >= self.lower) & (features <= self.upper)).all(axis=1)
+        covered = _nearest_squared(self.scaling.apply(features), self.centres) <= self.radius**2
+        within = [bounds.contains(features) for bounds in self.bounds]
+        return np.asarray(np.logical_and.reduce([in_box, covered, *within]))
 
-    def draw(self, graph: Graph, features: str) -> str:
-        """The flag (n,) as a node of an ONNX graph."""
+    def add_to_graph(self, graph: Graph, features: str) -> str:
+        """Add the same test to an ONNX graph; name of the flag (n,)."""
         outside = graph.op(
             "Or",
             graph.op("Less", features, graph.constant(self.lower)),
             graph.op("Greater", features, graph.constant(self.upper)),
         )
-        beyond = graph.reduced("ReduceMax", graph.double(outside), 1)
+        any_outside = graph.reduced("ReduceMax", graph.double(outside), 1)
         x = graph.scaled(features, self.scaling.mean, self.scaling.scale)
-        apart = graph.reduced("ReduceMin", graph.squared_distances(x, self.covers), 1)
-        far = graph.op("Greater", apart, graph.constant(self.radius**2))
-        out = graph.op("Or", graph.op("Greater", beyond, graph.constant(0.5)), far)
-        for envelope in self.envelopes:
-            out = graph.op("Or", out, envelope.draw(graph, features))
+        nearest = graph.reduced("ReduceMin", graph.squared_distances(x, self.centres), 1)
+        far = graph.op("Greater", nearest, graph.constant(self.radius**2))
+        out = graph.op("Or", graph.op("Greater", any_outside, graph.constant(0.5)), far)
+        for bounds in self.bounds:
+            out = graph.op("Or", out, bounds.add_outside(graph, features))
         return graph.op("Not", out)
 
 
-def _least(z: Floats, covers: Floats) -> Floats:
-    apart = (z**2).sum(axis=1)[:, None] + (covers**2).sum(axis=1) - 2.0 * (z @ covers.T)
-    return np.asarray(np.maximum(apart.min(axis=1), 0.0))
+def _nearest_squared(z: Floats, centres: Floats) -> Floats:
+    """Squared distance (n,) from rows (n, d) to the nearest centre."""
+    squared = (z**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1) - 2.0 * (z @ centres.T)
+    return np.asarray(np.maximum(squared.min(axis=1), 0.0))

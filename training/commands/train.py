@@ -70,9 +70,9 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
-    from training.export.any_wheel_file import is_for_any_wheel
+    from training.spec import is_any_wheel_spec
 
-    if is_for_any_wheel(args.spec):
+    if is_any_wheel_spec(args.spec):
         return _any_wheel(args)
     if args.data is None:
         raise InputError(
@@ -82,20 +82,21 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _any_wheel(args: argparse.Namespace) -> int:
-    """Train the estimator for wheels of any size."""
+    """Train the file for wheels of any size."""
     from soilml.cli.progress import stage_progress
-    from training.export.any_wheel_file import card, export, read_any_spec, trained
+    from training.export.any_wheel_card import any_wheel_card
+    from training.export.any_wheel_file import export_any_wheel
+    from training.spec import read_any_wheel_spec
+    from training.train import train_any_wheel
 
     if args.data is not None:
-        raise InputError(
-            f"{args.data} given, but {args.spec} simulates its own rows; leave the data out"
-        )
-    spec, out = read_any_spec(args.spec), Path(args.out)
+        raise InputError(f"{args.data}: {args.spec} simulates its own rows; leave the data out")
+    spec, out = read_any_wheel_spec(args.spec), Path(args.out)
     with stage_progress() as progress:
-        posterior, figures = trained(spec, progress)
+        posterior, figures = train_any_wheel(spec, progress)
         with atomic_outputs(outputs(args)[:2]) as (model, page):
-            metadata = export(spec, posterior, figures, model)
-            page.write_text(card(metadata, posterior, figures), encoding="utf-8")
+            metadata = export_any_wheel(spec, posterior, figures, model)
+            page.write_text(any_wheel_card(metadata, posterior, figures), encoding="utf-8")
     size = out.stat().st_size / 1e3
     print(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
     return 0
@@ -106,9 +107,9 @@ def _from_data(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
     from soilml.io.text_tables import format_table
     from training.data.dataset import read_dataset
-    from training.export.learning_curves import draw_curves
-    from training.export.model_card import card
-    from training.export.model_file import export
+    from training.export.learning_curves import plot_learning_curves
+    from training.export.model_card import model_card
+    from training.export.model_file import export_model
     from training.spec import read_spec
     from training.train import train
 
@@ -119,10 +120,10 @@ def _from_data(args: argparse.Namespace) -> int:
         trained = train(spec, data, progress)
         progress("exporting", 0, 2)
         with atomic_outputs(outputs(args)) as (model, page, picture):
-            metadata = export(trained, model, args.data)
+            metadata = export_model(trained, model, args.data)
             progress("exporting", 1, 2)
-            draw_curves(trained, picture)
-            page.write_text(card(trained, metadata, out.stem), encoding="utf-8")
+            plot_learning_curves(trained, picture)
+            page.write_text(model_card(trained, metadata, out.stem), encoding="utf-8")
         progress("exporting", 2, 2)
     rows = [
         (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])

@@ -1,1 +1,1 @@
-"""Rows to learn from, and what may be learned from them."""
+"""Training data, their split by run, and the quantities that can be targets."""

@@ -1,4 +1,4 @@
-"""Rows to learn from: features, true parameters, and which rows share a soil."""
+"""Training data: features, true values of the targets, and which rows share a soil."""
 
 from __future__ import annotations
 
@@ -12,19 +12,35 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table
-from soilml.onboard.features import computed, inputs_of
+from soilml.onboard.features import compute_features, inputs_of
 from soilml.quantities import QUANTITIES, column
 from training.data.targets import check_measured, prior_of
 
 Floats = NDArray[np.float64]
 
-#: With fewer rows no interval that is measured on a fifth of them can be believed.
+#: With fewer rows, a fifth of them is too few to calibrate intervals on.
 LEAST_ROWS = 200
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Measured quantities by name (n,), features (n, d), targets (n, q), run numbers (n,)."""
+    """Rows with measured quantities, features, and true values of the targets.
+
+    Attributes
+    ----------
+    measured : dict of str to ndarray, shape (n,)
+        Readings in SI units, by name.
+    features, targets : ndarray, shapes (n, d) and (n, q)
+        Inputs of the regressors, and true values.
+    run : ndarray of int, shape (n,)
+        Run number; rows of a run have one soil.
+    lower, upper : ndarray, shape (q,)
+        Range of the prior of the targets.
+    recipe : str
+        Recipe of the data as JSON.
+    dropped : int
+        Rows of the file without equilibrium or without a reading.
+    """
 
     measured: dict[str, Floats]
     features: Floats
@@ -32,7 +48,7 @@ class Dataset:
     run: NDArray[np.int64]
     feature_names: tuple[str, ...]
     target_names: tuple[str, ...]
-    lower: Floats  # (q,) ends of the prior
+    lower: Floats
     upper: Floats
     recipe: str
     dropped: int
@@ -41,7 +57,7 @@ class Dataset:
         return len(self.targets)
 
     def rows(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Dataset:
-        """The rows of an index or a mask."""
+        """The rows of an index array or a mask."""
         return replace(
             self,
             measured={name: values[index] for name, values in self.measured.items()},
@@ -50,14 +66,15 @@ class Dataset:
             run=self.run[index],
         )
 
-    def thinned(self, most: int = 2) -> Dataset:
-        """At most so many rows of each run: rows of one soil err alike and would count double."""
+    def limit_rows_per_run(self, most: int = 2) -> Dataset:
+        """At most `most` rows of each run: the errors of rows of one soil are correlated."""
         return self.rows(np.sort(np.concatenate([run[:most] for run in self.runs()])))
 
     def runs(self) -> list[NDArray[np.int64]]:
-        """Row numbers of each run, shuffled.
+        """Row indices of each run, shuffled.
 
-        Rows of a recipe are drawn to fill the range: the first rows of all runs are driven alike.
+        Rows are generated from a low-discrepancy sequence: without the shuffle, the first rows of
+        all runs would have similar operating conditions.
         """
         order = np.random.default_rng(0).permutation(len(self))
         order = order[np.argsort(self.run[order], kind="stable")]
@@ -78,9 +95,14 @@ class Dataset:
 def read_dataset(
     path: str | os.PathLike[str], features: Sequence[str], targets: Sequence[str]
 ) -> Dataset:
-    """A file that `soilml generate` wrote; rows without equilibrium or a reading are dropped.
+    """Read a file that `soilml generate` wrote; rows without equilibrium or a reading are dropped.
 
-    Raises `InputError` where a target is missing, or too few rows are left to learn from.
+    Raises
+    ------
+    TableError
+        For a missing column, and for fewer than 200 usable rows.
+    InputError
+        For a target that does not vary, or that has noise.
     """
     inputs = inputs_of(features)
     needed = ["run", *(column(name) for name in (*inputs, *targets))]
@@ -88,29 +110,29 @@ def read_dataset(
     for name in needed:
         if name not in table:
             raise TableError(
-                f"{path}: column {name} is missing; the spec's features and targets must be in the "
-                f"data, which hold: {', '.join(table.columns)}"
+                f"{path}: column {name} is missing, which the spec needs; the data have: "
+                f"{', '.join(table.columns)}"
             )
-    good = table.answered.copy()
+    usable = table.answered.copy()
     for name in needed[1:]:
-        good &= np.isfinite(table[name])
-    if good.sum() < LEAST_ROWS:
+        usable &= np.isfinite(table[name])
+    if usable.sum() < LEAST_ROWS:
         raise TableError(
-            f"{path}: {int(good.sum())} usable rows; needed are {LEAST_ROWS} or more to train, "
+            f"{path}: {int(usable.sum())} usable rows; needed are {LEAST_ROWS} or more to train, "
             "calibrate and score"
         )
-    kept = table.rows(good)
+    kept = table.rows(usable)
     measured = {name: kept[column(name)] for name in inputs}
     truth = np.stack([kept[column(name)] for name in targets], axis=1)
     if float(np.ptp(truth, axis=0).min()) <= 0.0:
-        raise InputError(f"{path}: a target does not vary; it cannot be learned")
+        raise InputError(f"{path}: a target does not vary; give it a range in the recipe")
     recipe = table.metadata.get("soilml_recipe", "{}")
     content = json.loads(recipe)
     check_measured(targets, content, str(path))
     ends = [_ends(prior_of(name, content), truth[:, i]) for i, name in enumerate(targets)]
     return Dataset(
         measured=measured,
-        features=computed(features, measured),
+        features=compute_features(features, measured),
         targets=truth,
         run=np.unique(kept["run"], return_inverse=True)[1].astype(np.int64),
         feature_names=tuple(features),
@@ -118,7 +140,7 @@ def read_dataset(
         lower=np.asarray([low for low, _ in ends]),
         upper=np.asarray([high for _, high in ends]),
         recipe=recipe,
-        dropped=int(len(table) - good.sum()),
+        dropped=int(len(table) - usable.sum()),
     )
 
 
@@ -131,36 +153,38 @@ def _ends(prior: object, truth: Floats) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Split:
-    """Rows to learn from, to stop and choose by, and to measure uncertainty on; no soil in two."""
+class DataSplit:
+    """Training, validation and calibration rows; no soil is in two of them."""
 
     train: Dataset
-    choose: Dataset
-    calibrate: Dataset
+    validation: Dataset
+    calibration: Dataset
 
 
-def split(data: Dataset, seed: int, choose: float = 0.1, calibrate: float = 0.2) -> Split:
-    """Split by run. Runs of many rows, where they are few, all go to the calibration part.
+def split_by_run(
+    data: Dataset, seed: int, validation: float = 0.1, calibration: float = 0.2
+) -> DataSplit:
+    """Split by run into given shares of the runs for validation and calibration.
 
-    There they show how surely rows of one soil may be joined; the rows that stand alone teach more
-    by showing more soils.
+    Where at least half of the rows are runs of a single row, all longer runs are used for
+    calibration, with a tenth of the single rows: pooling is calibrated on the longer runs, and
+    single rows cover more soils for training.
     """
-    alone = data.run_length == 1
-    shared_to_calibrate = bool(0.5 <= alone.mean() < 1.0)
+    single = data.run_length == 1
     codes, first = np.unique(data.run, return_index=True)
     shuffled = np.random.default_rng(seed).permutation(len(codes))
     rank = np.empty(len(codes))
     rank[shuffled] = (np.arange(len(codes)) + 0.5) / len(codes)
-    if shared_to_calibrate:
-        many = ~alone[first]
-        rank[many] = 1.0
-        singles = np.flatnonzero(~many)
-        order = np.argsort(rank[singles])
-        rank[singles[order]] = (np.arange(singles.size) + 0.5) / singles.size
-        calibrate = 0.1
-    place = rank[np.searchsorted(codes, data.run)]
-    return Split(
-        train=data.rows(place < 1.0 - choose - calibrate),
-        choose=data.rows((place >= 1.0 - choose - calibrate) & (place < 1.0 - calibrate)),
-        calibrate=data.rows(place >= 1.0 - calibrate),
+    if 0.5 <= single.mean() < 1.0:
+        single_runs = np.flatnonzero(single[first])
+        order = np.argsort(rank[single_runs])
+        rank[:] = 1.0
+        rank[single_runs[order]] = (np.arange(single_runs.size) + 0.5) / single_runs.size
+        calibration = 0.1
+    row_rank = rank[np.searchsorted(codes, data.run)]
+    first_validation, first_calibration = 1.0 - validation - calibration, 1.0 - calibration
+    return DataSplit(
+        train=data.rows(row_rank < first_validation),
+        validation=data.rows((row_rank >= first_validation) & (row_rank < first_calibration)),
+        calibration=data.rows(row_rank >= first_calibration),
     )

@@ -1,1 +1,1 @@
-"""A trained model as an ONNX file, with its card and learning curves."""
+"""Export of trained models: ONNX file, model card and learning curves."""

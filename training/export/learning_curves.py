@@ -1,4 +1,4 @@
-"""Learning curves as a picture."""
+"""Plots of how the regressors were fitted: learning curves, searches and losses."""
 
 from __future__ import annotations
 
@@ -11,90 +11,89 @@ from sklearn.base import clone
 
 from soilml.io.atomic_files import atomic_output
 from training.regressors.feature_subset import FeatureSubset
-from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
-from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.lssvm import LSSVM
-from training.train import Trained
+from training.train import TrainedModel
 
-#: Shares of the training rows at which the error is looked at.
+#: Shares of the training rows at which the validation error is plotted.
 SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)
 
 
-def draw_curves(trained: Trained, path: str | os.PathLike[str]) -> None:
+def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) -> None:
     """Error against rows, loss against epochs, and leave-one-out error against gamma, as PNG."""
     from matplotlib.figure import Figure
 
-    readers = [member.regressor for member in trained.members]
-    searched = [r for r in readers if isinstance(r.machine, LSSVM | FixedSizeLSSVM)]
-    learned = [r for r in readers if isinstance(r.machine, GaussianMLP)]
-    figure = Figure(figsize=(4.2 * (1 + len(searched) + len(learned)), 3.6), layout="constrained")
-    axes = figure.subplots(1, 1 + len(searched) + len(learned), squeeze=False)[0]
-    _rows(axes[0], trained, readers)
-    for axis, reader in zip(axes[1:], [*searched, *learned], strict=True):
-        if isinstance(reader.machine, GaussianMLP):
-            _epochs(axis, reader)
-        else:
-            _search(axis, reader)
+    regressors = [member.regressor for member in trained.members]
+    searched = [r for r in regressors if r.model.hyperparameter_search()]
+    by_epochs = [r for r in regressors if r.model.loss_history()]
+    count = 1 + len(searched) + len(by_epochs)
+    figure = Figure(figsize=(4.2 * count, 3.6), layout="constrained")
+    axes = figure.subplots(1, count, squeeze=False)[0]
+    _plot_rows(axes[0], trained, regressors)
+    for axis, regressor in zip(axes[1:], searched, strict=False):
+        _plot_search(axis, regressor)
+    for axis, regressor in zip(axes[1 + len(searched) :], by_epochs, strict=True):
+        _plot_epochs(axis, regressor)
     with atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 
-def _rows(axis: Any, trained: Trained, readers: list[FeatureSubset]) -> None:
-    """Error on held-out rows against rows learned from, for the machines that fit in a moment."""
-    train, check = trained.parts.train, trained.parts.choose
-    for reader in readers:
-        machine, shown = reader.machine, reader.read(train.features)
-        if isinstance(machine, GaussianMLP | LSSVM):
-            error = _relative(reader, trained)
-            axis.plot([len(train)], [error], "o", label=reader.kind)
+def _plot_rows(axis: Any, trained: TrainedModel, regressors: list[FeatureSubset]) -> None:
+    """Validation error against the number of training rows, of regressors that are fast to fit."""
+    train = trained.parts.train
+    for regressor in regressors:
+        features = regressor.select(train.features)
+        fixed = regressor.model.learning_curve_parameters()
+        if fixed is None:
+            error = _relative_rmse(regressor, trained)
+            axis.plot([len(train)], [error], "o", label=regressor.name)
             continue
-        fixed: dict[str, Any] = {}
-        if isinstance(machine, FixedSizeLSSVM):
-            fixed = {"gamma": machine.gamma_, "width": machine.width_}
         sizes, errors = [], []
         for share in SHARES:
             size = int(share * len(train))
             if size < 40:
                 continue
-            some = clone(machine).set_params(**fixed).fit(shown[:size], train.targets[:size])
+            refitted = clone(regressor.model).set_params(**fixed)
+            refitted.fit(features[:size], train.targets[:size])
             sizes.append(size)
-            errors.append(_relative(replace(reader, machine=some), trained))
-        axis.plot(sizes, errors, "o-", label=reader.kind)
-    axis.set(xscale="log", xlabel="rows learned from", ylabel="RMSE / prior std, mean over outputs")
-    axis.set_title(f"error on {len(check)} rows not learned from", fontsize=9)
+            errors.append(_relative_rmse(replace(regressor, model=refitted), trained))
+        axis.plot(sizes, errors, "o-", label=regressor.name)
+    axis.set(xscale="log", xlabel="training rows", ylabel="RMSE / prior std, mean over outputs")
+    axis.set_title(f"error on {len(trained.parts.validation)} validation rows", fontsize=9)
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
 
 
-def _relative(reader: FeatureSubset, trained: Trained) -> float:
-    check = trained.parts.choose
-    error = (check.targets - reader.predict(check.features)) / trained.prior.std
+def _relative_rmse(regressor: FeatureSubset, trained: TrainedModel) -> float:
+    """RMSE on the validation rows in prior standard deviations, averaged over the targets."""
+    validation = trained.parts.validation
+    error = (validation.targets - regressor.predict(validation.features)) / trained.prior.std
     return float(np.sqrt(np.mean(error**2, axis=0)).mean())
 
 
-def _search(axis: Any, reader: FeatureSubset) -> None:
-    machine = reader.machine
-    for width, gammas, errors in machine.search_:
+def _plot_search(axis: Any, regressor: FeatureSubset) -> None:
+    """Leave-one-out error against gamma for each width, and the selected pair."""
+    search = regressor.model.hyperparameter_search()
+    for width, gammas, errors in search:
         axis.plot(gammas, np.sqrt(errors), "-", label=f"width {width:.2g}")
-    axis.plot([machine.gamma_], [min(np.sqrt(e.min()) for _, _, e in machine.search_)], "k*", ms=10)
+    _, gammas, errors = min(search, key=lambda entry: float(entry[2].min()))
+    axis.plot([gammas[int(np.argmin(errors))]], [np.sqrt(errors.min())], "k*", ms=10)
     axis.set(xscale="log", xlabel="gamma", ylabel="leave-one-out error / spread of outputs")
-    axis.set_title(f"{reader.kind}: choice by leave-one-out", fontsize=9)
-    low = min(float(np.sqrt(e.min())) for _, _, e in machine.search_)
+    axis.set_title(f"{regressor.name}: selection by leave-one-out", fontsize=9)
+    low = float(np.sqrt(errors.min()))
     axis.set_ylim(low * 0.995, low * 1.08)
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
 
 
-def _epochs(axis: Any, reader: FeatureSubset) -> None:
-    machine = reader.machine
-    loss = np.asarray(machine.history_)
-    held = int(np.ceil(machine.warm_up * machine.epochs))
+def _plot_epochs(axis: Any, regressor: FeatureSubset) -> None:
+    """Training and validation loss against epochs, without those of the mean alone."""
+    loss = np.asarray(regressor.model.loss_history())
+    first = regressor.model.mean_only_epochs()
     epochs = np.arange(1, len(loss) + 1)
-    axis.plot(epochs[held:], loss[held:, 0], label="learned from")
-    axis.plot(epochs[held:], loss[held:, 1], label="held out")
-    best = held + int(np.argmin(loss[held:, 1])) if len(loss) > held else len(loss) - 1
-    axis.axvline(epochs[best], color="k", lw=0.8, ls=":", label=f"kept: epoch {epochs[best]}")
+    axis.plot(epochs[first:], loss[first:, 0], label="training")
+    axis.plot(epochs[first:], loss[first:, 1], label="validation")
+    best = first + int(np.argmin(loss[first:, 1])) if len(loss) > first else len(loss) - 1
+    axis.axvline(epochs[best], color="k", lw=0.8, ls=":", label=f"used: epoch {epochs[best]}")
     axis.set(xlabel="epoch", ylabel="negative log likelihood, nat")
-    axis.set_title(f"{reader.kind}: likelihood (mean-only epochs left out)", fontsize=9)
+    axis.set_title(f"{regressor.name}: likelihood (without mean-only epochs)", fontsize=9)
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)

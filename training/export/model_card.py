@@ -1,124 +1,128 @@
-"""The card beside a model file: what it is, what it was trained on, how good it is."""
+"""The card beside a model file: validity, metrics and provenance."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from training.calibration.scores import Score
+from training.calibration.metrics import Metrics
+from training.regressors.feature_subset import FeatureSubset
 from training.set_posterior.metadata import table_of
-from training.train import Trained
+from training.train import TrainedModel
 
-WORTH = (
-    "One reading brings one equation for all these unknowns: the estimate is mostly the prior, "
-    "and its standard deviation says so. Use several readings of one soil together "
+SINGLE_READING = (
+    "A single reading is one equation for all these unknowns: the estimate is mostly the prior, "
+    "and its standard deviation is almost as large. Use several readings of one soil together "
     "(`soilml estimate --by run`, `Estimator.run`)."
 )
-PER_ROW_WORTH = (
-    "Slip differs from row to row: each reading is estimated by itself. How much of the answer is "
-    "the prior depends on how well the soil is known, and the standard deviation says it."
+PER_ROW = (
+    "Slip differs between rows: each reading is estimated by itself. How much the estimate depends "
+    "on the prior depends on how well the soil is known; the standard deviation shows it."
 )
-TOGETHER = (
-    "Several readings of one soil together (`run`), by what the run varied: what came of them "
-    "on runs that joining was not fitted to. Rows of nearly the same slip and load count as "
-    "one, and a run between these kinds is taken between them."
+POOLED = (
+    "Several readings of one soil, pooled (`run`), by the operating conditions that the run "
+    "varied, on runs that pooling was not calibrated on. Rows of nearly the same slip and load "
+    "count as one; for a run between these patterns, the calibration is interpolated."
+)
+SET_POSTERIOR = (
+    "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
+    "all readings under a learned response of the wheel, sampled in the graph. On fresh simulated "
+    "sets with free, three-level or steady operating conditions; a third of them with sinkage and "
+    "drawbar pull. Refused sets count with the prior."
 )
 
-POSTERIOR = (
-    "Several readings of one soil together by the set posterior (`run`, `step`): the exact "
-    "likelihood of all readings under a learned response of the wheel, sampled in the graph. On "
-    "fresh sets, driven anywhere, at three levels or steadily; in a third sinkage and drawbar pull "
-    "are measured too. Sets that are refused count with the prior."
-)
 
-
-def card(trained: Trained, metadata: Mapping[str, str], name: str) -> str:
-    """The card as Markdown."""
-    outputs = json.loads(metadata["outputs"])
-    inputs = json.loads(metadata["inputs"])
-    recipe = json.loads(metadata["recipe"])
-    gear = ", ".join(f"{k} {v}" for k, v in json.loads(metadata["gear"]).items())
-    kinds = ", ".join(_described(m.regressor.machine, m.regressor.kind) for m in trained.members)
-    parts = trained.parts
-    fused = len(trained.members) > 1
+def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) -> str:
+    """The card of a model file as Markdown, from its model, metadata and name."""
+    targets = [output["name"] for output in json.loads(metadata["outputs"])]
     lines = [
         f"# {name}",
         "",
-        f"Estimates {_list(o['name'].replace('_', ' ') for o in outputs)} from one reading of "
-        f"{_list(i['name'] for i in inputs)}. Regressors: {kinds}."
-        + (f" Joined by the rule `{trained.spec.rule}`." if fused else ""),
-        "",
-        PER_ROW_WORTH if trained.spec.per_row else WORTH,
-        "",
+        *_summary(trained, metadata),
         "## Valid for",
         "",
+        *_validity(trained, metadata),
+        "## Figures",
+        "",
+        f"On {trained.scores['estimator'].rows} rows that were not used for training or "
+        "calibration. Error is RMSE / prior std; -log p is the mean negative log density of the "
+        "value over the prior std (prior alone: 1.42 as a Gaussian); 90 % is the coverage of the "
+        "90 % interval.",
+        "",
+        *_metrics_table(trained.scores, targets),
+        "",
+    ]
+    if trained.set_posterior is not None:
+        lines += [SET_POSTERIOR, "", *table_of(trained.set_figures, targets)]
+    elif not trained.spec.per_row:
+        lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
+    lines += ["## Made by", "", *_provenance(trained, metadata), ""]
+    return "\n".join(lines)
+
+
+def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
+    """What is estimated from what, and by which regressors."""
+    outputs = _enumerate(o["name"].replace("_", " ") for o in json.loads(metadata["outputs"]))
+    inputs = _enumerate(i["name"] for i in json.loads(metadata["inputs"]))
+    regressors = ", ".join(_describe(member.regressor) for member in trained.members)
+    text = f"Estimates {outputs} from one reading of {inputs}. Regressors: {regressors}."
+    if len(trained.members) > 1:
+        text += f" Fused by the rule `{trained.spec.rule}`."
+    return [text, "", PER_ROW if trained.spec.per_row else SINGLE_READING, ""]
+
+
+def _validity(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
+    """Gear, soil, effects and noise of the training data; ranges of inputs and outputs."""
+    recipe = json.loads(metadata["recipe"])
+    gear = ", ".join(f"{k} {v}" for k, v in json.loads(metadata["gear"]).items())
+    noise, bias = (json.dumps(recipe.get(key, {})) for key in ("noise", "bias"))
+    return [
         f"- gear: {gear or 'not recorded'}",
         f"- soil outside the estimated parameters: {_soil(recipe, trained.spec.targets)}",
-        *[f"- effect: {json.dumps(e)}" for e in recipe.get("effect", [])],
-        f"- noise: {json.dumps(recipe.get('noise', {}))}; bias per run: "
-        f"{json.dumps(recipe.get('bias', {}))}",
+        *[f"- effect: {json.dumps(effect)}" for effect in recipe.get("effect", [])],
+        f"- noise: {noise}; bias per run: {bias}",
         "",
         "| input | column | unit | trained from | to |",
         "|---|---|---|---:|---:|",
         *[
             f"| {i['name']} | `{i['column']}` | {i['unit']} | {i['lower']:.4g} | {i['upper']:.4g} |"
-            for i in inputs
+            for i in json.loads(metadata["inputs"])
         ],
         "",
-        "Readings outside, or unlike any that were trained on, come back with `in_range` false.",
+        "Readings outside these ranges, or far from all training rows, have `in_range` false.",
         "",
         "| output | column | unit | prior from | to | prior std |",
         "|---|---|---|---:|---:|---:|",
         *[
             f"| {o['name']} | `{o['column']}` | {o['unit']} | {o['lower']:.4g} | {o['upper']:.4g} "
             f"| {o['prior_std']:.4g} |"
-            for o in outputs
+            for o in json.loads(metadata["outputs"])
         ],
         "",
-        "## Figures",
-        "",
-        f"On {trained.scores['estimator'].rows} rows that nobody learned from or calibrated on. "
-        "Error is RMSE / prior std; likelihood is the mean negative log density of the value over "
-        "the prior std (prior alone: 1.42 as a Gaussian); coverage is of the 90 % interval.",
-        "",
-        *_scores(trained.scores, [o["name"] for o in outputs]),
-        "",
-        *(
-            []
-            if trained.spec.per_row or trained.posterior
-            else _together(trained, [o["name"] for o in outputs])
-        ),
-        *_posterior(trained, [o["name"] for o in outputs]),
-        "## Made by",
-        "",
-        f"- rows: {len(parts.train)} learned from, {len(parts.choose)} to stop and choose by, "
-        f"{len(parts.calibrate)} to calibrate and score; {trained.data.dropped} dropped",
+    ]
+
+
+def _provenance(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
+    parts = trained.parts
+    return [
+        f"- rows: {len(parts.train)} for training, {len(parts.validation)} for validation, "
+        f"{len(parts.calibration)} for calibration and metrics; {trained.data.dropped} dropped",
         f"- training recipe sha256 `{metadata['recipe_sha256']}`",
         f"- data sha256 `{metadata['data_sha256']}`",
         f"- spec: `{metadata['spec']}`",
         f"- float32 file against float64 original: at most {metadata['parity']} of the prior's "
         f"spread; opset {metadata['opset']}, IR {metadata['ir_version']}",
         f"- soilml {metadata['soilml_version']}",
-        "",
     ]
-    return "\n".join(lines)
 
 
-def _described(regressor: Any, kind: str) -> str:
-    details = ""
-    if hasattr(regressor, "centres_"):
-        details = (
-            f" ({len(regressor.centres_)} centres, gamma {regressor.gamma_:.3g}, "
-            f"width {regressor.width_:.3g})"
-        )
-    if hasattr(regressor, "history_"):
-        layers = " x ".join(str(h) for h in regressor.hidden)
-        details = f" (hidden {layers}, {len(regressor.history_)} epochs)"
-    return f"{kind}{details}"
+def _describe(regressor: FeatureSubset) -> str:
+    settings = regressor.model.fitted_settings()
+    return f"{regressor.name} ({settings})" if settings else regressor.name
 
 
-def _list(words: Any) -> str:
+def _enumerate(words: Iterable[str]) -> str:
     words = list(words)
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
@@ -131,33 +135,28 @@ def _soil(recipe: Mapping[str, Any], targets: Sequence[str]) -> str:
     return f"{text}; varied and not estimated: {json.dumps(unknown)}" if unknown else text
 
 
-def _scores(scores: Mapping[str, Score], names: list[str]) -> list[str]:
-    head = " | ".join(f"error {n}" for n in names)
-    logs = " | ".join(f"-log p {n}" for n in names)
-    cover = " | ".join(f"90 % {n}" for n in names)
-    lines = [f"| | {head} | {logs} | {cover} |", "|---|" + "---:|" * (3 * len(names))]
-    for name, s in scores.items():
-        cells = [f"{v:.3f}" for v in (*s.relative, *s.nll)] + [f"{v:.1%}" for v in s.cover90]
+def _metrics_table(scores: Mapping[str, Metrics], targets: list[str]) -> list[str]:
+    """Error, likelihood and coverage of every target, a line for each estimate."""
+    heads = [f"{what} {target}" for what in ("error", "-log p", "90 %") for target in targets]
+    lines = [f"| | {' | '.join(heads)} |", "|---|" + "---:|" * len(heads)]
+    for name, metrics in scores.items():
+        values = [f"{v:.3f}" for v in (*metrics.relative, *metrics.nll)]
+        values += [f"{v:.1%}" for v in metrics.cover90]
         label = f"**{name}**" if name == "estimator" else name
-        lines.append(f"| {label} | {' | '.join(cells)} |")
+        lines.append(f"| {label} | {' | '.join(values)} |")
     return lines
 
 
-def _posterior(trained: Trained, names: list[str]) -> list[str]:
-    """What the set posterior gives, on fresh simulated sets."""
-    if trained.posterior is None:
-        return []
-    return [POSTERIOR, "", *table_of(trained.figures, names)]
-
-
-def _together(trained: Trained, names: list[str]) -> list[str]:
-    head = " | ".join(f"{what} {n}" for what in ("error", "90 %") for n in names)
-    lines = [TOGETHER, "", f"| run | rows | sets | {head} |"]
-    lines.append("|---|---:|---:|" + "---:|" * (2 * len(names)))
-    for kind, scores in trained.sets.items():
-        for rows, score in scores.items():
-            cells = [f"{v:.3f}" for v in score.relative] + [f"{v:.1%}" for v in score.cover90]
-            lines.append(f"| {kind} | {rows} | {score.rows} | {' | '.join(cells)} |")
-        if not scores:
-            lines.append(f"| {kind} | | 0 |{' |' * (2 * len(names))}")
-    return [*lines, ""]
+def _pooled_table(scores: Mapping[str, Mapping[int, Metrics]], targets: list[str]) -> list[str]:
+    """Error and coverage of every target, a line for each pattern and number of rows."""
+    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
+    lines = [f"| run | rows | sets | {' | '.join(heads)} |"]
+    lines.append("|---|---:|---:|" + "---:|" * len(heads))
+    for pattern, by_length in scores.items():
+        for rows, metrics in by_length.items():
+            values = [f"{v:.3f}" for v in metrics.relative]
+            values += [f"{v:.1%}" for v in metrics.cover90]
+            lines.append(f"| {pattern} | {rows} | {metrics.rows} | {' | '.join(values)} |")
+        if not by_length:
+            lines.append(f"| {pattern} | | 0 |{' |' * len(heads)}")
+    return lines

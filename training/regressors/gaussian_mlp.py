@@ -1,27 +1,25 @@
-"""The multi-layer perceptron that predicts a mean and a variance."""
+"""A multi-layer perceptron that predicts a mean and a variance."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_head import GaussianHead, checked
+from training.regressors.gaussian_head import GaussianHead, validate_training_data
+from training.regressors.gaussian_regressor import GaussianRegressor, Progress
 from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int], None]
 
 
-class GaussianMLP(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    r"""Tanh layers with a Gaussian head, by maximum likelihood.
+class GaussianMLP(GaussianRegressor):
+    r"""Tanh layers with a Gaussian head, fitted by maximum likelihood.
 
     .. math:: L = \tfrac12 \sum_k \left[\log v_k + (y_k - \mu_k)^2 / v_k\right]
 
@@ -32,19 +30,27 @@ class GaussianMLP(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ign
     epochs, batch, learning_rate : int, int, float
         Of AdamW with a cosine schedule.
     warm_up : float
-        Share of the epochs in which the variance is held, so that the mean is found first.
+        Share of the epochs in which the variance is fixed at 1, so that the mean is fitted first.
     patience : int
-        Epochs without improvement on the held-out rows after which training stops.
+        Epochs without improvement on the validation rows after which training stops.
     validation : float
-        Share of the rows held out, unless `fit` is given some.
+        Share of the rows used for validation, unless `fit_with_validation` is given some.
     random_state : int
         Seed of weights and batches.
 
-    References: Nix and Weigend, Proc. IEEE ICNN, 1994. Weights are kept as numpy arrays: a fitted
-    machine needs torch no more.
+    Attributes
+    ----------
+    layers_ : list of ndarray
+        Weights and bias of each layer in turn; prediction does not need torch.
+    history_ : list of (float, float)
+        See `loss_history`.
+
+    References
+    ----------
+    Nix and Weigend, Proc. IEEE ICNN, 1994.
     """
 
-    kind: ClassVar[str] = "mlp"
+    type_name: ClassVar[str] = "mlp"
 
     def __init__(
         self,
@@ -66,57 +72,63 @@ class GaussianMLP(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ign
         self.validation = validation
         self.random_state = random_state
 
-    def fit(
-        self,
-        X: Any,
-        y: Any,
-        held_out: tuple[Floats, Floats] | None = None,
-        progress: Progress = lambda epoch: None,
+    def fit(self, X: Any, y: Any) -> GaussianMLP:
+        """Fit rows X (n, d) to y (n,) or (n, q); a share of them is used for early stopping."""
+        return self._fit(X, y, None, lambda epoch, epochs: None)
+
+    def fit_with_validation(
+        self, X: Floats, y: Floats, validation: tuple[Floats, Floats], progress: Progress
     ) -> GaussianMLP:
-        """Fit rows X (n, d) to y (n,) or (n, q); stops early on `held_out` rows (X, y)."""
-        X, Y, one_output = checked(self, X, y)
-        if held_out is None:
+        """Fit rows X (n, d) to y (n,) or (n, q), with separate validation rows (X, y)."""
+        return self._fit(X, y, validation, progress)
+
+    def _fit(
+        self, X: Any, y: Any, validation: tuple[Floats, Floats] | None, progress: Progress
+    ) -> GaussianMLP:
+        X, Y, one_output = validate_training_data(self, X, y)
+        if validation is None:
             order = np.random.default_rng(self.random_state).permutation(len(X))
             cut = max(int(self.validation * len(X)), 1) if len(X) > 1 else 0
-            held_out = (X[order[:cut]], Y[order[:cut]]) if cut else (X, Y)
+            validation = (X[order[:cut]], Y[order[:cut]]) if cut else (X, Y)
             X, Y = X[order[cut:]], Y[order[cut:]]
         self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
         standardised = (
-            self.x_scaling_.apply(held_out[0]),
-            self.y_scaling_.apply(held_out[1].reshape(len(held_out[1]), -1)),
+            self.x_scaling_.apply(validation[0]),
+            self.y_scaling_.apply(validation[1].reshape(len(validation[1]), -1)),
         )
         x = self.x_scaling_.apply(X)
-        self._descend(x, self.y_scaling_.apply(Y), standardised, progress)
-        self.head_ = GaussianHead.of(self.y_scaling_, self._outputs(x)[1], one_output)
+        self._minimise(x, self.y_scaling_.apply(Y), standardised, progress)
+        log_variance = self._standardised_outputs(x)[1]
+        self.head_ = GaussianHead.of(self.y_scaling_, log_variance, one_output)
         return self
 
-    def _descend(
-        self, x: Floats, z: Floats, held_out: tuple[Floats, Floats], progress: Progress
+    def _minimise(
+        self, x: Floats, z: Floats, validation: tuple[Floats, Floats], progress: Progress
     ) -> None:
         import torch
 
         threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # same sums in the same order, and no fight over two cores
+        torch.set_num_threads(1)  # sums in a fixed order, whatever the number of cores
         try:
             generator = torch.Generator().manual_seed(self.random_state)
-            layers = _initial([x.shape[1], *self.hidden, 2 * z.shape[1]], generator)
-            self._epochs(torch, layers, generator, x, z, held_out, progress)
+            layers = _initial_layers([x.shape[1], *self.hidden, 2 * z.shape[1]], generator)
+            self._run_epochs(torch, layers, generator, x, z, validation, progress)
         finally:
             torch.set_num_threads(threads)
 
-    def _epochs(
+    def _run_epochs(
         self,
         torch: Any,
         layers: list[Any],
         generator: Any,
         x: Floats,
         z: Floats,
-        held_out: tuple[Floats, Floats],
+        validation: tuple[Floats, Floats],
         progress: Progress,
     ) -> None:
         q = z.shape[1]
         tx, tz = torch.from_numpy(x).float(), torch.from_numpy(z).float()
-        hx, hz = (torch.from_numpy(part).float() for part in held_out)
+        hx, hz = (torch.from_numpy(part).float() for part in validation)
         batches = max(math.ceil(len(x) / self.batch), 1)
         optimiser = torch.optim.AdamW(layers, lr=self.learning_rate, weight_decay=1e-4)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
@@ -125,60 +137,72 @@ class GaussianMLP(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ign
         best, waited, self.history_ = math.inf, 0, []
         self.layers_ = [part.detach().numpy().astype(np.float64) for part in layers]
         for epoch in range(self.epochs):
-            holding = epoch < self.warm_up * self.epochs
+            mean_only = epoch < self.warm_up * self.epochs
             order = torch.randperm(len(tx), generator=generator)
             total = 0.0
             for index in order.split(self.batch):
                 optimiser.zero_grad()
-                loss = _loss(_forward(torch, layers, tx[index]), tz[index], q, holding)
+                loss = _loss(_forward(torch, layers, tx[index]), tz[index], q, mean_only)
                 loss.backward()
                 torch.nn.utils.clip_grad_norm_(layers, 5.0)
                 optimiser.step()
                 schedule.step()
                 total += float(loss.detach()) * len(index)
             with torch.no_grad():
-                check = float(_loss(_forward(torch, layers, hx), hz, q, False))
-            self.history_.append((total / len(tx), check))
-            progress(epoch + 1)
-            if holding or check < best:
-                best, waited = (math.inf if holding else check), 0
+                validation_loss = float(_loss(_forward(torch, layers, hx), hz, q, False))
+            self.history_.append((total / len(tx), validation_loss))
+            progress(epoch + 1, self.epochs)
+            if mean_only or validation_loss < best:
+                best, waited = (math.inf if mean_only else validation_loss), 0
                 self.layers_ = [part.detach().numpy().astype(np.float64) for part in layers]
             else:
                 waited += 1
                 if waited > self.patience:
                     break
 
-    def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Mean (n,) or (n, q); with `return_std` a tuple with the standard deviation."""
-        check_is_fitted(self)
-        X = validate_data(self, X, reset=False, dtype=np.float64)
-        return self.head_.answer(*self._outputs(self.x_scaling_.apply(X)), return_std)
-
-    def _outputs(self, h: Floats) -> tuple[Floats, Floats]:
-        """Mean and log-variance (n, q) in standardised outputs, from standardised inputs."""
-        for weights, bias in self._pairs()[:-1]:
+    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
+        h = x
+        for weights, bias in self._layer_pairs()[:-1]:
             h = np.tanh(h @ weights + bias)
-        weights, bias = self._pairs()[-1]
+        weights, bias = self._layer_pairs()[-1]
         both = h @ weights + bias
         q = both.shape[1] // 2
         return both[:, :q], both[:, q:]
 
-    def _pairs(self) -> list[tuple[Floats, Floats]]:
+    def _layer_pairs(self) -> list[tuple[Floats, Floats]]:
         return list(zip(self.layers_[0::2], self.layers_[1::2], strict=True))
 
-    def draw(self, graph: Graph, features: str) -> tuple[str, str]:
-        """The fitted layers as nodes of an ONNX graph: names of mean and std, (n, q)."""
+    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
+        """Add the fitted layers to an ONNX graph; names of mean and std, (n, q)."""
         h = graph.scaled(features, self.x_scaling_.mean, self.x_scaling_.scale)
-        for weights, bias in self._pairs()[:-1]:
+        for weights, bias in self._layer_pairs()[:-1]:
             h = graph.op("Tanh", graph.affine(h, weights, bias))
-        weights, bias = self._pairs()[-1]
+        weights, bias = self._layer_pairs()[-1]
         both = graph.affine(h, weights, bias)
         q = weights.shape[1] // 2
-        return self.head_.draw(graph, graph.columns(both, 0, q), graph.columns(both, q, 2 * q))
+        mean, log_variance = graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
+        return self.head_.add_to_graph(graph, mean, log_variance)
+
+    def fitted_settings(self) -> str:
+        """Layer widths, and epochs until training stopped."""
+        layers = " x ".join(str(h) for h in self.hidden)
+        return f"hidden {layers}, {len(self.history_)} epochs"
+
+    def learning_curve_parameters(self) -> dict[str, Any] | None:
+        """None: fitting again takes too long."""
+        return None
+
+    def mean_only_epochs(self) -> int:
+        """Number of first epochs in which the variance is fixed."""
+        return math.ceil(self.warm_up * self.epochs)
+
+    def loss_history(self) -> list[tuple[float, float]]:
+        """Training and validation loss of each epoch; squared error while the variance is fixed."""
+        return self.history_
 
 
-def _initial(sizes: list[int], generator: Any) -> list[Any]:
-    """Weights and biases: Glorot's uniform range, the output layer near zero."""
+def _initial_layers(sizes: list[int], generator: Any) -> list[Any]:
+    """Weights and biases: Glorot's uniform range, a tenth of it for the output layer."""
     import torch
 
     layers = []
@@ -195,9 +219,9 @@ def _forward(torch: Any, layers: list[Any], h: Any) -> Any:
     return h @ layers[-2] + layers[-1]
 
 
-def _loss(both: Any, z: Any, q: int, holding: bool) -> Any:
+def _loss(both: Any, z: Any, q: int, mean_only: bool) -> Any:
     square = (z - both[:, :q]) ** 2
-    if holding:
+    if mean_only:
         return 0.5 * square.sum(dim=1).mean()
     logs = both[:, q:].clamp(-12.0, 6.0)
     return 0.5 * (logs + square * (-logs).exp()).sum(dim=1).mean()

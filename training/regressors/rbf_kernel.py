@@ -1,4 +1,4 @@
-"""The radial basis kernel, and ridge regression with a bias by eigenvalues."""
+"""The radial basis kernel, its natural width, and the target of a log-variance."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-#: Expectation of the logarithm of a squared standard normal number.
+#: Expectation of the logarithm of a squared standard normal variable.
 LOG_CHI2 = -1.2703628454614782
-#: Squared residuals are kept from zero by this share of their mean, before logarithms.
-LEAST_SQUARE = 1e-4
+#: Share of their mean that is added to squared residuals, so that their logarithms are finite.
+SQUARE_FLOOR = 1e-4
 
 
 def rbf(a: Floats, b: Floats, width: float) -> Floats:
@@ -19,16 +19,17 @@ def rbf(a: Floats, b: Floats, width: float) -> Floats:
     return np.asarray(np.exp(-np.maximum(squared, 0.0) / (2.0 * width * width)))
 
 
-def log_squares(residual: Floats) -> Floats:
-    """Targets (n, q) for a log-variance: unbiased logs of squared residuals of unit variance."""
+def log_squared_residuals(residual: Floats) -> Floats:
+    """Targets (n, q) for a log-variance: logarithms of squared residuals, corrected for bias."""
     square = residual**2
-    floor = LEAST_SQUARE * square.mean(axis=0) + 1e-300
+    floor = SQUARE_FLOOR * square.mean(axis=0) + 1e-300
     return np.asarray(np.log(square + floor) - LOG_CHI2)
 
 
 def median_distance(x: Floats, seed: int = 0) -> float:
-    """Median distance between rows, the natural unit of kernel widths."""
-    some = x[np.random.default_rng(seed).permutation(len(x))[:400]]
-    apart = np.sqrt(((some[:, None, :] - some[None, :, :]) ** 2).sum(axis=-1))
-    middle = float(np.median(apart[np.triu_indices(len(some), 1)])) if len(some) > 1 else 1.0
-    return middle if middle > 0.0 else 1.0
+    """Median distance between rows (n, d), of at most 400 of them: the unit of kernel widths."""
+    sample = x[np.random.default_rng(seed).permutation(len(x))[:400]]
+    distance = np.sqrt(((sample[:, None, :] - sample[None, :, :]) ** 2).sum(axis=-1))
+    pairs = np.triu_indices(len(sample), 1)
+    median = float(np.median(distance[pairs])) if len(sample) > 1 else 1.0
+    return median if median > 0.0 else 1.0

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Standardisation:
-    """Mean and scale (d,) of columns; a constant column keeps the scale 1."""
+    """Mean and standard deviation (d,) of columns; a constant column has the scale 1."""
 
     mean: Floats
     scale: Floats
@@ -29,5 +29,5 @@ class Standardisation:
         return np.asarray((values - self.mean) / self.scale)
 
     def undo(self, values: Floats) -> Floats:
-        """Rows in the original unit."""
+        """Rows in their original units."""
         return np.asarray(values * self.scale + self.mean)

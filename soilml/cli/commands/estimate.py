@@ -24,8 +24,8 @@ from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.gaussian_pooling import LEAST_SOUND
-from soilml.onboard.multi_sensor import ACROSS_FILES, PRIOR_ONCE, fused_estimates
+from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
+from soilml.onboard.multi_sensor import ACROSS_FILES, PRIOR_ONCE, fuse_estimates
 from soilml.optional_imports import need
 from soilml.quantities import column
 
@@ -177,7 +177,7 @@ def _row_estimates(
     columns |= {column(name): table[column(name)] for name in inputs}
     estimate, files = estimates[0], None
     if len(estimators) > 1:
-        combined = fused_estimates(estimates, rule)
+        combined = fuse_estimates(estimates, rule)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in _columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
@@ -205,7 +205,7 @@ def _row_estimates(
 
 def _all_rows(estimator: Estimator, usable: NDArray[np.bool_], table: Table) -> Estimate:
     """An estimate for every row; one that is not usable counts as out of range."""
-    result = estimator.unknown(len(table))
+    result = estimator.prior_estimate(len(table))
     if usable.any():
         alone = estimator.sets is not None and estimator.sets.sets_only
         readings = (joint_readings if alone else row_readings)(estimator, table.rows(usable))
@@ -223,7 +223,7 @@ def _group_estimates(
     groups = list(table.rows(usable).groups(by))
     readings = [joint_readings(estimator, rows) for _, rows in groups]
     estimates = [estimator.run(**inputs) for inputs in readings]
-    in_range = [int(estimator.inside(**inputs).sum()) for inputs in readings]
+    in_range = [int(estimator.rows_in_range(**inputs).sum()) for inputs in readings]
     estimate = _stack(estimates)
     position = {name: i for i, (name, _) in enumerate(groups)}
     answered = np.asarray([name in position for name in order])
@@ -248,7 +248,7 @@ def _group_estimates(
     for (name, rows), inside, one in zip(groups, in_range, estimates, strict=True):
         if not one.in_range:
             why = f"{len(rows) - inside} of {len(rows)} rows are out of range"
-            if inside >= LEAST_SOUND * len(rows):
+            if inside >= LEAST_SHARE_IN_RANGE * len(rows):
                 why = "no soil within the prior explains all its rows"
             notes.append(f"{by} {name}: {why}; the estimate is the prior")
     return columns, notes

@@ -164,7 +164,7 @@ def test_files_that_are_not_ours_are_refused(tmp_path, small_model):
     foreign = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)])
     foreign.ir_version = 9
     onnx.save(foreign, tmp_path / "foreign.onnx")
-    with pytest.raises(ModelFileError, match="none that soilml train wrote"):
+    with pytest.raises(ModelFileError, match="without soilml metadata"):
         Estimator.load(tmp_path / "foreign.onnx")
 
 
@@ -221,14 +221,14 @@ def test_the_probe_asks_for_a_row_out_of_range(estimator):
 
 
 def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small_model):
-    from soilml.onboard.model_file import checksum
+    from soilml.onboard.model_file import metadata_checksum
 
     model = onnx.load(small_model)
     metadata = {e.key: e.value for e in model.metadata_props}
     probe = json.loads(metadata["probe"])
     probe[0]["mean"][0][0] += 1.0
     metadata["probe"] = json.dumps(probe)
-    metadata["metadata_sha256"] = checksum(metadata)
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
     for entry in model.metadata_props:
         entry.value = metadata[entry.key]
     (tmp_path / "other.onnx").write_bytes(model.SerializeToString(deterministic=True))
@@ -237,7 +237,7 @@ def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small
 
 
 def test_damaged_metadata_is_refused(tmp_path, small_model):
-    from soilml.onboard.model_file import checksum
+    from soilml.onboard.model_file import metadata_checksum
 
     for key, value in {"outputs": "{", "together": "[]", "probe": "{}"}.items():
         model = onnx.load(small_model)
@@ -247,7 +247,7 @@ def test_damaged_metadata_is_refused(tmp_path, small_model):
         metadata = {e.key: e.value for e in model.metadata_props}
         for entry in model.metadata_props:
             if entry.key == "metadata_sha256":
-                entry.value = checksum(metadata)
+                entry.value = metadata_checksum(metadata)
         (tmp_path / "damaged.onnx").write_bytes(model.SerializeToString(deterministic=True))
         with pytest.raises(ModelFileError, match="metadata is damaged"):
             Estimator.load(tmp_path / "damaged.onnx")

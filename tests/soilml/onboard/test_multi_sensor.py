@@ -5,7 +5,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.multi_sensor import ACROSS_FILES, fused_estimates
+from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))
 
@@ -43,7 +43,7 @@ def rms(values):
 
 def test_the_prior_counts_once():
     truth, found = posteriors()
-    once = fused_estimates(found).estimate
+    once = fuse_estimates(found).estimate
     exact = (0.15**-2 + 0.1**-2 + 0.2**-2) ** -0.5
     np.testing.assert_allclose(once.std, exact, rtol=0.01)
     assert rms(once.mean[:, 0] - truth) == pytest.approx(exact, rel=0.02)
@@ -54,16 +54,16 @@ def test_the_prior_counts_once():
 def test_weighing_by_variance_counts_it_twice_and_is_too_sure():
     truth, found = posteriors()
     for rule in ("inverse-variance", "pairwise"):
-        twice = fused_estimates(found, rule).estimate
+        twice = fuse_estimates(found, rule).estimate
         assert rms((twice.mean[:, 0] - truth) / twice.std[:, 0]) > 1.15
         assert rms(twice.mean[:, 0] - truth) > rms(
-            fused_estimates(found).estimate.mean[:, 0] - truth
+            fuse_estimates(found).estimate.mean[:, 0] - truth
         )
 
 
 def test_where_readings_say_far_more_than_the_prior_the_rules_agree():
     found = [estimate(0.30, 0.002), estimate(0.305, 0.004)]
-    once, paper = (fused_estimates(found, r).estimate for r in ("prior-once", "inverse-variance"))
+    once, paper = (fuse_estimates(found, r).estimate for r in ("prior-once", "inverse-variance"))
     assert paper.mean[0] == pytest.approx(0.301)  # eq. 26: weight 0.8 and 0.2
     np.testing.assert_allclose(once.mean, paper.mean, atol=1e-5)
     np.testing.assert_allclose(once.std, paper.std, rtol=1e-3)
@@ -71,14 +71,14 @@ def test_where_readings_say_far_more_than_the_prior_the_rules_agree():
 
 def test_whatever_errors_have_in_common_covariance_intersection_is_not_too_sure():
     same = [estimate(0.4, 0.05)] * 2
-    assert fused_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
+    assert fuse_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("rule", ACROSS_FILES)
 def test_what_is_out_of_range_takes_no_part(rule):
     flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
     slips = np.full(4, 0.30)
-    both = fused_estimates(
+    both = fuse_estimates(
         [estimate(slips, 0.05, flags[0]), estimate(0.34 + 0 * slips, 0.05, flags[1])], rule
     )
     found = both.estimate
@@ -91,10 +91,10 @@ def test_what_is_out_of_range_takes_no_part(rule):
 
 
 def test_sensors_that_contradict_each_other_give_the_prior():
-    quarrel = fused_estimates([estimate(0.1, 0.02), estimate(0.5, 0.02)])
+    quarrel = fuse_estimates([estimate(0.1, 0.02), estimate(0.5, 0.02)])
     assert not quarrel.used.any() and not bool(quarrel.estimate.in_range)
     np.testing.assert_array_equal(quarrel.estimate.mean, PRIOR.mean)
-    assert bool(fused_estimates([estimate(0.1, 0.1), estimate(0.5, 0.1)]).estimate.in_range)
+    assert bool(fuse_estimates([estimate(0.1, 0.1), estimate(0.5, 0.1)]).estimate.in_range)
 
 
 def test_what_does_not_belong_together_is_refused():
@@ -103,11 +103,11 @@ def test_what_does_not_belong_together_is_refused():
     for others, said in (
         ([estimate(0.3, 0.1, names=("n",))], "another n: only estimates of the same"),
         ([estimate([0.3, 0.2], 0.1)], "have the shapes"),
-        ([estimate(0.3, 0.1, prior=wide)], "other priors of slip"),
+        ([estimate(0.3, 0.1, prior=wide)], "different priors of slip"),
     ):
         with pytest.raises(InputError, match=said):
-            fused_estimates([one, *others])
+            fuse_estimates([one, *others])
     with pytest.raises(InputError, match="rule is 'best-linear'"):
-        fused_estimates([one, one], "best-linear")
+        fuse_estimates([one, one], "best-linear")
     with pytest.raises(InputError, match="no estimate given"):
-        fused_estimates([])
+        fuse_estimates([])

@@ -9,7 +9,7 @@ import pytest
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.model_file import behind, checksum
+from soilml.onboard.model_file import metadata_checksum, serialise_metadata
 from soilml.onboard.set_posterior import MOST_SYSTEM_ROWS, Memory
 
 ANY = {
@@ -234,12 +234,12 @@ def changed(source, folder, change):
     model = onnx.load(source)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     change(metadata)
-    metadata["metadata_sha256"] = checksum(metadata)
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
     del model.metadata_props[:]
-    told = behind({e.key: e.value for e in onnx.load(source).metadata_props})
+    told = serialise_metadata({e.key: e.value for e in onnx.load(source).metadata_props})
     graph = source.read_bytes().removesuffix(told)
     path = folder / "changed.onnx"
-    path.write_bytes(graph + behind(metadata))
+    path.write_bytes(graph + serialise_metadata(metadata))
     return path
 
 

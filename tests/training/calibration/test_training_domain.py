@@ -33,24 +33,24 @@ def corners(slip, load):
 
 def test_rows_of_training_are_in_range_and_hardly_any_genuine_row_is_not(halves):
     first, second = halves
-    support = TrainingDomain.of(first.features, FEATURES)
-    assert support.holds(first.features).all()
-    assert support.holds(second.features).mean() > 0.99
+    domain = TrainingDomain.of(first.features, FEATURES)
+    assert domain.contains(first.features).all()
+    assert domain.contains(second.features).mean() > 0.99
 
 
 def test_torques_far_beyond_any_soil_are_out_of_range_everywhere(halves):
     """Thirty standard deviations of the noise, 2 %, beyond the ends of the prior."""
-    support = TrainingDomain.of(halves[0].features, FEATURES)
+    domain = TrainingDomain.of(halves[0].features, FEATURES)
     slip, load = (x.ravel() for x in np.meshgrid(np.linspace(0.06, 0.59, 20), [32, 60, 90, 118]))
     least, most = corners(slip, load)
     for torque, share in ((least / 1.6, 0.97), (least / 2.0, 1.0), (most * 1.6, 1.0)):
-        out = ~support.holds(np.stack([slip, torque / load, load], axis=1))
+        out = ~domain.contains(np.stack([slip, torque / load, load], axis=1))
         assert out.mean() >= share
     within = np.stack([slip, np.sqrt(least * most) / load, load], axis=1)
-    assert support.holds(within).all()
+    assert domain.contains(within).all()
 
 
 @pytest.mark.parametrize("names", [("slip", "torque/load"), ("torque/load", "load"), ("torque",)])
 def test_features_may_lack_slip_or_load(halves, names):
     features = halves[0].features[:, [FEATURES.index(n) if n in FEATURES else 1 for n in names]]
-    assert TrainingDomain.of(features, names).holds(features).all()
+    assert TrainingDomain.of(features, names).contains(features).all()

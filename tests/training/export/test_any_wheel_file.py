@@ -5,7 +5,7 @@ import pytest
 from datagen.recipe import packaged_file
 from soilml.cli import main
 from soilml.errors import InputError
-from training.export.any_wheel_file import is_for_any_wheel, read_any_spec
+from training.spec import is_any_wheel_spec, read_any_wheel_spec
 
 SPEC = packaged_file("any_wheel", "training", "specs").read_text()
 
@@ -17,8 +17,8 @@ def spec_of(folder, text):
 
 
 def test_the_packaged_spec_is_of_driving_wheels():
-    spec = read_any_spec("any_wheel")
-    assert is_for_any_wheel("any_wheel") and not is_for_any_wheel("fused")
+    spec = read_any_wheel_spec("any_wheel")
+    assert is_any_wheel_spec("any_wheel") and not is_any_wheel_spec("fused")
     assert spec.noise["torque"] == [0.0, 0.02]
     assert spec.family.ranges["slip"].lower > 0.0
 
@@ -27,12 +27,12 @@ def test_the_packaged_spec_is_of_driving_wheels():
 def test_a_range_that_is_missing_is_named(tmp_path, key):
     lines = [line for line in SPEC.splitlines() if not line.startswith(f"{key} =")]
     with pytest.raises(InputError, match=key):
-        read_any_spec(spec_of(tmp_path, "\n".join(lines)))
+        read_any_wheel_spec(spec_of(tmp_path, "\n".join(lines)))
 
 
 def test_a_key_that_nobody_reads_is_named(tmp_path):
     with pytest.raises(InputError, match="hiden"):
-        read_any_spec(spec_of(tmp_path, SPEC.replace("hidden", "hiden")))
+        read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("hidden", "hiden")))
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_key_that_nobody_reads_is_named(tmp_path):
 )
 def test_a_size_that_learns_nothing_is_refused(tmp_path, text, said):
     with pytest.raises(InputError, match=said):
-        read_any_spec(spec_of(tmp_path, SPEC.replace("designs = 60000", text)))
+        read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("designs = 60000", text)))
 
 
 def test_data_are_refused_where_rows_are_simulated(tmp_path, capsys):

@@ -10,9 +10,9 @@ from onnx.reference import ReferenceEvaluator
 
 from soilml import Estimator
 from soilml.numerics.estimate_fusion import RULES
-from soilml.onboard.features import computed
+from soilml.onboard.features import compute_features
 from training.data.dataset import read_dataset
-from training.export.model_file import export
+from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train
 
@@ -54,7 +54,7 @@ def specs():
 @pytest.mark.parametrize("text", list(specs()))
 def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows, text):
     original = trained(tmp_path, few_rows, text)
-    metadata = export(original, tmp_path / "m.onnx", few_rows)
+    metadata = export_model(original, tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
     rng = np.random.default_rng(0)
     readings = {
@@ -62,7 +62,7 @@ def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows,
         for entry in json.loads(metadata["inputs"])
     }
     found = estimator(**readings)
-    mean, std, inside = original.predict(computed(original.spec.features, readings))
+    mean, std, inside = original.predict(compute_features(original.spec.features, readings))
     same = found.in_range == inside
     assert same.mean() > 0.999
     assert 0.1 < inside.mean() < 1.0
@@ -73,7 +73,7 @@ def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows,
 
 def test_a_second_runtime_agrees(tmp_path, few_rows):
     members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
-    export(trained(tmp_path, few_rows, members), tmp_path / "m.onnx", few_rows)
+    export_model(trained(tmp_path, few_rows, members), tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
     reference = ReferenceEvaluator(str(tmp_path / "m.onnx"))
     rng = np.random.default_rng(1)
@@ -93,7 +93,7 @@ def test_same_spec_and_data_give_the_same_bytes(tmp_path, few_rows):
     members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
     digests = set()
     for name in ("a", "b"):
-        export(trained(tmp_path, few_rows, members), tmp_path / f"{name}.onnx", few_rows)
+        export_model(trained(tmp_path, few_rows, members), tmp_path / f"{name}.onnx", few_rows)
         digests.add(hashlib.sha256((tmp_path / f"{name}.onnx").read_bytes()).hexdigest())
     assert len(digests) == 1
 
@@ -110,7 +110,7 @@ def test_versions_are_pinned_where_old_runtimes_still_read_them(small_model):
 def test_other_inputs_can_be_learned_from(tmp_path, few_rows):
     text = 'features = ["slip", "torque/load", "load", "sinkage", "drawbar_pull/load"]\n'
     original = trained(tmp_path, few_rows, text + MEMBERS["fixed-size-lssvm"])
-    export(original, tmp_path / "m.onnx", few_rows)
+    export_model(original, tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
     assert estimator.inputs == ("slip", "torque", "load", "drawbar_pull", "sinkage")
     # drawbar pull and sinkage without noise determine far more than torque alone

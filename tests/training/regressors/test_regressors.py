@@ -8,9 +8,9 @@ from sklearn.utils.estimator_checks import check_estimator
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM, Factored
+from training.regressors.lssvm import LSSVM, KernelEigensystem
 from training.regressors.rbf_kernel import rbf
-from training.regressors.renyi_subset import entropy_selected
+from training.regressors.renyi_subset import select_by_renyi_entropy
 
 ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
 
@@ -23,7 +23,7 @@ def curve(count, seed=0, noise=0.1):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("machine", ALL, ids=lambda m: m.kind)
+@pytest.mark.parametrize("machine", ALL, ids=lambda m: m.type_name)
 def test_passes_the_checks_of_scikit_learn(machine):
     results = check_estimator(machine, on_fail="raise", on_skip=None)
     assert sum(r["status"] == "passed" for r in results) > 40
@@ -41,7 +41,7 @@ def bordered(x, y, gamma, width):
 
 def test_solution_is_that_of_the_bordered_system_for_all_outputs_at_once():
     x, y, _ = curve(60)
-    alpha, bias, _ = Factored.of(rbf(x, x, 0.8)).solved(y, 30.0)
+    alpha, bias, _ = KernelEigensystem.of(rbf(x, x, 0.8)).solve(y, 30.0)
     expected_alpha, expected_bias, _ = bordered(x, y, 30.0, 0.8)
     np.testing.assert_allclose(alpha, expected_alpha, rtol=1e-8, atol=1e-10)
     np.testing.assert_allclose(bias, expected_bias, rtol=1e-8)
@@ -51,7 +51,7 @@ def test_solution_is_that_of_the_bordered_system_for_all_outputs_at_once():
 @pytest.mark.parametrize("gamma", [0.1, 10.0, 1e4])
 def test_closed_form_leave_one_out_is_leaving_one_out(gamma):
     x, y, _ = curve(30)
-    residual = Factored.of(rbf(x, x, 0.8)).solved(y, gamma)[2]
+    residual = KernelEigensystem.of(rbf(x, x, 0.8)).solve(y, gamma)[2]
     for i in range(0, 30, 4):
         rest = np.arange(30) != i
         alpha, bias, _ = bordered(x[rest], y[rest], gamma, 0.8)
@@ -60,11 +60,11 @@ def test_closed_form_leave_one_out_is_leaving_one_out(gamma):
 
 
 def test_fixed_size_leave_one_out_is_leaving_one_out():
-    from training.regressors.fixed_size_lssvm import Primal
+    from training.regressors.fixed_size_lssvm import RidgeEigensystem
 
     x, y, _ = curve(40)
     features = rbf(x, x[:9], 1.0)
-    residual = Primal.of(features).leave_one_out(features, y, 3.0)
+    residual = RidgeEigensystem.of(features).leave_one_out(features, y, 3.0)
     for i in range(0, 40, 5):
         rest = np.arange(40) != i
         # ridge with a free bias by its normal equations
@@ -132,8 +132,8 @@ def test_training_stops_early_when_held_out_rows_get_worse():
 
 def test_selected_rows_spread_more_than_random_ones():
     x = np.random.default_rng(0).normal(size=(1500, 2))
-    chosen = entropy_selected(x, 40, 0.7, seed=0)
+    chosen = select_by_renyi_entropy(x, 40, 0.7, seed=0)
     random = np.random.default_rng(1).permutation(1500)[:40]
     assert len(np.unique(chosen)) == 40
     assert rbf(x[chosen], x[chosen], 0.7).sum() < 0.8 * rbf(x[random], x[random], 0.7).sum()
-    assert len(entropy_selected(x[:10], 40, 0.7, seed=0)) == 10
+    assert len(select_by_renyi_entropy(x[:10], 40, 0.7, seed=0)) == 10

@@ -19,9 +19,9 @@ from soilml.quantities import SHEAR
 from training.benchmark.designs import HASHED_DIGITS
 from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.set_unknowns import RankedPosterior
-from training.export.any_wheel_file import read_any_spec
 from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
+from training.spec import read_any_wheel_spec
 
 Progress = Callable[[str, int, int], None]
 
@@ -75,7 +75,7 @@ def families() -> dict[str, WheelFamily]:
     """Wheels and soils of the reference sets, by label."""
     return {
         ONE_WHEEL: RecipeFamily.of(read_recipe("wheel"), SHEAR),
-        ANY_WHEEL: read_any_spec("any_wheel").family,
+        ANY_WHEEL: read_any_wheel_spec("any_wheel").family,
     }
 
 

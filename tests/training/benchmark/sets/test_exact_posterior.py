@@ -11,9 +11,9 @@ from soilml.config.measurement_noise import Noise
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
 from training.benchmark.sets.exact_posterior import exact_set_posterior
-from training.export.any_wheel_file import read_any_spec
 from training.set_posterior.dimensionless_family import DimensionlessFamily
 from training.set_posterior.recipe_family import RecipeFamily
+from training.spec import read_any_wheel_spec
 
 STEPS = 36
 
@@ -71,7 +71,7 @@ def test_it_agrees_with_integration_on_a_grid(rows, noise, bias):
 
 
 def test_uncertain_bearing_is_marginalised():
-    family = read_any_spec("any_wheel").family
+    family = read_any_wheel_spec("any_wheel").family
     assert isinstance(family, DimensionlessFamily)
     sets = family.sets(300, 1, 9)
     o = sets.origin

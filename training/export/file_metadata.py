@@ -1,0 +1,114 @@
+"""The metadata of a model file trained from data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from datagen.recipe import parse_recipe
+from soilml import __version__
+from soilml.onboard.model_file import FORMAT, write_pooling
+from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from soilml.quantities import QUANTITIES, column
+from training.data.targets import PER_ROW
+from training.onnx_graph.builder import IR_VERSION, OPSET
+from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.metadata import figures_of, metadata_of
+from training.train import TrainedModel
+
+
+def file_metadata(
+    trained: TrainedModel,
+    probe: list[dict[str, Any]],
+    parity: float,
+    data_path: str | os.PathLike[str],
+) -> dict[str, str]:
+    """Metadata of a model file: what the runtime needs, provenance and metrics; values are JSON."""
+    spec, data = trained.spec, trained.data
+    recipe = data.recipe
+    inputs = [
+        {
+            "name": name,
+            "column": QUANTITIES[name].column,
+            "unit": QUANTITIES[name].unit,
+            "lower": float(values.min()),
+            "upper": float(values.max()),
+        }
+        for name, values in trained.parts.train.measured.items()
+    ]
+    outputs = [
+        {
+            "name": name,
+            "column": QUANTITIES[name].column,
+            "unit": QUANTITIES[name].unit,
+            "lower": float(data.lower[k]),
+            "upper": float(data.upper[k]),
+            "prior_mean": float(trained.prior.mean[k]),
+            "prior_std": float(trained.prior.std[k]),
+            **({"per_row": True} if name in PER_ROW else {}),
+        }
+        for k, name in enumerate(spec.targets)
+    ]
+    return {
+        "soilml_format": FORMAT,
+        "soilml_version": __version__,
+        "inputs": json.dumps(inputs),
+        "outputs": json.dumps(outputs),
+        "gear": json.dumps(json.loads(recipe).get("gear", {}), sort_keys=True),
+        "together": json.dumps(write_pooling(trained.pooling)),
+        "probe": json.dumps(probe),
+        **_set_metadata(trained.set_posterior, recipe),
+        "spec": spec.text,
+        "recipe": recipe,
+        "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
+        "data_sha256": hashlib.sha256(Path(data_path).read_bytes()).hexdigest(),
+        "metrics": json.dumps(
+            {
+                name: {
+                    "rmse": score.rmse.tolist(),
+                    "rmse_share_of_prior": score.relative.tolist(),
+                    "nll": score.nll.tolist(),
+                    "cover50": score.cover50.tolist(),
+                    "cover90": score.cover90.tolist(),
+                    "rows": score.rows,
+                }
+                for name, score in trained.scores.items()
+            }
+        ),
+        "metrics_of_posterior": json.dumps(figures_of(trained.set_figures)),
+        "metrics_of_sets": json.dumps(
+            {
+                label: {
+                    length: {
+                        "rmse_share_of_prior": score.relative.tolist(),
+                        "cover90": score.cover90.tolist(),
+                        "sets": score.rows,
+                    }
+                    for length, score in scores.items()
+                }
+                for label, scores in trained.pooled_scores.items()
+            }
+        ),
+        "parity": f"{parity:.3e}",
+        "opset": str(OPSET),
+        "ir_version": str(IR_VERSION),
+    }
+
+
+def _set_metadata(posterior: SetPosteriorGraph | None, recipe: str) -> dict[str, str]:
+    """The entry "set" of a set posterior, with the noise of the recipe as default."""
+    if posterior is None:
+        return {}
+    content = parse_recipe(recipe, "recipe of the data")
+    noise = {
+        name: [content.case.noise[column(name)].constant, content.case.noise[column(name)].share]
+        for name in RESPONSE_CHANNELS
+        if column(name) in content.case.noise
+    }
+    bias = content.bias.get(column("torque"))
+    if bias is not None:
+        noise["torque_bias"] = [bias.constant, bias.share]
+    return {"set": json.dumps(metadata_of(posterior, noise, alone=False))}
