@@ -1,4 +1,7 @@
-"""Train the released models again: `make models`. The same tree gives the same files."""
+"""Train the released models again: `make models`.
+
+The same tree on the same machine and library versions gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from soilml.cli import main
 HERE = Path(__file__).parent
 KLS1 = str(HERE.parent / "examples" / "kls1" / "recipe.toml")
 
-#: released name -> (recipe, spec)
+#: Recipe and spec of each released file that is trained from data.
 RELEASED = {
     "wheel": ("wheel", "fused"),
     "wheel_lssvm": ("wheel", "lssvm"),
@@ -22,7 +25,7 @@ RELEASED = {
 }
 
 
-#: released name -> spec that simulates its own rows
+#: Spec of each released file that is trained on simulated rows.
 SIMULATED = {"any_wheel": "any_wheel"}
 
 
@@ -35,14 +38,16 @@ def run() -> None:
             if not Path(data).exists():
                 steps.insert(0, ["generate", recipe, data])
             for step in steps:
-                print(f"\n$ soilml {shlex.join(step)}", flush=True)
-                if main(step) != 0:
-                    sys.exit(1)
+                _run_command(step)
     for name, spec in SIMULATED.items():
-        step = ["train", spec, str(HERE / f"{name}.onnx")]
-        print(f"\n$ soilml {shlex.join(step)}", flush=True)
-        if main(step) != 0:
-            sys.exit(1)
+        _run_command(["train", spec, str(HERE / f"{name}.onnx")])
+
+
+def _run_command(arguments: list[str]) -> None:
+    """Print and run a command; exit where it fails."""
+    print(f"\n$ soilml {shlex.join(arguments)}", flush=True)
+    if main(arguments) != 0:
+        sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The runtime on board: one ONNX file, numpy and onnxruntime alone."""
+"""The onboard runtime: estimates from one ONNX file, with numpy and onnxruntime only."""
 
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator

@@ -1,6 +1,6 @@
-"""What a trained model reads: measured quantities, and ratios of them.
+"""Inputs of a trained model: measured quantities, and ratios of them.
 
-Training and the onboard runtime both take their inputs from here, so that they cannot differ.
+Training and the onboard runtime share this module, so that their inputs are the same.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from soilml.quantities import QUANTITIES
 
 Floats = NDArray[np.float64]
 
-#: Quantities that a model may read, with the open interval in which a reading makes sense.
+#: Quantities that a model can read, with the open interval of possible readings.
 READABLE: dict[str, tuple[float, float]] = {
     "slip": (-1.0, 1.0),
     "torque": (-np.inf, np.inf),
@@ -28,7 +28,7 @@ READABLE: dict[str, tuple[float, float]] = {
 
 
 def numerator_denominator(feature: str) -> tuple[str, str | None]:
-    """(numerator, denominator) of `torque/load`; no denominator for `slip`."""
+    """Numerator and denominator of a feature: of `torque/load`, or of `slip`, which has none."""
     top, slash, bottom = feature.partition("/")
     for name in (top, bottom if slash else top):
         if name not in READABLE:
@@ -43,7 +43,7 @@ def inputs_of(features: Sequence[str]) -> tuple[str, ...]:
 
 
 def compute_features(features: Sequence[str], measured: Mapping[str, Floats]) -> Floats:
-    """The features (rows, d) of measured columns (rows,)."""
+    """Features (rows, d) from measured quantities (rows,)."""
     columns = []
     for feature in features:
         top, bottom = numerator_denominator(feature)
@@ -54,9 +54,9 @@ def compute_features(features: Sequence[str], measured: Mapping[str, Floats]) ->
 def flatten_readings(
     names: Sequence[str], measured: Mapping[str, Any]
 ) -> tuple[list[Floats], tuple[int, ...]]:
-    """The named quantities as flat arrays of one length, and the shape they had in common.
+    """The named quantities broadcast and flattened, and the shape they were broadcast to.
 
-    Raises `InputError` for one that is missing, not known, not finite or outside `READABLE`.
+    Raises `InputError` for one that is missing, unknown, not finite or outside `READABLE`.
     """
     for name in measured:
         if name not in names:

@@ -96,7 +96,9 @@ def _any_wheel(args: argparse.Namespace) -> int:
         posterior, figures = train_any_wheel(spec, progress)
         with atomic_outputs(outputs(args)[:2]) as (model, page):
             metadata = export_any_wheel(spec, posterior, figures, model)
-            page.write_text(any_wheel_card(metadata, posterior, figures), encoding="utf-8")
+            page.write_text(
+                any_wheel_card(metadata, posterior.family.inputs(), figures), encoding="utf-8"
+            )
     size = out.stat().st_size / 1e3
     print(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
     return 0

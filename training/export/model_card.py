@@ -13,8 +13,8 @@ from training.train import TrainedModel
 
 SINGLE_READING = (
     "A single reading is one equation for all these unknowns: the estimate is mostly the prior, "
-    "and its standard deviation is almost as large. Use several readings of one soil together "
-    "(`soilml estimate --by run`, `Estimator.run`)."
+    "and its standard deviation is not much smaller than the prior's. Use several readings of one "
+    "soil together (`soilml estimate --by run`, `Estimator.run`)."
 )
 PER_ROW = (
     "Slip differs between rows: each reading is estimated by itself. How much the estimate depends "
