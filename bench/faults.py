@@ -11,7 +11,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import suits
 from soilml.physics.operating_point import Operating
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -115,7 +114,7 @@ def effects(case: Case) -> list[Fault]:
     """Every effect that applies to this gear, at twice its reference size or at its bound."""
     found = []
     for name, cls in EFFECTS.items():
-        if not suits(cls, case.model.gear) or name == "torque-offset":
+        if not cls.applies_to(case.model.gear) or name == "torque-offset":
             continue
         size = dict(cls.about.reference)
         bound = declared(cls)[cls.about.size]

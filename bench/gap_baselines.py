@@ -13,14 +13,13 @@ from soilml.gap.statistics.signatures import signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import suits
 from soilml.quantities import CHANNELS, column
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     """The effect that each baseline names, '' where it sees no gap."""
     cells = cells_of(case, table)
-    effects = {name: e for name, e in EFFECTS.items() if suits(e, case.model.gear)}
+    effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
     known, _ = signatures(soil_only, cells, effects)
     y = predicted(soil_only, [], np.zeros((1, 0)), cells)[0]
     r = (cells.reading - y) / cells.std

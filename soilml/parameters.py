@@ -33,16 +33,20 @@ class Parameter:
     text: str = ""
 
 
-@cache
 def declared(cls: type) -> dict[str, Parameter]:
     """The parameters that a dataclass declares, by field name, in order."""
+    return _declared(cls)
+
+
+@cache
+def _declared(cls: type) -> dict[str, Parameter]:
     hints = get_type_hints(cls, include_extras=True)
-    found = {}
+    parameters = {}
     for field in fields(cls):
         for mark in getattr(hints[field.name], "__metadata__", ()):
             if isinstance(mark, Parameter):
-                found[field.name] = mark
-    return found
+                parameters[field.name] = mark
+    return parameters
 
 
 def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:

@@ -30,7 +30,6 @@ from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.physics.effects.base import suits
 from soilml.quantities import SHEAR, column
 
 
@@ -54,7 +53,7 @@ def gap(
     Raises `InputError` and `TableError` for names, columns and rows that make no sense; data that
     cannot be analysed give a report of status `bad-data`.
     """
-    effects = {name: e for name, e in effects.items() if suits(e, case.model.gear)}
+    effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
     check_wheel_size(case, table)
     answered = table.answered
     if not answered.any():

@@ -13,7 +13,7 @@ from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameters
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Channel, Observations
-from soilml.physics.effects.base import through
+from soilml.physics.effects.base import apply_stage
 from soilml.physics.equilibrium import prepared
 from soilml.physics.gears import LinearWheel
 from soilml.physics.load_case import LoadCase
@@ -105,11 +105,11 @@ def _line(
     case: Case, slip: Floats, load: Floats, T: Floats, z: Floats, cohesion: float
 ) -> tuple[Floats, Floats]:
     """Rows of the system matrix (n, 2) @ (c, tan phi) = right-hand side (n,), all in Pa."""
-    gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)  # type: ignore[attr-defined]
+    gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)
     effects = case.model.effects
     scene = prepared(LoadCase(gear, case.soil, Operating(slip=slip, load=load), effects))
     shape = gear.shape(z, scene.soil, scene.at)
-    contact = gear.contact(through(effects, "on_contact", shape, scene), scene.at)
+    contact = gear.contact(apply_stage(effects, "on_contact", shape, scene), scene.at)
     mobilised = -np.expm1(-np.abs(contact.sheared) / case.soil.shear_modulus)
     m0, m1 = mobilised  # at exit and at maximum stress
     scale = contact.lever * contact.area[1]
@@ -134,7 +134,7 @@ def _said(case: Case, free: Sequence[FreeParameter], solution: Floats, load: Flo
         for f in free
         if f.path not in ("cohesion", "friction_angle", "shear_modulus")
     ]
-    if any(hasattr(effect, "on_stress") for effect in case.model.effects):
+    if any(effect.overrides("on_stress") for effect in case.model.effects):
         said.append("the linear method leaves out effects on the stress")
     if solution[0] < 0 or solution[1] < 0:
         said.append("the straight line gives a negative value: outside what soil can be")

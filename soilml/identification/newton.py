@@ -37,7 +37,7 @@ def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     three, it runs away, which is reported as an error.
     """
     gear = case.model.gear
-    closed = LinearWheel(radius=gear.radius, width=gear.width)  # type: ignore[attr-defined]
+    closed = LinearWheel(radius=gear.radius, width=gear.width)
     case = replace(case, model=replace(case.model, gear=closed))
     if data.cells < 3:
         raise FitError(f"{data.cells} readings: the Newton-Raphson method needs three or more")

@@ -11,7 +11,7 @@ from soilml.arrays import Array, namespace, tracked, untracked
 from soilml.numerics.root_finding import crossing, scan
 from soilml.parameters import values
 from soilml.physics.contact import Force, Stress, integrate, stress
-from soilml.physics.effects.base import through
+from soilml.physics.effects.base import apply_stage
 from soilml.physics.load_case import LoadCase, rows
 from soilml.row_status import Status
 
@@ -29,13 +29,13 @@ LOOKS, DEEPEST_LOOK, NEARLY, GENTLE = 12, 0.9, 0.95, 0.4
 SHALLOWEST = 1e-14
 
 
-def loaded(scene: LoadCase, sinkage: Array, *, rough: bool = False) -> Force:
+def loaded(load_case: LoadCase, sinkage: Array, *, rough: bool = False) -> Force:
     """Forces on a gear that stands this deep (m) in the soil, whatever load that carries."""
     xp = namespace(sinkage)
-    soil = scene.soil
-    shape, stresses = stressed(scene, sinkage, rough=rough)
+    soil = load_case.soil
+    shape, stresses = stressed(load_case, sinkage, rough=rough)
     load, pull, torque = integrate(stresses)
-    flaw = scene.gear.flaw(shape)
+    flaw = load_case.gear.flaw(shape)
     bearing = soil.kc / stresses.contact.width + soil.kphi + 0.0 * load
     status = xp.where((flaw == 0) & ~(bearing > 0), flaw + int(Status.NO_BEARING), flaw)
     force = Force(
@@ -46,69 +46,76 @@ def loaded(scene: LoadCase, sinkage: Array, *, rough: bool = False) -> Force:
         entry_angle=shape.entry,
         status=status,
     )
-    return through(scene.effects, "on_force", force, scene)
+    return apply_stage(load_case.effects, "on_force", force, load_case)
 
 
-def stressed(scene: LoadCase, sinkage: Array, *, rough: bool = False) -> tuple[Any, Stress]:
+def stressed(load_case: LoadCase, sinkage: Array, *, rough: bool = False) -> tuple[Any, Stress]:
     """The gear's shape this deep (m) in the soil, and the stresses on it."""
-    gear, soil, at, effects = scene.gear, scene.soil, scene.at, scene.effects
-    shape = through(effects, "on_contact", gear.shape(sinkage, soil, at), scene)
+    gear, soil, at, effects = load_case.gear, load_case.soil, load_case.at, load_case.effects
+    shape = apply_stage(effects, "on_contact", gear.shape(sinkage, soil, at), load_case)
     contact = gear.rough(shape, at) if rough else gear.contact(shape, at)
-    return shape, through(effects, "on_stress", stress(contact, soil, at), scene)
+    return shape, apply_stage(effects, "on_stress", stress(contact, soil, at), load_case)
 
 
-def settled(scene: LoadCase) -> Force:
+def settled(load_case: LoadCase) -> Force:
     """What the sensors report of a gear at rest in the soil; arrays (batch,)."""
-    force = at_rest(scene)
-    return _blanked(through(scene.effects, "on_reading", force, prepared(scene)))
+    force = at_rest(load_case)
+    return _blanked(apply_stage(load_case.effects, "on_reading", force, prepared(load_case)))
 
 
-def at_rest(scene: LoadCase) -> Force:
+def at_rest(load_case: LoadCase) -> Force:
     """Forces at the first sinkage at which the soil carries the load; arrays (batch,)."""
-    scene = prepared(scene)
-    leaves = list(values(scene).values())
+    load_case = prepared(load_case)
+    leaves = list(values(load_case).values())
     with untracked(leaves):
-        force = _carried(scene)
+        force = _carried(load_case)
     if tracked(leaves):
-        force = _differentiable(scene, force)
+        force = _differentiable(load_case, force)
     return _blanked(force)
 
 
-def prepared(scene: LoadCase) -> LoadCase:
-    """The scene as it truly is: slip and load without sensor errors, the soil as it is met."""
-    scene = replace(scene, at=through(scene.effects, "on_operating", scene.at, scene))
-    return replace(scene, soil=through(scene.effects, "on_soil", scene.soil, scene))
-
-
-def stresses_along(scene: LoadCase, sinkage: Array, points: int) -> tuple[Array, Stress]:
-    """Angles and stresses (points, batch) on a gear that stands this deep (m) in the soil."""
-    scene = prepared(scene)
-    shape = through(
-        scene.effects, "on_contact", scene.gear.shape(sinkage, scene.soil, scene.at), scene
+def prepared(load_case: LoadCase) -> LoadCase:
+    """The load_case as it truly is: slip and load without sensor errors, the soil as it is met."""
+    load_case = replace(
+        load_case, at=apply_stage(load_case.effects, "on_operating", load_case.at, load_case)
     )
-    angle, contact = scene.gear.stations(shape, scene.at, points)
-    found = stress(contact, scene.soil, scene.at)
-    return angle, through(scene.effects, "on_stress", found, scene)
+    return replace(
+        load_case, soil=apply_stage(load_case.effects, "on_soil", load_case.soil, load_case)
+    )
 
 
-def _carried(scene: LoadCase) -> Force:
+def stresses_along(load_case: LoadCase, sinkage: Array, points: int) -> tuple[Array, Stress]:
+    """Angles and stresses (points, batch) on a gear that stands this deep (m) in the soil."""
+    load_case = prepared(load_case)
+    shape = apply_stage(
+        load_case.effects,
+        "on_contact",
+        load_case.gear.shape(sinkage, load_case.soil, load_case.at),
+        load_case,
+    )
+    angle, contact = load_case.gear.stations(shape, load_case.at, points)
+    found = stress(contact, load_case.soil, load_case.at)
+    return angle, apply_stage(load_case.effects, "on_stress", found, load_case)
+
+
+def _carried(load_case: LoadCase) -> Force:
     """Forces at equilibrium, of every row: directly where that works, by search where not."""
-    xp = namespace(scene.at.load)
-    soil, at, gear = scene.soil, scene.at, scene.gear
+    xp = namespace(load_case.at.load)
+    soil, at, gear = load_case.soil, load_case.at, load_case.gear
     deepest = xp.log(gear.deepest() + 0.0 * at.load)
     guess = xp.log(gear.guess(soil, at))
     guess = xp.where(guess < deepest - 0.1, guess, deepest - 0.1)
     found, force, slope = _balanced(
-        scene, deepest + math.log(SHALLOWEST), deepest, guess, soil.n + 0.5 + 0.0 * at.load
+        load_case, deepest + math.log(SHALLOWEST), deepest, guess, soil.n + 0.5 + 0.0 * at.load
     )
-    found = found & ~_reached_before(scene, force, slope)
+    found = found & ~_reached_before(load_case, force, slope)
     if not bool(xp.all(found)):
         index = xp.nonzero(~found)[0]
-        force = _with_rows(force, found, _searched(rows(scene, index)))
+        force = _with_rows(force, found, _searched(rows(load_case, index)))
     return force
 
 
-def _reached_before(scene: LoadCase, force: Force, slope: Array) -> Array:
+def _reached_before(load_case: LoadCase, force: Force, slope: Array) -> Array:
     """Rows that may carry the load at a smaller sinkage already, as a few points tell.
 
     A driving wheel's shear lifts it everywhere in front of the axle, and its load only rises. A
@@ -116,30 +123,32 @@ def _reached_before(scene: LoadCase, force: Force, slope: Array) -> Array:
     load would be reached earlier, but hardly so where it is small.
     """
     xp = namespace(slope)
-    if not scene.effects and not bool(xp.any(scene.at.slip < 0)):
+    if not load_case.effects and not bool(xp.any(load_case.at.slip < 0)):
         return xp.zeros_like(slope, dtype=xp.bool)
-    _, stresses = stressed(scene, force.sinkage, rough=True)
+    _, stresses = stressed(load_case, force.sinkage, rough=True)
     lift = stresses.shear * stresses.contact.ahead
     down = xp.sum(xp.maximum(-lift, xp.zeros_like(lift)), axis=0)
-    doubted = down > SMALL * scene.at.load
-    if any(hasattr(effect, "on_stress") for effect in scene.effects):
+    doubted = down > SMALL * load_case.at.load
+    if any(effect.overrides("on_stress") for effect in load_case.effects):
         doubted = xp.ones_like(doubted)
-    if any(hasattr(effect, "on_force") for effect in scene.effects):
+    if any(effect.overrides("on_force") for effect in load_case.effects):
         own = integrate(stresses)[0]
-        doubted = doubted | (loaded(scene, force.sinkage, rough=True).load != own)
+        doubted = doubted | (loaded(load_case, force.sinkage, rough=True).load != own)
     index = xp.nonzero(doubted)[0]
     if index.shape[0] == 0:
         return slope < GENTLE
     shares = [DEEPEST_LOOK * ((i + 1) / LOOKS) ** 2 for i in range(LOOKS)]
     sinkage = xp.concat([force.sinkage[index] * share for share in shares], axis=0)
-    look = loaded(rows(scene, xp.concat([index] * LOOKS, axis=0)), sinkage, rough=True)
+    look = loaded(rows(load_case, xp.concat([index] * LOOKS, axis=0)), sinkage, rough=True)
     most = xp.max(xp.reshape(look.load, (LOOKS, index.shape[0])), axis=0)
     place = xp.clip(xp.cumulative_sum(xp.astype(doubted, xp.int64)) - 1, 0, None)
-    reached = xp.take(xp.concat([most, xp.zeros_like(slope[:1])]), place) > NEARLY * scene.at.load
+    reached = (
+        xp.take(xp.concat([most, xp.zeros_like(slope[:1])]), place) > NEARLY * load_case.at.load
+    )
     return (slope < GENTLE) | (doubted & reached)
 
 
-def _differentiable(scene: LoadCase, force: Force) -> Force:
+def _differentiable(load_case: LoadCase, force: Force) -> Force:
     r"""The same forces, with their gradients through the equilibrium.
 
     .. math:: z(p) = z^* - \frac{W(z^*; p) - W}{\partial W / \partial z}
@@ -148,48 +157,48 @@ def _differentiable(scene: LoadCase, force: Force) -> Force:
     implicit function theorem. Rows without equilibrium have none.
     """
     xp = namespace(force.sinkage)
-    with untracked(values(scene).values()):
+    with untracked(values(load_case).values()):
         z, h = force.sinkage, 1e-5
-        above, below = loaded(scene, z * (1.0 + h)).load, loaded(scene, z * (1.0 - h)).load
+        above, below = loaded(load_case, z * (1.0 + h)).load, loaded(load_case, z * (1.0 - h)).load
         steepness = (above - below) / (2.0 * h * z)
-    excess = loaded(scene, z).load - scene.at.load
+    excess = loaded(load_case, z).load - load_case.at.load
     answered = force.status == 0
     step = xp.where(answered, excess / steepness, xp.zeros_like(z))
-    return replace(loaded(scene, z - step), status=force.status)
+    return replace(loaded(load_case, z - step), status=force.status)
 
 
 def _balanced(
-    scene: LoadCase, low: Array, high: Array, guess: Array, steepness: Array
+    load_case: LoadCase, low: Array, high: Array, guess: Array, steepness: Array
 ) -> tuple[Array, Force, Array]:
     """Which rows have an equilibrium between two logs of sinkage, the forces, the slope there."""
     xp = namespace(guess)
-    excess = _excess(scene)
+    excess = _excess(load_case)
     root = crossing(excess, low, high, guess, steepness)
-    force = loaded(scene, xp.exp(root.x))
-    balanced = xp.abs(force.load / scene.at.load - 1.0) < BALANCE
+    force = loaded(load_case, xp.exp(root.x))
+    balanced = xp.abs(force.load / load_case.at.load - 1.0) < BALANCE
     return root.found & balanced & (root.slope > 0), force, root.slope
 
 
-def _excess(scene: LoadCase) -> Callable[[Array], Array]:
+def _excess(load_case: LoadCase) -> Callable[[Array], Array]:
     """Log of the load carried over the load, by log of sinkage; flat where far too little is."""
-    xp = namespace(scene.at.load)
+    xp = namespace(load_case.at.load)
 
     def excess(log_sinkage: Array) -> Array:
-        ratio = loaded(scene, xp.exp(log_sinkage)).load / scene.at.load
+        ratio = loaded(load_case, xp.exp(log_sinkage)).load / load_case.at.load
         return xp.log(xp.maximum(ratio, xp.full_like(ratio, 1e-3)))
 
     return excess
 
 
-def _searched(scene: LoadCase) -> Force:
+def _searched(load_case: LoadCase) -> Force:
     """Rows where the load is not reached directly, or is reached on the way down from a peak.
 
     Under a braking wheel, or with an effect that lifts or unloads, the load carried need not rise
     with sinkage: the wheel comes to rest where it first reaches the load.
     """
-    xp = namespace(scene.at.load)
-    deepest = xp.log(scene.gear.deepest() + 0.0 * scene.at.load)
-    excess = _excess(scene)
+    xp = namespace(load_case.at.load)
+    deepest = xp.log(load_case.gear.deepest() + 0.0 * load_case.at.load)
+    excess = _excess(load_case)
     steps = [3.0 * math.log((i + 1) / SCAN_POINTS) for i in range(SCAN_POINTS)]
     grid = xp.stack([deepest + step for step in [math.log(SHALLOWEST), *steps]], axis=0)
     low, high, exists, peak = scan(excess, grid)
@@ -204,8 +213,8 @@ def _searched(scene: LoadCase) -> Force:
         exists = exists | near
     top = xp.take_along_axis(grid, peak[None, :], axis=0)[0, :]
     low, high = xp.where(exists, low, top - 1e-3), xp.where(exists, high, top)
-    found, force, _ = _balanced(scene, low, high, 0.5 * (low + high), 1.0 / (high - low))
-    at_top = loaded(scene, xp.exp(top))
+    found, force, _ = _balanced(load_case, low, high, 0.5 * (low + high), 1.0 / (high - low))
+    at_top = loaded(load_case, xp.exp(top))
     status = xp.where(exists, int(Status.NOT_CONVERGED) + 0 * force.status, force.status)
     status = xp.where(exists, status, int(Status.TOO_HEAVY) + 0 * force.status)
     status = xp.where(force.status != 0, force.status, xp.where(found, 0 * status, status))

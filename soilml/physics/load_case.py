@@ -25,9 +25,11 @@ class LoadCase:
     effects: tuple[Any, ...] = ()
 
 
-def rows(scene: LoadCase, index: Array) -> LoadCase:
-    """The rows `index` of a scene; a parameter shared by all rows stays as it is."""
+def rows(load_case: LoadCase, index: Array) -> LoadCase:
+    """The rows `index` of a load_case; a parameter shared by all rows stays as it is."""
     taken = {
-        path: value[index] for path, value in values(scene).items() if getattr(value, "ndim", 0) > 0
+        path: value[index]
+        for path, value in values(load_case).items()
+        if getattr(value, "ndim", 0) > 0
     }
-    return with_values(scene, taken)
+    return with_values(load_case, taken)

@@ -13,8 +13,9 @@ from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import check, values, with_values
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import Effect, suits, through
+from soilml.physics.effects.base import Effect, apply_stage
 from soilml.physics.equilibrium import at_rest, settled, stresses_along
+from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
 from soilml.physics.operating_point import Operating
@@ -36,12 +37,23 @@ class Model:
     gear: Gear
     effects: tuple[Effect, ...] = ()
 
+    def __post_init__(self) -> None:
+        for effect in self.effects:
+            if not isinstance(effect, Effect):
+                raise InputError(
+                    f"{type(effect).__name__} is not an effect; derive it from "
+                    "soilml.physics.effects.Effect"
+                )
+
     def __add__(self, effect: Effect) -> Model:
         if any(effect.name == other.name for other in self.effects):
             raise InputError(f"the model has the effect {effect.name!r} already")
-        if not suits(effect, self.gear):
-            kind = "tracks" if effect.about.track else "rigid wheels"
-            raise InputError(f"the effect {effect.name} is one of {kind}, not of {self.gear.name}")
+        if not effect.applies_to(self.gear):
+            meant = [gear.name for gear in GEARS.values() if issubclass(gear, effect.gear_types)]
+            raise InputError(
+                f"the effect {effect.name} does not apply to the gear {self.gear.name!r}; "
+                f"it applies to: {', '.join(meant)}"
+            )
         return replace(self, effects=(*self.effects, effect))
 
     def __call__(self, soil: Soil, at: Operating) -> Force:
@@ -51,10 +63,10 @@ class Model:
         `InputError` for a value outside its bounds; a row without equilibrium is NaN with its
         reason in `status`.
         """
-        scene, shape = self._scene(soil, at)
-        xp = namespace(scene.at.slip)
+        load_case, shape = self._load_case(soil, at)
+        xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = _in_chunks(scene, settled)
+            force = _in_chunks(load_case, settled)
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
@@ -62,15 +74,15 @@ class Model:
 
         NaN in rows without equilibrium. Raises `InputError` as a call does.
         """
-        scene, shape = self._scene(soil, at)
-        xp = namespace(scene.at.slip)
+        load_case, shape = self._load_case(soil, at)
+        xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):
-            sinkage = _in_chunks(scene, at_rest).sinkage  # not what a sensor makes of it
-            angle, stresses = stresses_along(scene, sinkage, points)
+            sinkage = _in_chunks(load_case, at_rest).sinkage  # not what a sensor makes of it
+            angle, stresses = stresses_along(load_case, sinkage, points)
         parts = (angle, stresses.normal, stresses.shear)
         return Profile(*(xp.reshape(part, (part.shape[0], *shape)) for part in parts))
 
-    def _scene(self, soil: Soil, at: Operating) -> tuple[LoadCase, tuple[int, ...]]:
+    def _load_case(self, soil: Soil, at: Operating) -> tuple[LoadCase, tuple[int, ...]]:
         check(at)
         check(soil, "soil ")
         check(self)
@@ -86,9 +98,9 @@ class Profile:
     shear: Array
 
 
-def flattened(scene: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
-    """The scene with all arrays of shape (batch,), those shared by all rows (), and the shape."""
-    given = values(scene)
+def flattened(load_case: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
+    """The load case as float64 arrays: (batch,), or () where shared by all rows; and the shape."""
+    given = values(load_case)
     xp = namespace(*given.values())
     device = next((v.device for v in given.values() if hasattr(v, "device")), None)
     arrays = {k: _float64(v, xp, device) for k, v in given.items()}
@@ -97,7 +109,7 @@ def flattened(scene: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
     for path, array in arrays.items():
         if array.ndim > 0 or path.startswith("at."):
             arrays[path] = xp.reshape(xp.broadcast_to(array, shape), (size,))
-    return with_values(scene, arrays), shape
+    return with_values(load_case, arrays), shape
 
 
 def _float64(value: Real, xp: Any, device: Any) -> Array:
@@ -107,20 +119,22 @@ def _float64(value: Real, xp: Any, device: Any) -> Array:
     return xp.asarray(value, dtype=xp.float64, device=device)
 
 
-def _in_chunks(scene: LoadCase, solve: Callable[[LoadCase], Force]) -> Force:
+def _in_chunks(load_case: LoadCase, solve: Callable[[LoadCase], Force]) -> Force:
     """Rows that truly drive and rows that brake apart: they are cut into different points."""
-    xp = namespace(scene.at.slip)
-    braking = through(scene.effects, "on_operating", scene.at, scene).slip < 0
+    xp = namespace(load_case.at.slip)
+    braking = apply_stage(load_case.effects, "on_operating", load_case.at, load_case).slip < 0
     size = braking.shape[0]
     parts, order = [], []
     for group in (xp.nonzero(~braking)[0], xp.nonzero(braking)[0]):
         for start in range(0, group.shape[0], CHUNK):
             index = group[start : min(start + CHUNK, group.shape[0])]
             whole = index.shape[0] == size
-            parts.append(solve(scene if whole else rows(scene, index)))
+            parts.append(solve(load_case if whole else rows(load_case, index)))
             order.append(index)
     if not parts:
-        nothing: dict[str, Array] = {f.name: xp.zeros_like(scene.at.slip) for f in fields(Force)}
+        nothing: dict[str, Array] = {
+            f.name: xp.zeros_like(load_case.at.slip) for f in fields(Force)
+        }
         return Force(**nothing | {"status": xp.astype(nothing["status"], xp.int64)})
     if len(parts) == 1:
         return parts[0]

@@ -32,15 +32,15 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
     check(at)
     check(soil, "soil ")
     check(model)
-    scene, shape = flattened(LoadCase(model.gear, soil, at, model.effects))
-    xp = namespace(scene.at.slip)
-    if not bool(xp.all(scene.at.slip > 0)):
+    load_case, shape = flattened(LoadCase(model.gear, soil, at, model.effects))
+    xp = namespace(load_case.at.slip)
+    if not bool(xp.all(load_case.at.slip > 0)):
         raise InputError(
-            f"slip is {float(xp.min(scene.at.slip)):g}; pull efficiency needs slip above 0"
+            f"slip is {float(xp.min(load_case.at.slip)):g}; pull efficiency needs slip above 0"
         )
     with np.errstate(all="ignore"):
-        force = at_rest(scene)
-        _, stresses = stressed(prepared(scene), force.sinkage)
+        force = at_rest(load_case)
+        _, stresses = stressed(prepared(load_case), force.sinkage)
     thrust = xp.sum(stresses.shear * stresses.contact.up, axis=0)
     return xp.reshape(force.drawbar_pull / thrust, shape)
 

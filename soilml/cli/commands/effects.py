@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     if args.name not in effects:
         raise InputError(f"no effect {args.name!r}; there are: {', '.join(effects)}")
     cls = effects[args.name]
-    acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if hasattr(cls, stage))
+    acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if cls.overrides(stage))
     neutral = cls()
     rows = [
         (name, p.text, f"{getattr(neutral, name):g}", f"{p.lower:g} .. {p.upper:g}", p.unit)

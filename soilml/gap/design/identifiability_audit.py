@@ -21,7 +21,6 @@ from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.physics.effects.base import suits
 from soilml.quantities import CHANNELS, SHEAR, column
 from soilml.row_status import Status
 
@@ -100,7 +99,7 @@ def audit(
     Channels are those whose noise is declared. Raises `InputError` where none is, or where the
     model carries a load of the design nowhere.
     """
-    effects = {name: e for name, e in effects.items() if suits(e, case.model.gear)}
+    effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
     cells = planned(case, design.rows(design.answered))
     wanted = select_free(case, free if free is not None or case.prior else SHEAR)
     axes = [soil_axis(f) for f in wanted if "." not in f.path]

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from soilml.arrays import Array
 from soilml.errors import InputError
-from soilml.physics.gears.rigid_wheel import RigidWheel
-from soilml.physics.gears.track import Track
-from soilml.physics.operating_point import COVARIATES
+from soilml.physics.contact import Force, Stress
+from soilml.physics.gears.base import Gear
+from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.physics.soils.soil import Soil
+
+if TYPE_CHECKING:
+    from soilml.physics.load_case import LoadCase
 
 T = TypeVar("T")
 
@@ -18,54 +24,42 @@ T = TypeVar("T")
 STAGES = {
     "on_operating": "Operating: what the slip and load sensors report -> what the gear does",
     "on_soil": "Soil: the soil as it is at this slip, speed or pass",
-    "on_contact": "the gear's shape in the soil (for wheels a WheelArc)",
+    "on_contact": "the geometry of the gear in the soil (for wheels a WheelArc)",
     "on_stress": "Stress at the points of the contact, which it carries",
     "on_force": "Force at any sinkage, inside the search for equilibrium",
     "on_reading": "Force at equilibrium -> what the sensors report",
 }
 
-#: Where the cause of an effect may sit.
+#: Where the cause of an effect may lie.
 KINDS = ("soil", "wheel", "rig", "sensor")
-
-
-@runtime_checkable
-class Effect(Protocol):
-    """A named pure function of one stage of a model, or of several.
-
-    An effect is a frozen dataclass of its parameters. It acts through the methods it has, any of
-    `STAGES`, each `(value, scene) -> value`. With its parameters at their defaults it changes
-    nothing, to the last bit.
-    """
-
-    name: ClassVar[str]
-    about: ClassVar[EffectCard]
 
 
 @dataclass(frozen=True)
 class EffectCard:
-    """What a user should know of an effect before adding it."""
+    """What a user should know of an effect before adding it to a model."""
 
     text: str
     source: str
-    #: where the cause sits, one of `KINDS`
+    #: where the cause lies, one of `KINDS`
     kind: str
     #: its size and a value of it that matters on a small rover; the first parameter named here is
     #: the one that a search for missing effects fits
     reference: dict[str, float]
     #: sign of the change that the reference size makes, channel -> -1 or +1, driving at slip > 0.1
     signs: dict[str, int]
-    #: runs that would tell it from others
+    #: runs that would distinguish it from other effects
     isolate: str
-    #: it changes the arc of a rigid wheel, or needs its radius: for no other gear
+    #: for classes that do not derive from `Effect`, which declare `gear_types` instead: the effect
+    #: applies to rigid wheels only
     wheel: bool = False
-    #: it sits on the belt of a track: for no other gear
+    #: likewise: the effect applies to tracks only
     track: bool = False
-    #: fields of `Operating` that must be given, and must vary for the effect to be found
+    #: fields of `Operating` that must be given, and must vary for the effect to be identifiable
     needs: tuple[str, ...] = ()
-    #: what the runs of one model cannot vary, and a search for missing effects thus cannot test
+    #: what the runs of one model cannot vary, so that a search for missing effects cannot test it
     varied: str = ""
-    #: for sensors and rigs: how large the fault may be in a setup that was checked, one standard
-    #: deviation, in the unit of its size; None where nothing is known
+    #: for sensors and rigs: standard deviation of the fault that remains in a checked setup, in the
+    #: unit of the effect's size; None where it is unknown
     calibration: float | None = None
 
     @property
@@ -74,27 +68,127 @@ class EffectCard:
         return next(iter(self.reference))
 
 
-def suits(effect: Any, gear: Any) -> bool:
-    """Whether an effect, or its class, means something for this gear."""
-    about = getattr(effect, "about", None)
-    if about is None:
-        return True
-    rigid, track = isinstance(gear, RigidWheel), isinstance(gear, Track)
-    return (rigid or not about.wheel) and (track or not about.track)
+@dataclass(frozen=True)
+class Effect:
+    """A named pure function of one stage of a model, or of several.
+
+    An effect is a frozen dataclass of its parameters that derives from this class and overrides
+    the stages that it acts at; the others pass their value on unchanged. With its parameters at
+    their defaults an effect changes nothing, to the last bit.
+
+    Raises
+    ------
+    InputError
+        When a subclass is defined with a public method that begins with ``on_`` and is not one of
+        `STAGES`, or with `EffectCard.wheel` or `EffectCard.track` in place of `gear_types`.
+
+    Examples
+    --------
+    A sensor that reads 2 mm too deep:
+
+    >>> from dataclasses import dataclass, replace
+    >>> from typing import Annotated, ClassVar
+    >>> from soilml.arrays import Real
+    >>> from soilml.parameters import Parameter
+    >>> from soilml.physics.contact import Force
+    >>> from soilml.physics.effects import Effect, EffectCard
+    >>> @dataclass(frozen=True, kw_only=True)
+    ... class Zero(Effect):
+    ...     name: ClassVar[str] = "zero"
+    ...     about: ClassVar[EffectCard] = EffectCard(
+    ...         text="the zero of the sinkage sensor is off",
+    ...         source="linear sensor error",
+    ...         kind="sensor",
+    ...         reference={"offset": 0.002},
+    ...         signs={"sinkage": +1},
+    ...         isolate="the wheel on a plate",
+    ...     )
+    ...     offset: Annotated[Real, Parameter("m", -0.05, 0.05)] = 0.0
+    ...
+    ...     def on_reading(self, force, load_case):
+    ...         return replace(force, sinkage=force.sinkage + self.offset)
+    >>> Zero(offset=0.002).overrides("on_reading"), Zero.overrides("on_force")
+    (True, False)
+    """
+
+    name: ClassVar[str]
+    about: ClassVar[EffectCard]
+    #: the gear classes that the effect applies to; any gear where empty
+    gear_types: ClassVar[tuple[type, ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if fault := misspelt_stage(cls):
+            raise InputError(f"{cls.__name__}: {fault}")
+        about = getattr(cls, "about", None)
+        if isinstance(about, EffectCard) and (about.wheel or about.track):
+            raise InputError(
+                f"{cls.__name__}: about.wheel and about.track have no meaning for a class that "
+                "derives from Effect; declare gear_types, for example (RigidWheel,)"
+            )
+
+    @classmethod
+    def applies_to(cls, gear: Gear) -> bool:
+        """Whether the effect has a meaning for this gear."""
+        return not cls.gear_types or isinstance(gear, cls.gear_types)
+
+    @classmethod
+    def overrides(cls, stage: str) -> bool:
+        """Whether the effect acts at this stage, one of `STAGES`."""
+        base: type = cls
+        return stage in _overridden(base)
+
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
+        """The true slip and load, from those that the sensors report."""
+        return at
+
+    def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
+        """The soil at this slip, speed or pass."""
+        return soil
+
+    def on_contact(self, geometry: Any, load_case: LoadCase) -> Any:
+        """The geometry of the contact, of the type that the gear's `contact_geometry` returns."""
+        return geometry
+
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
+        """The stresses at the points of the contact."""
+        return stress
+
+    def on_force(self, force: Force, load_case: LoadCase) -> Force:
+        """The forces at any sinkage, inside the search for equilibrium."""
+        return force
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        """What the sensors report, from the forces at equilibrium."""
+        return force
 
 
-def covariate(scene: Any, field: str, effect: str) -> Array:
-    """What an effect needs to know of the driving; raises `InputError` where nobody measured it."""
-    value = getattr(scene.at, field)
+@cache
+def _overridden(cls: type) -> frozenset[str]:
+    return frozenset(name for name in STAGES if getattr(cls, name) is not getattr(Effect, name))
+
+
+def misspelt_stage(cls: type) -> str:
+    """Message on a public method of `cls` that begins with ``on_`` and is no stage; else empty."""
+    for name in dir(cls):
+        if name.startswith("on_") and name not in STAGES and callable(getattr(cls, name)):
+            near = difflib.get_close_matches(name, STAGES, 1, 0.5)
+            hint = f"did you mean {near[0]}? " if near else ""
+            return f"{name} is not a stage of a model; {hint}The stages are: {', '.join(STAGES)}"
+    return ""
+
+
+def covariate(load_case: LoadCase, field: str, effect: str) -> Array:
+    """A field of `Operating` that an effect needs; raises `InputError` where it is missing."""
+    value = getattr(load_case.at, field)
     if value is None:
         raise InputError(f"the effect {effect} needs the column {COVARIATES[field]}")
     return value
 
 
-def through(effects: Iterable[Any], stage: str, value: T, scene: Any) -> T:
+def apply_stage(effects: Iterable[Effect], stage: str, value: T, load_case: LoadCase) -> T:
     """`value` after all effects that act at this stage, in the order of the model."""
     for effect in effects:
-        act = getattr(effect, stage, None)
-        if act is not None:
-            value = act(value, scene)
+        if effect.overrides(stage):
+            value = getattr(effect, stage)(value, load_case)
     return value

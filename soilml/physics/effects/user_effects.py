@@ -5,46 +5,66 @@ from __future__ import annotations
 import os
 import re
 import sys
+from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import KINDS, STAGES, EffectCard
+from soilml.physics.effects.base import KINDS, STAGES, Effect, EffectCard, misspelt_stage
+from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.physics.gears.track import Track
 from soilml.physics.operating_point import COVARIATES
 
 
-def load_effects(path: str | os.PathLike[str]) -> dict[str, type]:
+def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
     """Run a Python file and return the effects that it defines, by name.
 
     An effect is a frozen dataclass with a `name`, a card `about` and at least one stage of
-    `soilml.physics.effects.base.STAGES`, as those of the catalogue are; classes whose names begin
-    with an underscore are left alone. The file may do all that Python may: load what you would
-    run. Raises `InputError`, one line, for a file that does not run and an effect that no model
-    could take.
+    `soilml.physics.effects.base.STAGES`. It derives from `soilml.physics.effects.Effect`, or from
+    no class, as in files written before that class existed; such a class is given the base here.
+    Classes whose names begin with an underscore are ignored. The file may do all that Python may:
+    load only what you would run.
+
+    Parameters
+    ----------
+    path
+        The Python file.
+
+    Returns
+    -------
+    dict
+        Effect class by name, in order of definition.
+
+    Raises
+    ------
+    InputError
+        One line, for a file that does not run and for a class that is not a valid effect.
     """
-    found: dict[str, type] = {}
-    for cls in _classes(Path(path)):
+    module = _run(Path(path))
+    effects: dict[str, type[Effect]] = {}
+    for cls in _candidates(module):
         where = f"{path}: {cls.__name__}"
         if fault := _fault(cls):
             raise InputError(f"{where}: {fault}")
         if cls.name in EFFECTS:
             raise InputError(f"{where}: the catalogue has an effect {cls.name!r} already")
-        if cls.name in found:
-            raise InputError(f"{where}: {found[cls.name].__name__} is {cls.name!r} already")
-        found[cls.name] = cls
-    if not found:
+        if cls.name in effects:
+            raise InputError(f"{where}: {effects[cls.name].__name__} is {cls.name!r} already")
+        effects[cls.name] = _derived(cls, module)
+    if not effects:
         raise InputError(
             f"{path}: no effect in it; one is a frozen dataclass with name, about and one of: "
             f"{', '.join(STAGES)}"
         )
-    return found
+    return effects
 
 
-def _classes(path: Path) -> list[Any]:
-    """The classes of a file that mean to be effects, in order of definition."""
+def _run(path: Path) -> ModuleType:
+    """The file as a module."""
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     spec = spec_from_file_location(f"own_effects_{path.stem}", path)
@@ -56,20 +76,50 @@ def _classes(path: Path) -> list[Any]:
         exec(compile(path.read_bytes(), str(path), "exec"), vars(module))
     except SyntaxError as error:
         raise InputError(f"{path}: line {error.lineno}: {error.msg}") from error
+    except InputError as error:  # from `Effect.__init_subclass__`, a message for the user
+        raise InputError(f"{path}: {error}") from error
     except (Exception, SystemExit) as error:
-        said = " ".join(str(error).split())
-        raise InputError(f"{path}: {type(error).__name__} when run: {said}") from error
-    own = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == spec.name]
-    acts = ("about", *STAGES)
-    return [v for v in own if v.__name__[0] != "_" and any(hasattr(v, name) for name in acts)]
+        message = " ".join(str(error).split())
+        raise InputError(f"{path}: {type(error).__name__} when run: {message}") from error
+    return module
+
+
+def _candidates(module: ModuleType) -> list[Any]:
+    """The classes of a file that are meant to be effects, in order of definition."""
+    own = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and value.__module__ == module.__name__
+    ]
+    marks = ("about", *STAGES)
+    return [v for v in own if v.__name__[0] != "_" and any(hasattr(v, name) for name in marks)]
+
+
+def _derived(cls: Any, module: ModuleType) -> type[Effect]:
+    """The class itself where it derives from `Effect`, else a subclass of it that does."""
+    if issubclass(cls, Effect):
+        derived: type[Effect] = cls
+        return derived
+    gear_types = (RigidWheel,) * cls.about.wheel + (Track,) * cls.about.track
+    members = {
+        "__module__": cls.__module__,
+        "__doc__": cls.__doc__,
+        "about": replace(cls.about, wheel=False, track=False),
+        "gear_types": gear_types,
+    }
+    derived = type(cls.__name__, (cls, Effect), members)
+    setattr(module, cls.__name__, derived)  # so that instances can be pickled
+    return derived
 
 
 def _fault(cls: Any) -> str:
-    """What keeps a class from being an effect; nothing where it is one."""
-    made = vars(cls).get("__dataclass_params__")  # its own, not that of what it derives from
-    if made is None or not made.frozen:
+    """What keeps a class from being an effect; empty where it is one."""
+    own_dataclass = vars(cls).get("__dataclass_params__")  # not that of what it derives from
+    if own_dataclass is None or not own_dataclass.frozen:
         return "an effect is decorated by @dataclass(frozen=True, kw_only=True)"
-    if not any(hasattr(cls, stage) for stage in STAGES):
+    if fault := misspelt_stage(cls):
+        return fault
+    if not any(getattr(cls, name, None) not in (None, getattr(Effect, name)) for name in STAGES):
         return f"it acts on nothing; it needs one of the methods {', '.join(STAGES)}"
     if not isinstance(getattr(cls, "name", None), str):
         return 'name is missing; write name: ClassVar[str] = "my-effect"'
@@ -86,7 +136,7 @@ def _fault(cls: Any) -> str:
 
 
 def _fault_of_size(cls: Any, about: EffectCard) -> str:
-    """What is wrong with the parameters of an effect, or nothing."""
+    """What is wrong with the parameters of an effect; empty where nothing is."""
     try:
         parameters = declared(cls)
         neutral = cls()

@@ -20,6 +20,16 @@ class Gear(Protocol):
 
     name: ClassVar[str]
 
+    @property
+    def radius(self) -> Real:
+        """Radius of the wheel, of a track's end wheels or of the arc of a foot, m."""
+        ...
+
+    @property
+    def width(self) -> Real:
+        """Width of the gear, m."""
+        ...
+
     def deepest(self) -> Real:
         """The largest sinkage that the gear's model holds for, m."""
         ...

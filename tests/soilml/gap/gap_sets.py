@@ -19,7 +19,6 @@ from soilml.gap.statistics.reml_covariance import Scatter, assembled, scatter_co
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.base import suits
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
@@ -84,7 +83,7 @@ def bench_of(case, table, scatter=(0.0, 0.0)) -> Bench:
         1e6,
     )
     axes = tuple(soil_axis(f) for f in select_free(case, None))
-    effects = {name: e for name, e in EFFECTS.items() if suits(e, case.model.gear)}
+    effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
     return Bench(case, axes, cells, assembled(cells, columns, known), effects, {})
 
 

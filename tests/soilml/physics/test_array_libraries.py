@@ -8,10 +8,9 @@ import pytest
 import torch
 
 from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
-from soilml.physics.effects.base import suits
 
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
-OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if suits(cls, WHEEL.gear)}
+OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(WHEEL.gear)}
 CASES = {
     "all": replace(WHEEL, effects=tuple(cls(**cls.about.reference) for cls in OF_WHEELS.values())),
     **{name: WHEEL + cls(**cls.about.reference) for name, cls in OF_WHEELS.items()},

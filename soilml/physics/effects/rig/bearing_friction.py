@@ -8,13 +8,14 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class BearingFriction:
+class BearingFriction(Effect):
     r"""The motor turns the bearing too: its torque is more than what the soil asks for.
 
     .. math:: T' = T + \mu W r
@@ -29,14 +30,14 @@ class BearingFriction:
         text="friction of the bearing is in the measured torque",
         source="Coulomb friction",
         kind="rig",
-        wheel=True,
         reference={"coefficient": 0.01},
         signs={"torque": +1},
         isolate="turning the wheel, loaded, on a smooth roller or a second bearing",
         calibration=0.005,
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     coefficient: Annotated[Real, Parameter("1", 0.0, 0.3, "mu, referred to r")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
-        radius = scene.gear.radius  # type: ignore[attr-defined]
-        return replace(force, torque=force.torque + self.coefficient * scene.at.load * radius)
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        radius = load_case.gear.radius
+        return replace(force, torque=force.torque + self.coefficient * load_case.at.load * radius)

@@ -8,14 +8,14 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class LoadTransfer:
+class LoadTransfer(Effect):
     r"""The rig presses the wheel down by more than its load cell says: the pull has a lever arm.
 
     .. math:: W = W' + \frac{h}{L} DP + W_0
@@ -40,10 +40,10 @@ class LoadTransfer:
     ratio: Annotated[Real, Parameter("1", -0.5, 0.5, "h / L, load gained per pull")] = 0.0
     offset: Annotated[Real, Parameter("N", -100.0, 100.0, "W0, load gained always")] = 0.0
 
-    def on_operating(self, at: Operating, scene: LoadCase) -> Operating:
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         xp = namespace(at.load)
         load = at.load + self.offset
         return replace(at, load=xp.maximum(load, xp.full_like(load, 1e-6)))
 
-    def on_force(self, force: Force, scene: LoadCase) -> Force:
+    def on_force(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, load=force.load - self.ratio * force.drawbar_pull)

@@ -8,14 +8,14 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Slope:
+class Slope(Effect):
     r"""The bed is inclined and nobody knows: driving goes uphill, or downhill in reverse.
 
     .. math:: W = W' \cos\alpha, \quad DP' = DP - d W' \sin\alpha
@@ -38,12 +38,12 @@ class Slope:
     )
     angle: Annotated[Real, Parameter("rad", -0.5, 0.5, "uphill is positive")] = 0.0
 
-    def on_operating(self, at: Operating, scene: LoadCase) -> Operating:
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         xp = namespace(at.load)
         return replace(at, load=at.load * xp.cos(self.angle + 0.0 * at.load))
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
-        load, speed = scene.at.load, scene.at.speed  # the load across the slope by now
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        load, speed = load_case.at.load, load_case.at.speed  # the load across the slope by now
         xp = namespace(load)
         along = load * xp.tan(self.angle + 0.0 * load)
         if speed is not None:

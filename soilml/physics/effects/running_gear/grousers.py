@@ -9,7 +9,7 @@ from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
-from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
 
@@ -38,14 +38,14 @@ class Grousers(SlipLoadScaling):
         text="lugs carry the soil around: it shears further out than the rim",
         source="Ding et al. 2011, J. Terramechanics 48(1)",
         kind="wheel",
-        wheel=True,
         reference={"height": 0.01},
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with a wheel without lugs; a dead-weight check of the torque sensor",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a lug above the rim")] = 0.0
     shearing: Annotated[Real, Parameter("1", 0.0, 1.0, "lambda, share of h added to r")] = 0.75
 
-    def on_contact(self, rim: WheelArc, scene: LoadCase) -> WheelArc:
-        out = self.shearing * self.grown(self.height, scene)
+    def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
+        out = self.shearing * self.scaled(self.height, load_case)
         return replace(rim, shear_radius=rim.shear_radius + out, lever=rim.lever + out)

@@ -10,6 +10,7 @@ from soilml.parameters import Parameter
 from soilml.physics.contact import Stress
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.track import Track
 from soilml.physics.load_case import LoadCase
 
 
@@ -40,24 +41,24 @@ class TrackGrousers(SlipLoadScaling):
         text="grousers of a track shear soil on soil, and cohesion beside the track",
         source="Wang et al. 2018, J. Terramechanics 77, eqs. 10-14",
         kind="wheel",
-        track=True,
         reference={"spacing": 0.8},
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with a track without grousers",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (Track,)
     spacing: Annotated[Real, Parameter("1", 0.0, 1.0, "g, share of the pitch between tips")] = 0.0
     height: Annotated[Real, Parameter("m", 0.0, 0.2, "h, height of a grouser")] = 0.012
     yielding: Annotated[Real, Parameter("1", 0.1, 10.0, "j_k / K, where compression ends")] = 3.0
     power: Annotated[Real, Parameter("1", 0.2, 2.0, "d, exponent of compression")] = 0.5
 
-    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
-        contact, soil = stress.contact, scene.soil
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
+        contact, soil = stress.contact, load_case.soil
         xp = namespace(contact.sheared)
         share = xp.abs(contact.sheared) / (self.yielding * soil.shear_modulus)
         share = xp.clip(share, 1e-30, 1.0)  # the root of nothing has no derivative
         sides = 1.0 + 2.0 * self.height / contact.width
         strength = soil.cohesion * sides + stress.normal * xp.tan(soil.friction_angle)
-        sign = xp.where(scene.at.slip < 0, -xp.ones_like(share), xp.ones_like(share))
+        sign = xp.where(load_case.at.slip < 0, -xp.ones_like(share), xp.ones_like(share))
         between = sign * strength * xp.exp(self.power * xp.log(share))
-        grown = self.grown(self.spacing, scene)
+        grown = self.scaled(self.spacing, load_case)
         return replace(stress, shear=(1.0 - grown) * stress.shear + grown * between)

@@ -9,7 +9,7 @@ from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
-from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
 
@@ -34,16 +34,16 @@ class WheelFlexibility(SlipLoadScaling):
         text="the wheel deflects under its load and touches along a longer arc",
         source="Bekker 1969; Schmid 1995, J. Terramechanics 32(1)",
         kind="wheel",
-        wheel=True,
         reference={"compliance": 2e-5},
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     compliance: Annotated[Real, Parameter("m/N", 0.0, 1e-2, "C, deflection per load")] = 0.0
 
-    def on_contact(self, rim: WheelArc, scene: LoadCase) -> WheelArc:
+    def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
         xp = namespace(rim.entry)
-        deflection = self.grown(self.compliance, scene) * scene.at.load
+        deflection = self.scaled(self.compliance, load_case) * load_case.at.load
         larger = 1.0 + deflection / rim.sinkage
         radius = rim.radius * larger
         # the formula of the gear, so that a stiff wheel is the rigid one to the last bit

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class DrawbarGain:
+class DrawbarGain(Effect):
     r"""The drawbar sensor reads a share too much, or too little.
 
     .. math:: DP' = (1 + e) DP
@@ -34,5 +34,5 @@ class DrawbarGain:
     )
     gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, drawbar_pull=force.drawbar_pull * (1.0 + self.gain))

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class DrawbarOffset:
+class DrawbarOffset(Effect):
     r"""The drawbar sensor does not read zero when nothing pulls.
 
     .. math:: DP' = DP + F_0
@@ -35,5 +35,5 @@ class DrawbarOffset:
     )
     offset: Annotated[Real, Parameter("N", -200.0, 200.0, "F0, reading at no pull")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, drawbar_pull=force.drawbar_pull + self.offset)

@@ -7,14 +7,14 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class LoadGain:
+class LoadGain(Effect):
     r"""The load cell reads a share too much: the wheel feels less than is reported.
 
     .. math:: W' = (1 + e) W
@@ -35,5 +35,5 @@ class LoadGain:
     )
     gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
 
-    def on_operating(self, at: Operating, scene: LoadCase) -> Operating:
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         return replace(at, load=at.load / (1.0 + self.gain))

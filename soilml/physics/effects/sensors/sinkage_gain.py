@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SinkageGain:
+class SinkageGain(Effect):
     r"""The sinkage sensor reads a share too much, or too little.
 
     .. math:: z' = (1 + e) z
@@ -35,5 +35,5 @@ class SinkageGain:
     )
     gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, sinkage=force.sinkage * (1.0 + self.gain))

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SinkageOffset:
+class SinkageOffset(Effect):
     r"""The sinkage is measured from a level that is not that of the soil.
 
     .. math:: z' = z + z_0
@@ -35,5 +35,5 @@ class SinkageOffset:
     )
     offset: Annotated[Real, Parameter("m", -0.1, 0.1, "z0, reading at no sinkage")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, sinkage=force.sinkage + self.offset)

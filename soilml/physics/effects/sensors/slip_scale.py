@@ -7,14 +7,14 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class SlipScale:
+class SlipScale(Effect):
     r"""Travel speed, or the wheel's radius, is known wrongly, and slip with it.
 
     .. math::
@@ -39,7 +39,7 @@ class SlipScale:
     )
     error: Annotated[Real, Parameter("1", -0.2, 0.2, "e, of v / (r omega) as reported")] = 0.0
 
-    def on_operating(self, at: Operating, scene: LoadCase) -> Operating:
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         slip = at.slip
         xp = namespace(slip)
         driving = slip + (1.0 - slip) * (self.error / (1.0 + self.error))

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force
-from soilml.physics.effects.base import EffectCard
+from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.load_case import LoadCase
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class TorqueOffset:
+class TorqueOffset(Effect):
     r"""The torque sensor does not read zero when nothing turns it.
 
     .. math:: T' = T + T_0
@@ -35,5 +35,5 @@ class TorqueOffset:
     )
     offset: Annotated[Real, Parameter("N m", -100.0, 100.0, "T0, reading at no torque")] = 0.0
 
-    def on_reading(self, force: Force, scene: LoadCase) -> Force:
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
         return replace(force, torque=force.torque + self.offset)

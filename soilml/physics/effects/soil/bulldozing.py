@@ -42,9 +42,9 @@ class Bulldozing(SlipLoadScaling):
     )
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the formula's resistance")] = 0.0
 
-    def on_force(self, force: Force, scene: LoadCase) -> Force:
+    def on_force(self, force: Force, load_case: LoadCase) -> Force:
         xp = namespace(force.load)
-        soil = scene.soil
+        soil = load_case.soil
         tan = 2.0 / 3.0 * xp.tan(soil.friction_angle)
         tan = xp.maximum(tan, xp.full_like(tan, 1e-6))  # the factors have limits at phi = 0
         cos2 = 1.0 / (1.0 + tan * tan)
@@ -52,10 +52,10 @@ class Bulldozing(SlipLoadScaling):
         n_q = xp.exp(math.pi * tan) * xp.tan(math.pi / 4.0 + 0.5 * angle) ** 2
         k_c = ((n_q - 1.0) / tan - tan) * cos2
         k_gamma = (4.0 * (n_q + 1.0) + 1.0) * cos2  # N_gamma / tan = 2 (N_q + 1), Vesic
-        width = scene.gear.width  # type: ignore[attr-defined]
+        width = load_case.gear.width
         z = force.sinkage
         resistance = width * (
             0.67 * soil.cohesion * z * k_c + 0.5 * z * z * soil.unit_weight * k_gamma
         )
-        share = self.grown(self.share, scene)
+        share = self.scaled(self.share, load_case)
         return replace(force, drawbar_pull=force.drawbar_pull - share * resistance)

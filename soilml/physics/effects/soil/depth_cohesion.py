@@ -37,10 +37,10 @@ class DepthCohesion(SlipLoadScaling):
     )
     c1: Annotated[Real, Parameter("Pa/m", 0.0, 1e6, "growth of cohesion with depth")] = 0.0
 
-    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
-        contact, slip = stress.contact, scene.at.slip
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
+        contact, slip = stress.contact, load_case.at.slip
         xp = namespace(contact.depth)
-        mobilised = -xp.expm1(-xp.abs(contact.sheared) / scene.soil.shear_modulus)
+        mobilised = -xp.expm1(-xp.abs(contact.sheared) / load_case.soil.shear_modulus)
         sign = xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
-        more = self.grown(self.c1, scene) * contact.depth
+        more = self.scaled(self.c1, load_case) * contact.depth
         return replace(stress, shear=stress.shear + sign * more * mobilised)

@@ -12,7 +12,7 @@ from soilml.errors import InputError
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
-from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
 
@@ -38,11 +38,11 @@ class ExitAngle(SlipLoadScaling):
         text="the rim touches the soil behind the axle too: theta_2 below zero",
         source="Ishigami et al. 2007, J. Field Robotics 24(3); Ding et al. 2011",
         kind="soil",
-        wheel=True,
         reference={"kappa": 0.15},
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="runs near zero slip; the wheel weighed on its stand",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     kappa: Annotated[Real, Parameter("1", 0.0, 1.0, "height at exit / sinkage")] = 0.0
     b0: Annotated[Real, Parameter("1", -1.0, 0.0, "theta_2 / theta_1")] = 0.0
 
@@ -50,8 +50,10 @@ class ExitAngle(SlipLoadScaling):
         if np.any((to_numpy(self.kappa) != 0.0) & (to_numpy(self.b0) != 0.0)):
             raise InputError("exit-angle takes kappa or b0, and both are given: leave one at 0")
 
-    def on_contact(self, rim: WheelArc, scene: LoadCase) -> WheelArc:
+    def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
         xp = namespace(rim.entry)
-        kappa = xp.minimum(self.grown(self.kappa, scene) + 0.0 * rim.entry, xp.ones_like(rim.entry))
+        kappa = xp.minimum(
+            self.scaled(self.kappa, load_case) + 0.0 * rim.entry, xp.ones_like(rim.entry)
+        )
         behind = -2.0 * xp.asin(xp.sqrt(kappa * rim.sinkage / (2.0 * rim.radius)))
         return replace(rim, exit=rim.exit + behind + self.b0 * rim.entry)

@@ -40,11 +40,11 @@ class LateralSlip(SlipLoadScaling):
     )
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "times the sideways displacement")] = 0.0
 
-    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
-        contact, modulus = stress.contact, scene.soil.shear_modulus
-        beta = covariate(scene, "slip_angle", self.name)
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
+        contact, modulus = stress.contact, load_case.soil.shear_modulus
+        beta = covariate(load_case, "slip_angle", self.name)
         xp = namespace(contact.sheared)
-        aside = self.grown(self.share, scene) * (1.0 - scene.at.slip) * xp.tan(beta)
+        aside = self.scaled(self.share, load_case) * (1.0 - load_case.at.slip) * xp.tan(beta)
         aside = aside * contact.rolled
         ahead = xp.maximum(xp.abs(contact.sheared), xp.full_like(aside, 1e-100))
         both = xp.where(aside == 0, ahead, xp.hypot(ahead, aside))

@@ -39,8 +39,8 @@ class Multipass(SlipLoadScaling):
     )
     growth: Annotated[Real, Parameter("1", 0.0, 3.0, "a, power of the pass number")] = 0.0
 
-    def on_soil(self, soil: Soil, scene: LoadCase) -> Soil:
-        passes = covariate(scene, "pass_number", self.name)
+    def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
+        passes = covariate(load_case, "pass_number", self.name)
         xp = namespace(passes)
-        firmer = xp.exp(self.grown(self.growth, scene) * xp.log(passes))
+        firmer = xp.exp(self.scaled(self.growth, load_case) * xp.log(passes))
         return replace(soil, kc=soil.kc * firmer, kphi=soil.kphi * firmer)

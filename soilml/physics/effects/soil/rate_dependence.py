@@ -41,9 +41,9 @@ class Rate(SlipLoadScaling):
     )
     a: Annotated[Real, Parameter("1", -0.3, 0.3, "growth per e-fold of speed")] = 0.0
 
-    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
-        speed = covariate(scene, "speed", self.name)
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
+        speed = covariate(load_case, "speed", self.name)
         xp = namespace(speed)
         faster = xp.maximum(xp.abs(speed), xp.full_like(speed, SLOWEST)) / AT_SPEED
-        factor = 1.0 + self.grown(self.a, scene) * xp.log(faster)
+        factor = 1.0 + self.scaled(self.a, load_case) * xp.log(faster)
         return replace(stress, shear=stress.shear * xp.maximum(factor, xp.zeros_like(factor)))

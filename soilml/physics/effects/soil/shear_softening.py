@@ -43,15 +43,15 @@ class ShearSoftening(SlipLoadScaling):
     residual: Annotated[Real, Parameter("1", 0.05, 1.0, "K_r, residual / peak stress")] = 0.7
     peak: Annotated[Real, Parameter("1", 0.2, 10.0, "K_w / K, where the peak is")] = 1.5
 
-    def on_stress(self, stress: Stress, scene: LoadCase) -> Stress:
+    def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
         sheared = stress.contact.sheared
         xp = namespace(sheared)
         # the ratio of the curves has a limit where neither has moved
         moved = xp.maximum(xp.abs(sheared), xp.full_like(sheared, 1e-100))
-        modulus = scene.soil.shear_modulus
+        modulus = load_case.soil.shear_modulus
         at_peak = moved / (self.peak * modulus)
         hump = (1.0 / (self.residual * (1.0 - math.exp(-1.0))) - 1.0) * xp.exp(1.0 - at_peak)
         wong = self.residual * (1.0 + hump) * -xp.expm1(-at_peak)
         ratio = wong / -xp.expm1(-moved / modulus)
-        factor = 1.0 + self.grown(self.share, scene) * (ratio - 1.0)
+        factor = 1.0 + self.scaled(self.share, load_case) * (ratio - 1.0)
         return replace(stress, shear=stress.shear * factor)

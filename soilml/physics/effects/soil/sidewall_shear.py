@@ -12,6 +12,7 @@ from soilml.parameters import Parameter
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 
 
@@ -39,17 +40,17 @@ class SidewallShear(SlipLoadScaling):
         text="the buried side walls shear the soil too: more torque and pull",
         source="geometry; Jaky 1944; Janosi and Hanamoto 1961",
         kind="soil",
-        wheel=True,
         reference={"share": 1.0},
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with a wheel of another width; heavier loads, which bury more wall",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the formula's shear")] = 0.0
 
-    def on_force(self, force: Force, scene: LoadCase) -> Force:
-        soil, slip, entry = scene.soil, scene.at.slip, force.entry_angle
+    def on_force(self, force: Force, load_case: LoadCase) -> Force:
+        soil, slip, entry = load_case.soil, load_case.at.slip, force.entry_angle
         xp = namespace(entry)
-        radius = scene.gear.radius  # type: ignore[attr-defined]
+        radius = load_case.gear.radius
         area, depth = buried(entry)
         sin = xp.sin(entry)
         pressure = (1.0 - xp.sin(soil.friction_angle)) * soil.unit_weight * radius * depth
@@ -57,7 +58,7 @@ class SidewallShear(SlipLoadScaling):
         moved = radius * xp.abs(entry - (1.0 - slip) * sin)
         sign = xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
         shear = sign * strength * -xp.expm1(-moved / soil.shear_modulus)
-        pull = 2.0 * self.grown(self.share, scene) * shear * radius**2 * area
+        pull = 2.0 * self.scaled(self.share, load_case) * shear * radius**2 * area
         lever = radius * (depth + xp.cos(entry))
         return replace(
             force, torque=force.torque + pull * lever, drawbar_pull=force.drawbar_pull + pull

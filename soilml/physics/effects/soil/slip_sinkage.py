@@ -36,6 +36,6 @@ class SlipSinkage(SlipLoadScaling):
     )
     n1: Annotated[Real, Parameter("1", 0.0, 2.0, "growth of n per unit slip")] = 0.0
 
-    def on_soil(self, soil: Soil, scene: LoadCase) -> Soil:
-        xp = namespace(scene.at.slip)
-        return replace(soil, n=soil.n + self.grown(self.n1, scene) * xp.abs(scene.at.slip))
+    def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
+        xp = namespace(load_case.at.slip)
+        return replace(soil, n=soil.n + self.scaled(self.n1, load_case) * xp.abs(load_case.at.slip))

@@ -9,6 +9,7 @@ from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.soils.soil import Soil
 
@@ -34,16 +35,16 @@ class SmallWheelStiffness(SlipLoadScaling):
         text="the soil's stiffness depends on the diameter of the wheel",
         source="Meirion-Griffith and Spenko 2011, J. Terramechanics 48(2)",
         kind="soil",
-        wheel=True,
         reference={"exponent": -0.3},
         signs={"sinkage": -1},
         varied="wheels of several diameters: with one it is a change of kc and kphi",
         isolate="the same runs with a wheel of another diameter; plate tests of the soil",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     exponent: Annotated[Real, Parameter("1", -2.0, 0.0, "m, power of the diameter")] = 0.0
 
-    def on_soil(self, soil: Soil, scene: LoadCase) -> Soil:
-        xp = namespace(scene.at.slip)
-        diameter = 2.0 * scene.gear.radius  # type: ignore[attr-defined]
-        stiffer = xp.exp(self.grown(self.exponent, scene) * xp.log(diameter / LARGE))
+    def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:
+        xp = namespace(load_case.at.slip)
+        diameter = 2.0 * load_case.gear.radius
+        stiffer = xp.exp(self.scaled(self.exponent, load_case) * xp.log(diameter / LARGE))
         return replace(soil, kc=soil.kc * stiffer, kphi=soil.kphi * stiffer)

@@ -9,7 +9,7 @@ from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
-from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
 
@@ -34,15 +34,15 @@ class StressShift(SlipLoadScaling):
         text="stresses sit at the front of the contact: small wheels",
         source="Nagatani et al. 2009, IROS, sec. IV",
         kind="soil",
-        wheel=True,
         reference={"shift": 0.2},
         signs={"drawbar_pull": -1, "sinkage": +1},
         isolate="force sensors in the rim; the same soil under a larger wheel",
     )
+    gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     shift: Annotated[Real, Parameter("1", 0.0, 0.9, "share of the way to the entry angle")] = 0.0
 
-    def on_contact(self, rim: WheelArc, scene: LoadCase) -> WheelArc:
-        shift = self.grown(self.shift, scene)
+    def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
+        shift = self.scaled(self.shift, load_case)
         return replace(
             rim,
             peak=rim.peak + shift * (rim.entry - rim.peak),

@@ -10,7 +10,8 @@ from conftest import input_box, solved
 from soilml import EFFECTS, GEARS, Model, Operating, Status, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
-from soilml.physics.effects.base import KINDS, STAGES, suits
+from soilml.physics import effects
+from soilml.physics.effects.base import KINDS, STAGES, Effect
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.equilibrium import prepared
 from soilml.physics.gears.rigid_wheel import RigidWheel
@@ -25,7 +26,7 @@ CHANNELS = ("torque", "drawbar_pull", "sinkage")
 FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
 RIGID = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
-OF_WHEELS = [name for name, effect in EFFECTS.items() if suits(effect, WHEEL.gear)]
+OF_WHEELS = [name for name, effect in EFFECTS.items() if effect.applies_to(WHEEL.gear)]
 every = pytest.mark.parametrize("name", OF_WHEELS)
 shaped = pytest.mark.parametrize(
     "name", [n for n in OF_WHEELS if issubclass(EFFECTS[n], SlipLoadScaling)]
@@ -124,7 +125,7 @@ def test_is_described(name):
     cls = EFFECTS[name]
     card, parameters = cls.about, declared(cls)
     assert cls.name == name
-    assert any(hasattr(cls, stage) for stage in STAGES)
+    assert issubclass(cls, Effect) and any(cls.overrides(stage) for stage in STAGES)
     assert card.text and card.source and card.isolate and "References:" in cls.__doc__
     assert ".. math::" in cls.__doc__
     assert card.kind in KINDS
@@ -195,11 +196,60 @@ def test_an_effect_can_stand_in_a_model_once():
 
 
 def test_a_users_own_effect_takes_part():
-    class DeeperRut:
+    class DeeperRut(Effect):
         name = "deeper-rut"
 
-        def on_reading(self, force, scene):
+        def on_reading(self, force, load_case):
             return replace(force, sinkage=force.sinkage + 0.001)
 
     force = (WHEEL + DeeperRut())(SAND, AT)
     np.testing.assert_allclose(force.sinkage, WHEEL(SAND, AT).sinkage + 0.001, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "wrong, meant",
+    [("on_readings", "on_reading"), ("on_forces", "on_force"), ("on_stres", "on_stress")],
+)
+def test_a_misspelt_stage_is_refused_when_the_class_is_defined(wrong, meant):
+    with pytest.raises(
+        InputError, match=f"{wrong} is not a stage of a model; did you mean {meant}"
+    ):
+        type("Misspelt", (Effect,), {wrong: lambda self, value, load_case: value})
+
+
+def test_a_stage_that_is_misspelt_in_a_mixin_is_refused_too():
+    class Mixin:
+        def on_soils(self, soil, load_case):
+            return soil
+
+    with pytest.raises(InputError, match="Mixed: on_soils is not a stage"):
+
+        class Mixed(Mixin, Effect):
+            pass
+
+
+def test_stages_that_an_effect_does_not_override_return_their_value():
+    effect, value = EFFECTS["torque-gain"](gain=0.1), object()
+    assert [stage for stage in STAGES if effect.overrides(stage)] == ["on_reading"]
+    for stage in set(STAGES) - {"on_reading"}:
+        assert getattr(effect, stage)(value, None) is value
+
+
+def test_gear_flags_of_the_card_are_refused_where_gear_types_belong():
+    about = replace(EFFECTS["slip-sinkage"].about, wheel=True)
+    with pytest.raises(InputError, match="declare gear_types"):
+        type("ForWheels", (Effect,), {"name": "for-wheels", "about": about})
+
+
+def test_what_is_no_effect_is_refused_by_the_model():
+    with pytest.raises(InputError, match="object is not an effect; derive it from"):
+        Model(WHEEL.gear, (object(),))
+
+
+def test_the_catalogue_exports_each_effect_by_its_class_name():
+    assert list(EFFECTS)[:4] == ["slip-sinkage", "grousers", "track-grousers", "bulldozing"]
+    assert set(effects.__all__) == {"EFFECTS", "Effect", "EffectCard"} | {
+        cls.__name__ for cls in EFFECTS.values()
+    }
+    for cls in EFFECTS.values():
+        assert getattr(effects, cls.__name__) is cls

@@ -1,10 +1,13 @@
 """A user's own effects, from a file of theirs."""
 
+import pickle
+
 import numpy as np
 import pytest
 
-from soilml import Model, Operating, Wheel, soil
+from soilml import Model, Operating, Track, Wheel, soil
 from soilml.errors import InputError
+from soilml.physics.effects import Effect
 from soilml.physics.effects.user_effects import load_effects
 
 OWN = '''\
@@ -97,7 +100,13 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
         (" = 0.0\n", " = -1.0\n", "Crust: strength is -1 N"),
         ("frozen=True, ", "", "Crust: an effect is decorated by @dataclass(frozen=True"),
         ("@dataclass(frozen=True, kw_only=True)\n", "", "an effect is decorated by @dataclass"),
-        ("on_force", "on_forces", "Crust: it acts on nothing; it needs one of the methods on_op"),
+        (
+            "on_force",
+            "on_forces",
+            "Crust: on_forces is not a stage of a model; did you mean on_force? ",
+        ),
+        ("on_force", "forces", "Crust: it acts on nothing; it needs one of the methods on_op"),
+        ("class Crust:", "class Crust(Effect):", "NameError when run"),
         ('"soil"', '"water"', "about.kind is 'water'; there are: soil, wheel, rig, sensor"),
         (
             "        signs",
@@ -113,6 +122,46 @@ def test_what_is_wrong_is_said_in_one_line(own, old, new, said):
         load_effects(own)
     text = str(caught.value)
     assert text.startswith(f"{own}: ") and said in text and "\n" not in text
+
+
+DERIVED = OWN.replace("import EffectCard", "import Effect, EffectCard").replace(
+    "class Crust:", "class Crust(Effect):"
+)
+
+
+def test_an_effect_with_and_without_the_base_class_acts_alike(own):
+    (plain,) = load_effects(own).values()
+    own.write_text(DERIVED)
+    (derived,) = load_effects(own).values()
+    at = Operating(slip=np.asarray([0.2, 0.5]), load=60.0)
+    for cls in (plain, derived):
+        assert issubclass(cls, Effect) and cls.__doc__ == "A crust carries a part of the load."
+        assert cls.overrides("on_force") and not cls.overrides("on_reading")
+    np.testing.assert_array_equal(
+        (WHEEL + plain(strength=5.0))(SAND, at).torque,
+        (WHEEL + derived(strength=5.0))(SAND, at).torque,
+    )
+
+
+def test_instances_of_an_effect_without_the_base_class_can_be_pickled(own):
+    (crust,) = load_effects(own).values()
+    assert pickle.loads(pickle.dumps(crust(strength=5.0))) == crust(strength=5.0)
+
+
+def test_a_misspelt_stage_beside_the_base_class_is_one_line(own):
+    own.write_text(DERIVED.replace("on_force", "on_forces"))
+    with pytest.raises(InputError) as caught:
+        load_effects(own)
+    message = str(caught.value)
+    assert message.startswith(f"{own}: Crust: on_forces is not a stage") and "\n" not in message
+
+
+def test_gear_flags_of_a_card_are_the_gear_types_of_the_effect(own):
+    own.write_text(OWN.replace('kind="soil"', 'kind="soil",\n        wheel=True'))
+    (crust,) = load_effects(own).values()
+    assert crust.applies_to(WHEEL.gear)
+    with pytest.raises(InputError, match="it applies to: wheel, linear-wheel"):
+        _ = Model(Track(radius=0.1, width=0.1, base=0.5)) + crust()
 
 
 def test_an_effect_that_only_derives_from_a_dataclass_is_refused(own):

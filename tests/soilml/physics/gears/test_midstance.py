@@ -29,7 +29,6 @@ from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.parameters import with_values
 from soilml.physics.contact import integrate, stress
-from soilml.physics.effects.base import suits
 from soilml.quantities import column
 
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
@@ -172,11 +171,13 @@ def test_finite_over_a_box_of_feet_or_flagged_and_neutral_effects_change_nothing
     assert ok.mean() > 0.5
     assert np.isfinite(plain.torque[ok]).all() and np.isnan(plain.torque[~ok]).all()
     for name, effect in EFFECTS.items():
-        if suits(effect, foot):
+        if effect.applies_to(foot):
             neutral = (Model(foot) + effect())(ground, at)
             np.testing.assert_allclose(neutral.torque, plain.torque, rtol=1e-7, err_msg=name)
         else:
-            with pytest.raises(InputError, match="not of midstance"):
+            with pytest.raises(
+                InputError, match="does not apply to the gear 'midstance'; it applies to: "
+            ):
                 Model(foot) + effect()
 
 

@@ -11,7 +11,6 @@ from conftest import input_box
 from soilml import EFFECTS, Model, Operating, ShearSoftening, Soil, Status, Track, Wheel, soil
 from soilml import TrackGrousers as Grousers
 from soilml.errors import InputError
-from soilml.physics.effects.base import suits
 
 GEAR = Track(radius=0.1, width=0.08, base=0.6)
 TRACK = Model(GEAR)
@@ -19,7 +18,7 @@ SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
 LOAD = 637.0
 AT = Operating(slip=np.linspace(0.1, 0.9, 5), load=LOAD)
 FIELDS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
-EFFECTS_OF_TRACKS = {name: cls for name, cls in EFFECTS.items() if suits(cls, GEAR)}
+EFFECTS_OF_TRACKS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(GEAR)}
 KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
 
 
@@ -287,7 +286,11 @@ def test_what_cannot_be_is_refused():
         Track(radius=0.3, width=0.1, base=0.6)
     with pytest.raises(InputError, match=r"settling is 0\.8; it must lie between 0 and 0.5"):
         Model(replace(GEAR, settling=0.8))(SAND, AT)
-    with pytest.raises(InputError, match="track-grousers is one of tracks, not of wheel"):
+    with pytest.raises(
+        InputError, match="track-grousers does not apply to the gear 'wheel'; it applies to: track"
+    ):
         Model(Wheel(radius=0.1, width=0.1)) + Grousers()
-    with pytest.raises(InputError, match="exit-angle is one of rigid wheels, not of track"):
+    with pytest.raises(
+        InputError, match=r"exit-angle does not apply to .* it applies to: wheel, linear-wheel"
+    ):
         TRACK + EFFECTS["exit-angle"]()

@@ -56,7 +56,11 @@ def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(mode
         ("base = 0.6", "base = 0.15", "model.toml [gear]: base is 0.15 m with wheels of radius"),
         ("base = 0.6\n", "", "model.toml [gear]: base is missing"),
         ("base = 0.6", "base = 0.6\nleaving = 0.9", "leaving is 0.9; it must lie between"),
-        ("[noise]", '[[effect]]\nname = "grousers"\n[noise]', "grousers is one of rigid wheels"),
+        (
+            "[noise]",
+            '[[effect]]\nname = "grousers"\n[noise]',
+            "grousers does not apply to the gear",
+        ),
     ],
 )
 def test_a_track_that_cannot_be_is_refused_in_one_line(model, old, new, said, capsys):
