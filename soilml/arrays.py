@@ -39,14 +39,14 @@ def to_numpy(value: Real) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.asarray(value, dtype=np.float64)
 
 
-def tracked(values: Iterable[Real]) -> bool:
+def requires_gradient(values: Iterable[Real]) -> bool:
     """Whether a gradient is asked for through any of the values."""
     return any(getattr(value, "requires_grad", False) for value in values)
 
 
-def untracked(values: Iterable[Real]) -> AbstractContextManager[object]:
+def no_gradient(values: Iterable[Real]) -> AbstractContextManager[object]:
     """A block in which no gradient is recorded, where one is asked for at all."""
-    if not tracked(values):
+    if not requires_gradient(values):
         return nullcontext()
     import torch
 

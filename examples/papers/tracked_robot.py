@@ -184,7 +184,7 @@ def draw_stress(ax: plt.Axes) -> None:
     at = Operating(slip=0.2, load=WANG2018.load)
     profile = Model(WANG2018.track).profile(ground, at, points)
     sunk = Model(WANG2018.track)(ground, at).sinkage
-    belt = WANG2018.track.shape(sunk, ground, at)
+    belt = WANG2018.track.contact_geometry(sunk, ground, at)
     ends = (
         0.0,
         float(0.1 * belt.entry),

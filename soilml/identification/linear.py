@@ -14,7 +14,7 @@ from soilml.identification.fixed_parameter import with_fixed_parameters
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Channel, Observations
 from soilml.physics.effects.base import apply_stage
-from soilml.physics.equilibrium import prepared
+from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import LinearWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
@@ -107,16 +107,16 @@ def _line(
     """Rows of the system matrix (n, 2) @ (c, tan phi) = right-hand side (n,), all in Pa."""
     gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)
     effects = case.model.effects
-    scene = prepared(LoadCase(gear, case.soil, Operating(slip=slip, load=load), effects))
-    shape = gear.shape(z, scene.soil, scene.at)
+    scene = apply_input_effects(LoadCase(gear, case.soil, Operating(slip=slip, load=load), effects))
+    shape = gear.contact_geometry(z, scene.soil, scene.at)
     contact = gear.contact(apply_stage(effects, "on_contact", shape, scene), scene.at)
-    mobilised = -np.expm1(-np.abs(contact.sheared) / case.soil.shear_modulus)
+    mobilised = -np.expm1(-np.abs(contact.shear_displacement) / case.soil.shear_modulus)
     m0, m1 = mobilised  # at exit and at maximum stress
-    scale = contact.lever * contact.area[1]
+    scale = contact.shear_lever_arm * contact.area[1]
     # torque: lever (area_0 tau_0 + area_1 tau_1), tau_0 = c m0
-    tau_m = (T - contact.lever * contact.area[0] * cohesion * m0) / scale
-    rest = load - tau_m * contact.ahead[1] - cohesion * m0 * contact.ahead[0]
-    sigma_m = rest / contact.up[1]
+    tau_m = (T - contact.shear_lever_arm * contact.area[0] * cohesion * m0) / scale
+    rest = load - tau_m * contact.frontal_area[1] - cohesion * m0 * contact.frontal_area[0]
+    sigma_m = rest / contact.horizontal_area[1]
     from_c = m1 + m0 * contact.area[0] / contact.area[1]
     return np.stack([from_c, m1 * sigma_m], axis=1), T / scale
 

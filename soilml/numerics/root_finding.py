@@ -1,7 +1,4 @@
-"""Element-wise search for the first crossing of zero.
-
-Every element of a batch is its own scalar problem; all are stepped together.
-"""
+"""Element-wise search for roots: every element of a batch is a scalar problem of its own."""
 
 from __future__ import annotations
 
@@ -11,90 +8,114 @@ from dataclasses import dataclass
 
 from soilml.arrays import Array, namespace
 
-#: A step smaller than this ends the search; the last secant step then leaves far less.
+#: A step smaller than this ends the search; the error after the last secant step is far smaller.
 TOLERANCE = 1e-9
-MOST_STEPS = 80
+#: Bisection alone would take log2(bracket / TOLERANCE) steps, about 35 for a bracket of 32.
+MAX_STEPS = 80
+#: A secant steeper than this comes from rounding and is not used.
+MAX_SLOPE = 1e12
+#: From this step on, a step that is not half as long as the last one is replaced by bisection.
+FIRST_CHECKED_STEP = 3
 
 
 @dataclass(frozen=True)
 class Root:
-    """Where a function crosses zero, its slope there, and whether it does at all."""
+    """Where a function rises through zero, its slope there, and whether the search converged."""
 
     x: Array
     slope: Array
-    found: Array
+    converged: Array
 
 
-def crossing(
+def rising_root(
     f: Callable[[Array], Array], lower: Array, upper: Array, guess: Array, slope: Array
 ) -> Root:
-    """Where `f` rises through zero between `lower` and `upper`: secant steps inside a bracket.
+    """Where `f` rises through zero between `lower` and `upper`, by secant steps inside a bracket.
 
-    `f(lower) < 0` is taken for granted. `guess` and `slope` (> 0, an estimate of df/dx) start the
-    search. An element whose `f(upper) < 0` comes back with `x = upper` and `found` false, so
-    that a caller never mistakes a stalled bracket for a root. Where `f` rises, falls and rises
-    again, the crossing found need not be the first: a caller who cannot exclude that looks for it
-    with `scan`. All arrays have one shape.
+    Parameters
+    ----------
+    f
+        Function of an array of shape (batch,), element by element, with `f(lower) < 0`.
+    lower, upper
+        The bracket, (batch,).
+    guess, slope
+        Start of the search, and an estimate of df/dx > 0, (batch,).
+
+    Returns
+    -------
+    Root
+        An element with `f(upper) < 0` has `x = upper` and `converged` false, so that a stalled
+        bracket is not mistaken for a root. Where `f` rises, falls and rises again, the root need
+        not be the first: `first_bracket` finds that one.
     """
     xp = namespace(guess)
     low, high = lower, upper
-    low_known = xp.zeros_like(guess, dtype=xp.bool)
+    nowhere = xp.zeros_like(guess, dtype=xp.bool)
     x = xp.clip(guess, lower, upper)
-    done = found = low_known
+    done = converged = nowhere
     last_step = upper - lower
     previous_x, previous_y = x, x
-    for step_number in range(MOST_STEPS):
+    for step_number in range(MAX_STEPS):
         y = f(x)
-        # the bracket closes on the side that was evaluated
         low = xp.where(~done & (y < 0), x, low)
         high = xp.where(~done & (y >= 0), x, high)
-        none_left = ~done & (y < 0) & (x >= upper)
-        done = done | none_left
+        no_root = ~done & (y < 0) & (x >= upper)
+        done = done | no_root
         if step_number > 0:
             dx = x - previous_x
             secant = (y - previous_y) / xp.where(dx == 0, xp.ones_like(dx), dx)
-            good = (secant > 0) & (secant < 1e12) & ~done
-            slope = xp.where(good, secant, slope)
+            usable = (secant > 0) & (secant < MAX_SLOPE) & ~done
+            slope = xp.where(usable, secant, slope)
         new = x - y / slope
         middle = 0.5 * (low + high)
         step = xp.abs(new - x)
-        # a step past the upper end looks at the upper end itself, once
+        # a step past the upper end evaluates the upper end itself, once
         past = (new >= upper) & (high >= upper)
         outside = ~((new >= low) & (new <= high))
-        slow = (step > 0.5 * last_step) & (step_number > 2)
+        slow = (step > 0.5 * last_step) & (step_number >= FIRST_CHECKED_STEP)
         new = xp.where(past, upper, xp.where(outside | slow, middle, new))
         step = xp.abs(new - x)
-        settled = ~done & (step <= TOLERANCE)
-        found = found | settled
+        just_converged = ~done & (step <= TOLERANCE)
+        converged = converged | just_converged
         previous_x, previous_y = xp.where(done, previous_x, x), xp.where(done, previous_y, y)
         last_step = step
         x = xp.where(done, x, new)
-        done = done | settled
+        done = done | just_converged
         if bool(xp.all(done)):
             break
-    return Root(x=x, slope=slope, found=found)
+    return Root(x=x, slope=slope, converged=converged)
 
 
-def scan(f: Callable[[Array], Array], grid: Array) -> tuple[Array, Array, Array, Array]:
-    """First interval of `grid` in which `f` rises through zero: (lower, upper, exists, peak).
+def first_bracket(f: Callable[[Array], Array], grid: Array) -> tuple[Array, Array, Array, Array]:
+    """The first interval of a grid in which `f` rises through zero.
 
-    `grid` has shape (points, batch), rising along its first axis. `peak` is the index of the point
-    about which a caller may look closer for an earlier crossing between points: the highest before
-    the interval from which `f` falls again, without such a point the start of the interval, and
-    without an interval the highest of all.
+    Parameters
+    ----------
+    f
+        Function of an array of shape (batch,), element by element.
+    grid
+        Points (points, batch), increasing along the first axis.
+
+    Returns
+    -------
+    lower, upper, exists, peak
+        The ends of the interval, whether there is one, and the index of the point about which an
+        earlier crossing may be hidden between points: the highest point before the interval from
+        which `f` falls again, or the start of the interval if there is no such point, or the
+        highest point of all if there is no interval. Shape (batch,).
     """
     xp = namespace(grid)
     y = xp.stack([f(grid[i, :]) for i in range(grid.shape[0])], axis=0)
-    up = (y[1:, :] >= 0) & (y[:-1, :] < 0)
-    exists = xp.any(up, axis=0)
-    first = xp.argmax(xp.astype(up, xp.int64), axis=0)
-    falls = (y[1:-1, :] >= y[:-2, :]) & (y[1:-1, :] > y[2:, :])
+    rises = (y[1:, :] >= 0) & (y[:-1, :] < 0)
+    exists = xp.any(rises, axis=0)
+    first = xp.argmax(xp.astype(rises, xp.int64), axis=0)
+    is_peak = (y[1:-1, :] >= y[:-2, :]) & (y[1:-1, :] > y[2:, :])
     inner = xp.arange(1, grid.shape[0] - 1, device=grid.device)[:, None]
-    before = falls & exists[None, :] & (inner < first[None, :])
+    earlier_peak = is_peak & exists[None, :] & (inner < first[None, :])
     least = xp.full_like(y[1:-1, :], -math.inf)
-    earlier = 1 + xp.argmax(xp.where(before, y[1:-1, :], least), axis=0)
+    highest = 1 + xp.argmax(xp.where(earlier_peak, y[1:-1, :], least), axis=0)
     peak = xp.where(exists, first, xp.argmax(y, axis=0))
-    peak = xp.where(xp.any(before, axis=0), earlier, peak)
+    peak = xp.where(xp.any(earlier_peak, axis=0), highest, peak)
     lower = xp.take_along_axis(grid, first[None, :], axis=0)[0, :]
     upper = xp.take_along_axis(grid, (first + 1)[None, :], axis=0)[0, :]
     return lower, upper, exists, peak

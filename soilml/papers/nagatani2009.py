@@ -58,7 +58,7 @@ def _shifted() -> float:
     wheel, at = Wheel(radius=WHEEL.radius, width=WHEEL.width), Operating(slip=0.0, load=WEIGHT)
     depth = np.asarray(WHEEL.radius * (1.0 - math.cos(math.radians(70.0))))
     scene = LoadCase(wheel, SAND, at)
-    rim = wheel.shape(depth, SAND, at)
+    rim = wheel.contact_geometry(depth, SAND, at)
     left = StressShift(shift=SHIFT).on_contact(rim, scene)
     return float(np.rad2deg(left.entry - left.exit))
 

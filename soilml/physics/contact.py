@@ -1,33 +1,55 @@
-"""Contact, stress and force: where gears, soils and effects meet, and nowhere else."""
+"""Contact, stress and force: the quantities through which gears, soils and effects interact."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from soilml.arrays import Array, Real, namespace
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
+
+#: Depth (m) in place of none, where the stress is zero: log(0) has no derivative.
+SMALLEST_DEPTH = 1e-300
 
 
 @dataclass(frozen=True)
 class Contact:
     """Points along the contact of a running gear, arrays (points, batch): points first.
 
-    `up` and `ahead` are the area projected on the ground and on the direction of travel: for a
-    point where the gear's surface stands at an angle theta from the ground, cos(theta) and
-    sin(theta) times `area`. A gear whose stress follows a known shape between few points puts the
-    integral of that shape there, and the sum in `integrate` is then exact.
+    For a point where the gear's surface is inclined by an angle theta to the ground,
+    `horizontal_area` is cos(theta) and `frontal_area` sin(theta) times `area`. A gear whose stress
+    has a known shape between few points assigns the integrals of that shape to these points; the
+    sums in `integrate` are then exact.
     """
 
     depth: Array  # m, depth that sets the pressure
-    sheared: Array  # m, shear displacement since entry, positive when it drives
-    rolled: Array  # m, how far the gear's surface has moved past the point since entry
-    area: Array  # m^2, area that the point stands for
-    up: Array  # m^2, that area, projected on the ground
-    ahead: Array  # m^2, that area, projected on the direction of travel
-    lever: Array  # m, lever arm of the shear stress about the axle
+    shear_displacement: Array  # m, since entry, positive when it drives the gear
+    surface_travel: Array  # m, how far the gear's surface has moved past the point since entry
+    area: Array  # m^2, area that the point represents
+    horizontal_area: Array  # m^2, that area projected on the ground
+    frontal_area: Array  # m^2, that area projected on the plane across the travel
+    shear_lever_arm: Array  # m, of the shear stress about the axle
     width: Real  # m, the smaller dimension of the contact patch
-    normal_lever: Real = None  # m, of the normal stress, where it misses the axle
+    normal_lever_arm: Real | None = None  # m, of the normal stress, where it misses the axle
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Array:
+            """The field under its former name, which effect files of users may still read."""
+            if name not in _FORMER_NAMES:
+                raise AttributeError(f"a contact has no {name!r}")
+            return getattr(self, _FORMER_NAMES[name])
+
+
+_FORMER_NAMES = {
+    "sheared": "shear_displacement",
+    "rolled": "surface_travel",
+    "up": "horizontal_area",
+    "ahead": "frontal_area",
+    "lever": "shear_lever_arm",
+    "normal_lever": "normal_lever_arm",
+}
 
 
 @dataclass(frozen=True)
@@ -41,7 +63,7 @@ class Stress:
 
 @dataclass(frozen=True)
 class Force:
-    """What a running gear feels; arrays of the batch's shape.
+    """Forces of the soil on a running gear; arrays of the batch's shape.
 
     A row whose `status` is not 0 has no equilibrium: its torque, drawbar pull, sinkage and entry
     angle are NaN. Its `load` is the largest that the soil carried where it is TOO_HEAVY, and means
@@ -71,28 +93,42 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     modulus = soil.kc / contact.width + soil.kphi
     normal = modulus * xp.exp(soil.n * xp.log(contact.depth))
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
-    mobilised = -xp.expm1(-xp.abs(contact.sheared) / soil.shear_modulus)
-    sign = xp.where(at.slip < 0, -xp.ones_like(at.slip), xp.ones_like(at.slip))
-    return Stress(contact=contact, normal=normal, shear=sign * strength * mobilised)
+    mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), soil)
+    return Stress(contact=contact, normal=normal, shear=slip_sign(at) * strength * mobilised)
+
+
+def mobilised_fraction(displacement: Array, soil: Soil) -> Array:
+    r"""Fraction of the shear strength that is mobilised, :math:`1 - e^{-j / K}`.
+
+    `displacement` j (m) is not negative. References: Janosi and Hanamoto, Proc. 1st ISTVS, 1961.
+    """
+    return -namespace(displacement).expm1(-displacement / soil.shear_modulus)
+
+
+def slip_sign(at: Operating) -> Array:
+    """Direction of the shear stress: -1 where the gear brakes, else 1."""
+    xp = namespace(at.slip)
+    return xp.where(at.slip < 0, -xp.ones_like(at.slip), xp.ones_like(at.slip))
 
 
 def integrate(stress: Stress) -> tuple[Array, Array, Array]:
-    r"""Vertical load (N), drawbar pull (N) and torque (N m) of all points together.
+    r"""Vertical load (N), drawbar pull (N) and torque (N m), integrated over the contact.
 
     .. math::
         W = \int (\sigma \cos\theta + \tau \sin\theta) dA, \quad
         DP = \int (\tau \cos\theta - \sigma \sin\theta) dA, \quad
         T = \int (\tau R + \sigma R_n) dA
 
-    where R_n is the lever arm of the normal stress, nothing where the surface is an arc about the
+    where R_n is the lever arm of the normal stress, zero where the surface is an arc about the
     axle. References: Wong and Reece 1967, eqs. of equilibrium of a driven rigid wheel; Comin and
     Saaj 2017, eq. 17, for a surface that is not.
     """
     xp, contact = namespace(stress.normal), stress.contact
-    load = xp.sum(stress.normal * contact.up + stress.shear * contact.ahead, axis=0)
-    pull = xp.sum(stress.shear * contact.up - stress.normal * contact.ahead, axis=0)
-    turning = stress.shear * contact.lever
-    if contact.normal_lever is not None:
-        turning = turning + stress.normal * contact.normal_lever
-    torque = xp.sum(turning * contact.area, axis=0)
+    normal, shear = stress.normal, stress.shear
+    load = xp.sum(normal * contact.horizontal_area + shear * contact.frontal_area, axis=0)
+    pull = xp.sum(shear * contact.horizontal_area - normal * contact.frontal_area, axis=0)
+    torque_per_area = shear * contact.shear_lever_arm
+    if contact.normal_lever_arm is not None:
+        torque_per_area = torque_per_area + normal * contact.normal_lever_arm
+    torque = xp.sum(torque_per_area * contact.area, axis=0)
     return load, pull, torque

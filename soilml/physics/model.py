@@ -14,7 +14,8 @@ from soilml.errors import InputError
 from soilml.parameters import check, values, with_values
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect, apply_stage
-from soilml.physics.equilibrium import at_rest, settled, stresses_along
+from soilml.physics.equilibrium import equilibrium_forces, sensor_readings
+from soilml.physics.forces import stress_profile
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
@@ -66,7 +67,7 @@ class Model:
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = _in_chunks(load_case, settled)
+            force = _in_chunks(load_case, sensor_readings)
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
@@ -77,8 +78,10 @@ class Model:
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):
-            sinkage = _in_chunks(load_case, at_rest).sinkage  # not what a sensor makes of it
-            angle, stresses = stresses_along(load_case, sinkage, points)
+            sinkage = _in_chunks(
+                load_case, equilibrium_forces
+            ).sinkage  # not what a sensor makes of it
+            angle, stresses = stress_profile(load_case, sinkage, points)
         parts = (angle, stresses.normal, stresses.shear)
         return Profile(*(xp.reshape(part, (part.shape[0], *shape)) for part in parts))
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from soilml.arrays import Array, Real, namespace, to_numpy
 from soilml.errors import InputError
 from soilml.parameters import check
-from soilml.physics.equilibrium import at_rest, prepared, stressed
+from soilml.physics.equilibrium import equilibrium_forces
+from soilml.physics.forces import apply_input_effects, stresses_at_sinkage
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import Model, flattened
 from soilml.physics.operating_point import Operating
@@ -39,9 +40,9 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
             f"slip is {float(xp.min(load_case.at.slip)):g}; pull efficiency needs slip above 0"
         )
     with np.errstate(all="ignore"):
-        force = at_rest(load_case)
-        _, stresses = stressed(prepared(load_case), force.sinkage)
-    thrust = xp.sum(stresses.shear * stresses.contact.up, axis=0)
+        force = equilibrium_forces(load_case)
+        _, stresses = stresses_at_sinkage(apply_input_effects(load_case), force.sinkage)
+    thrust = xp.sum(stresses.shear * stresses.contact.horizontal_area, axis=0)
     return xp.reshape(force.drawbar_pull / thrust, shape)
 
 

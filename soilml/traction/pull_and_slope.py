@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.numerics.root_finding import crossing
+from soilml.numerics.root_finding import rising_root
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.traction.soil_draws import SoilDraws
@@ -132,9 +132,9 @@ def traction(
 
     ends = np.full(carried.size, STEEPEST)
     guess = np.arctan(flat[carried] / load)
-    root = crossing(too_steep, -ends, ends, guess, np.ones(carried.size))
+    root = rising_root(too_steep, -ends, ends, guess, np.ones(carried.size))
     slope = np.full(rows.size, np.nan)
-    slope[carried] = np.where(root.found | (root.x >= STEEPEST), root.x, np.nan)
+    slope[carried] = np.where(root.converged | (root.x >= STEEPEST), root.x, np.nan)
     shape = (count, len(slip))
     return Traction(float(load), slip, flat.reshape(shape), slope.reshape(shape))
 

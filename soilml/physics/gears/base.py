@@ -1,4 +1,4 @@
-"""What a running gear must answer."""
+"""The interface of a running gear."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from soilml.physics.soils.soil import Soil
 
 @runtime_checkable
 class Gear(Protocol):
-    """A running gear: a frozen dataclass of its dimensions that can describe its contact.
+    """A running gear: a frozen dataclass of its dimensions that describes its contact.
 
-    `shape` gives the contact as a few numbers per row (angles, radii), which effects may change;
-    `contact` cuts that shape into points. Both take arrays of shape (batch,).
+    `contact_geometry` gives the contact as a few numbers per row (angles, radii), which effects may
+    change; `contact` discretises it into points. All arrays have shape (batch,) unless noted.
     """
 
     name: ClassVar[str]
@@ -30,30 +30,30 @@ class Gear(Protocol):
         """Width of the gear, m."""
         ...
 
-    def deepest(self) -> Real:
-        """The largest sinkage that the gear's model holds for, m."""
+    def largest_sinkage(self) -> Real:
+        """The largest sinkage for which the gear's model holds, m."""
         ...
 
-    def guess(self, soil: Soil, at: Operating) -> Array:
-        """A first estimate of the sinkage, m."""
+    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
+        """A first estimate of the sinkage, m, where the search begins."""
         ...
 
-    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Any:
-        """The contact at this sinkage, before it is cut into points."""
+    def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> Any:
+        """The contact at this sinkage (m), of a type of the gear's own that has `entry` (rad)."""
         ...
 
-    def flaw(self, shape: Any) -> Array:
-        """`soilml.row_status.Status`: why a shape cannot carry stresses, 0 where it can."""
+    def geometry_status(self, geometry: Any) -> Array:
+        """`soilml.row_status.Status` where a geometry cannot carry stresses, 0 where it can."""
         ...
 
-    def contact(self, shape: Any, at: Operating) -> Contact:
-        """The points along the contact, for integration."""
+    def contact(self, geometry: Any, at: Operating) -> Contact:
+        """The points along the contact, (points, batch), for integration."""
         ...
 
-    def rough(self, shape: Any, at: Operating) -> Contact:
-        """Fewer points, good for a few per cent of the load."""
+    def coarse_contact(self, geometry: Any, at: Operating) -> Contact:
+        """Fewer points, for the load to a few per cent."""
         ...
 
-    def stations(self, shape: Any, at: Operating, points: int) -> tuple[Array, Contact]:
-        """Points along the contact for looking at: their angles (points, batch), and themselves."""
+    def profile_contact(self, geometry: Any, at: Operating, points: int) -> tuple[Array, Contact]:
+        """Points for a stress profile: their angles (points, batch), and a contact without area."""
         ...

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.physics.contact import Contact
-from soilml.physics.gears.rigid_wheel import NO_DEPTH, RigidWheel, WheelArc
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.operating_point import Operating
 
 
@@ -30,38 +30,48 @@ class LinearWheel(RigidWheel):
 
     name: ClassVar[str] = "linear-wheel"
 
-    def contact(self, shape: WheelArc, at: Operating) -> Contact:
-        """Two points, exit and maximum stress; at entry there is neither stress."""
-        xp = namespace(shape.entry)
-        entry, peak, leave = shape.entry, shape.peak, shape.exit
+    def contact(self, geometry: WheelArc, at: Operating) -> Contact:
+        """Two points, exit and maximum stress; at entry there is no stress.
+
+        The stress falls linearly from the maximum to both ends. With its value at a point factored
+        out, the integral of cos or sin times that line over the front and the rear part of the arc
+        is the weight of the point.
+        """
+        xp = namespace(geometry.entry)
+        entry, peak, leave = geometry.entry, geometry.peak, geometry.exit
         front, rear = entry - peak, peak - leave
         sin, cos = xp.sin, xp.cos
-        up_rear = (rear * sin(peak) + cos(peak) - cos(leave)) / rear
-        up_front = (cos(peak) - cos(entry) - front * sin(peak)) / front
-        ahead_rear = (sin(peak) - sin(leave) - rear * cos(peak)) / rear
-        ahead_front = (front * cos(peak) + sin(peak) - sin(entry)) / front
-        scale = shape.radius * shape.width
+        # weights of the maximum stress in the two parts, for cos and for sin of the angle
+        cos_rear = (rear * sin(peak) + cos(peak) - cos(leave)) / rear
+        cos_front = (cos(peak) - cos(entry) - front * sin(peak)) / front
+        sin_rear = (sin(peak) - sin(leave) - rear * cos(peak)) / rear
+        sin_front = (front * cos(peak) + sin(peak) - sin(entry)) / front
+        # weights of the stress at exit: the whole rear part less that of the maximum
+        cos_exit = sin(peak) - sin(leave) - cos_rear
+        sin_exit = cos(leave) - cos(peak) - sin_rear
+        scale = geometry.radius * geometry.width
         angle = xp.stack([leave, peak], axis=0)
         passed = entry - angle
+        peak_depth = geometry.radius * (cos(peak) - cos(entry))
+        rolled_ahead = (1.0 - at.slip) * (sin(entry) - sin(angle))
         return Contact(
-            depth=xp.stack(
-                [xp.full_like(peak, NO_DEPTH), shape.radius * (cos(peak) - cos(entry))], axis=0
-            ),
-            sheared=shape.shear_radius * (passed - (1.0 - at.slip) * (sin(entry) - sin(angle))),
-            rolled=shape.shear_radius * passed,
+            depth=xp.stack([xp.full_like(peak, SMALLEST_DEPTH), peak_depth], axis=0),
+            shear_displacement=geometry.shear_radius * (passed - rolled_ahead),
+            surface_travel=geometry.shear_radius * passed,
             area=scale * 0.5 * xp.stack([rear, front + rear], axis=0),
-            up=scale * xp.stack([sin(peak) - sin(leave) - up_rear, up_rear + up_front], axis=0),
-            ahead=scale
-            * xp.stack([cos(leave) - cos(peak) - ahead_rear, ahead_rear + ahead_front], axis=0),
-            lever=shape.lever,
-            width=shape.width,
+            horizontal_area=scale * xp.stack([cos_exit, cos_rear + cos_front], axis=0),
+            frontal_area=scale * xp.stack([sin_exit, sin_rear + sin_front], axis=0),
+            shear_lever_arm=geometry.lever,
+            width=geometry.width,
         )
 
-    def rough(self, shape: WheelArc, at: Operating) -> Contact:
+    def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """The same two points."""
-        return self.contact(shape, at)
+        return self.contact(geometry, at)
 
-    def stations(self, shape: WheelArc, at: Operating, points: int) -> tuple[Array, Contact]:
-        """Exit and maximum: the stresses are straight between them, and to nothing at entry."""
-        xp = namespace(shape.entry)
-        return xp.stack([shape.exit, shape.peak], axis=0), self.contact(shape, at)
+    def profile_contact(
+        self, geometry: WheelArc, at: Operating, points: int
+    ) -> tuple[Array, Contact]:
+        """Exit and maximum, whatever `points`; stresses are linear between them, and to entry."""
+        xp = namespace(geometry.entry)
+        return xp.stack([geometry.exit, geometry.peak], axis=0), self.contact(geometry, at)

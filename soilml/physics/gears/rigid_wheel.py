@@ -1,4 +1,4 @@
-"""The arc of a rigid wheel that stands in the soil."""
+"""The contact arc of a rigid wheel."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Annotated, final
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
+from soilml.physics.gears.arc import entry_angle
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 from soilml.row_status import Status
 
-#: Stands for no depth, where the stress is zero: log(0) has no derivative.
-NO_DEPTH = 1e-300
+#: Smallest value of 3 - n in the initial sinkage, whose equation holds for n well below 3.
+SMALLEST_DIVISOR = 0.5
 
 
 @dataclass(frozen=True)
@@ -28,26 +29,26 @@ class WheelArc:
     peak: Array  # rad, where the normal stress is largest
     sinkage: Array  # m
     radius: Real  # m
-    shear_radius: Real  # m, radius at which soil is sheared; that of the rim unless lugs dig
+    shear_radius: Real  # m, radius at which soil is sheared; larger than the rim's with lugs
     lever: Real  # m, lever arm of the shear stress about the axle
     width: Real  # m
 
 
 @dataclass(frozen=True, kw_only=True)
 class RigidWheel(ABC):
-    """A rigid cylinder in the soil, whatever its stresses are taken to be along the arc."""
+    """A rigid cylinder in the soil, for any assumption on the stresses along its arc."""
 
     radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
     width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
 
     @final
-    def deepest(self) -> Real:
-        """The hub stands at the free surface: the radius, m."""
+    def largest_sinkage(self) -> Real:
+        """The radius, m: the hub is at the free surface."""
         return self.radius
 
     @final
-    def guess(self, soil: Soil, at: Operating) -> Array:
-        r"""Sinkage under normal stress alone, m: where the search begins.
+    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
+        r"""Sinkage under normal stress alone, m, where the search begins.
 
         .. math::
             z = \left[\frac{3 W}{(3 - n) (k_c + b k_\varphi) \sqrt{2 r}}\right]^{2 / (2 n + 1)}
@@ -56,13 +57,13 @@ class RigidWheel(ABC):
         """
         xp = namespace(at.load)
         modulus = soil.kc + self.width * soil.kphi
-        room = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, 0.5))
-        base = 3.0 * at.load / (room * modulus * xp.sqrt(2.0 * self.radius))
+        divisor = xp.maximum(3.0 - soil.n, xp.full_like(3.0 - soil.n, SMALLEST_DIVISOR))
+        base = 3.0 * at.load / (divisor * modulus * xp.sqrt(2.0 * self.radius))
         return base ** (2.0 / (2.0 * soil.n + 1.0))
 
     @final
-    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> WheelArc:
-        r"""The arc of a wheel that has sunk this deep (m) and leaves the soil below its axle.
+    def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> WheelArc:
+        r"""The arc of a wheel at this sinkage (m) that leaves the soil straight below its axle.
 
         .. math::
             \theta_1 = \arccos(1 - z / r), \quad \theta_2 = 0, \quad
@@ -71,8 +72,7 @@ class RigidWheel(ABC):
         References: Wong and Reece, J. Terramechanics 4(1), 1967.
         """
         xp = namespace(sinkage)
-        # arcsin of the half angle keeps all digits at small sinkage, where arccos loses them
-        entry = 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * self.radius)))
+        entry = entry_angle(sinkage, self.radius)
         return WheelArc(
             entry=entry,
             exit=xp.zeros_like(entry),
@@ -85,9 +85,9 @@ class RigidWheel(ABC):
         )
 
     @final
-    def flaw(self, shape: WheelArc) -> Array:
+    def geometry_status(self, geometry: WheelArc) -> Array:
         """`Status.NO_PEAK` where the maximum stress does not lie inside the arc, else 0."""
-        xp = namespace(shape.entry)
-        inside = (shape.peak > shape.exit) & (shape.peak < shape.entry)
-        ok = xp.zeros_like(shape.entry, dtype=xp.int64)
+        xp = namespace(geometry.entry)
+        inside = (geometry.peak > geometry.exit) & (geometry.peak < geometry.entry)
+        ok = xp.zeros_like(geometry.entry, dtype=xp.int64)
         return xp.where(inside, ok, ok + int(Status.NO_PEAK))

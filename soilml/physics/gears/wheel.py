@@ -8,8 +8,9 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
-from soilml.physics.contact import Contact
-from soilml.physics.gears.rigid_wheel import NO_DEPTH, RigidWheel, WheelArc
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.arc import differences_from_entry
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.gears.shear_reversal import reversals
 from soilml.physics.operating_point import Operating
 
@@ -17,8 +18,8 @@ from soilml.physics.operating_point import Operating
 #: quadrature.
 DRIVING_NODES = 16
 BRAKING_NODES = 24
-#: Enough for a few per cent, to see whether the load was nearly reached.
-ROUGH_NODES = 5
+#: Enough for the load to a few per cent.
+COARSE_NODES = 5
 
 
 @final
@@ -41,99 +42,107 @@ class Wheel(RigidWheel):
 
     name: ClassVar[str] = "wheel"
 
-    def contact(self, shape: WheelArc, at: Operating) -> Contact:
+    def contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """The points along the arc; more of them where a braking wheel shears both ways."""
-        xp = namespace(shape.entry)
+        xp = namespace(geometry.entry)
         if bool(xp.any(at.slip < 0)):
-            return _braking(shape, at)
-        return _halves(shape, at, DRIVING_NODES)
+            return _braking_contact(geometry, at)
+        return _two_part_contact(geometry, at, DRIVING_NODES)
 
-    def rough(self, shape: WheelArc, at: Operating) -> Contact:
-        """Few points whichever way the wheel slips."""
-        return _halves(shape, at, ROUGH_NODES)
+    def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
+        """Few points, the same for driving and braking."""
+        return _two_part_contact(geometry, at, COARSE_NODES)
 
-    def stations(self, shape: WheelArc, at: Operating, points: int) -> tuple[Array, Contact]:
-        """Evenly spaced from entry to exit; they stand for no area."""
-        xp = namespace(shape.entry)
-        share = xp.linspace(0.0, 1.0, points, dtype=shape.entry.dtype)[:, None]
-        passed = share * (shape.entry - shape.exit)
-        front, rear = shape.entry - shape.peak, shape.peak - shape.exit
-        behind = (1.0 - share) * (shape.entry - shape.exit) * (front / rear)
-        depth = depth_along(shape, xp.where(passed <= front, passed, behind))
+    def profile_contact(
+        self, geometry: WheelArc, at: Operating, points: int
+    ) -> tuple[Array, Contact]:
+        """Evenly spaced points from entry to exit, without area."""
+        xp = namespace(geometry.entry)
+        fraction = xp.linspace(0.0, 1.0, points, dtype=geometry.entry.dtype)[:, None]
+        arc = geometry.entry - geometry.exit
+        front, rear = geometry.entry - geometry.peak, geometry.peak - geometry.exit
+        passed = fraction * arc
+        mirrored = (1.0 - fraction) * arc * (front / rear)
+        depth = depth_at(geometry, xp.where(passed <= front, passed, mirrored))
         none = xp.zeros_like(passed)
-        return shape.entry - passed, contact_along(
-            shape, at, passed, xp.maximum(depth, none + NO_DEPTH), none
-        )
+        depth = xp.maximum(depth, none + SMALLEST_DEPTH)
+        return geometry.entry - passed, contact_at(geometry, at, passed, depth, none)
 
 
-def _halves(rim: WheelArc, at: Operating, count: int) -> Contact:
+def _two_part_contact(rim: WheelArc, at: Operating, count: int) -> Contact:
     """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
     xp = namespace(rim.entry)
     x, weight = columns(crowded_start(count), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
     passed = xp.concat([x * front, (rim.entry - rim.exit) - x * rear], axis=0)
-    depth = depth_along(rim, x * front)  # nodes stand alike in both parts: the same pressures
+    # the pressure behind the maximum mirrors that before it, at the same fractions of both parts
+    depth = depth_at(rim, x * front)
     arc = xp.concat([weight * front, weight * rear], axis=0)
-    return contact_along(rim, at, passed, xp.concat([depth, depth], axis=0), arc)
+    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc)
 
 
-def _braking(rim: WheelArc, at: Operating) -> Contact:
-    """Parts that end where shear displacement changes its direction and the shear curve bends.
-
-    Three of them, or four where the rim reaches behind the axle and it may do so twice.
-    """
+def _braking_contact(rim: WheelArc, at: Operating) -> Contact:
+    """Parts that end where shear displacement changes its direction and the shear curve bends."""
     xp = namespace(rim.entry)
     x, weight = columns(crowded_ends(BRAKING_NODES), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    turn, turns = reversals(rim.entry, rim.exit, at.slip)
-    halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
-    inner = [rim.peak, xp.where(turns[0, :], turn[0, :], halfway)]
-    if bool(xp.any(turns[1, :])):
-        below = 0.5 * (rim.exit + xp.minimum(*inner))
-        inner.append(xp.where(turns[1, :], turn[1, :], below))
-    between = xp.sort(xp.stack(inner, axis=0), axis=0)
-    ends = [rim.exit, *(between[i, :] for i in range(len(inner))), rim.entry]
-    passed, mapped, arc = [], [], []
+    ends = _braking_part_ends(rim, at)
+    passed, equivalent, arc = [], [], []
     for low, high in pairwise(ends):
         length = high - low
-        here = (rim.entry - high) + length * x
-        behind = ((low - rim.exit) + length * (1.0 - x)) * (front / rear)
-        passed.append(here)
-        mapped.append(xp.where(high <= rim.peak, behind, here))
+        from_entry = (rim.entry - high) + length * x
+        # behind the maximum, the angle before it that has the same pressure
+        mirrored = ((low - rim.exit) + length * (1.0 - x)) * (front / rear)
+        passed.append(from_entry)
+        equivalent.append(xp.where(high <= rim.peak, mirrored, from_entry))
         arc.append(weight * length)
-    depth = depth_along(rim, xp.concat(mapped, axis=0))
-    return contact_along(rim, at, xp.concat(passed, axis=0), depth, xp.concat(arc, axis=0))
+    depth = depth_at(rim, xp.concat(equivalent, axis=0))
+    return contact_at(rim, at, xp.concat(passed, axis=0), depth, xp.concat(arc, axis=0))
 
 
-def depth_along(rim: WheelArc, passed: Array) -> Array:
+def _braking_part_ends(rim: WheelArc, at: Operating) -> list[Array]:
+    """Angles (rad) from exit to entry that bound the parts of a braking wheel's contact.
+
+    Between exit and entry they are the maximum stress and the reversal of shear displacement; a
+    second reversal is added if any row has one, where the rim reaches far behind the axle. Rows
+    without a reversal take an angle that divides the longer part, or the lowest, in halves.
+    """
+    xp = namespace(rim.entry)
+    front, rear = rim.entry - rim.peak, rim.peak - rim.exit
+    reversal, exists = reversals(rim.entry, rim.exit, at.slip)
+    halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
+    inner = [rim.peak, xp.where(exists[0, :], reversal[0, :], halfway)]
+    if bool(xp.any(exists[1, :])):
+        below = 0.5 * (rim.exit + xp.minimum(*inner))
+        inner.append(xp.where(exists[1, :], reversal[1, :], below))
+    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
+    return [rim.exit, *(ordered[i, :] for i in range(len(inner))), rim.entry]
+
+
+def depth_at(rim: WheelArc, passed: Array) -> Array:
     """Depth (m) below the free surface of points of the rim, by the angle passed since entry."""
     xp = namespace(passed)
+    # r (cos(theta) - cos(theta_1)), as in `differences_from_entry`
     t = xp.tan(0.5 * passed)
-    double = 2.0 * t / (1.0 + t * t)
-    return rim.radius * double * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
+    u = 2.0 * t / (1.0 + t * t)
+    return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
 
 
-def contact_along(rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array) -> Contact:
+def contact_at(rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array) -> Contact:
     """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
 
-    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point stands for. With t the
-    tangent of half the angle passed, sines and cosines follow from those of the entry angle alone,
-    and their differences do not cancel.
+    `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
     """
     xp = namespace(passed)
-    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
-    t = xp.tan(0.5 * passed)
-    double = 2.0 * t / (1.0 + t * t)
-    sin_gone = double * (cos_entry + t * sin_entry)  # sin(theta_1) - sin(theta)
-    cos_gained = double * (sin_entry - t * cos_entry)  # cos(theta) - cos(theta_1)
+    sin_difference, cos_difference = differences_from_entry(rim.entry, passed)
     area = rim.radius * rim.width * arc
     return Contact(
         depth=depth,
-        sheared=rim.shear_radius * (passed - (1.0 - at.slip) * sin_gone),
-        rolled=rim.shear_radius * passed,
+        shear_displacement=rim.shear_radius * (passed - (1.0 - at.slip) * sin_difference),
+        surface_travel=rim.shear_radius * passed,
         area=area,
-        up=area * (cos_entry + cos_gained),
-        ahead=area * (sin_entry - sin_gone),
-        lever=rim.lever,
+        horizontal_area=area * (xp.cos(rim.entry) + cos_difference),
+        frontal_area=area * (xp.sin(rim.entry) - sin_difference),
+        shear_lever_arm=rim.lever,
         width=rim.width,
     )

@@ -8,23 +8,24 @@ from itertools import pairwise
 from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Array, Real, namespace
-from soilml.numerics.quadrature import crowded_ends
+from soilml.numerics.quadrature import columns, crowded_ends
 from soilml.parameters import Parameter
-from soilml.physics.contact import Contact
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.arc import differences_from_entry, entry_angle
 from soilml.physics.gears.shear_reversal import reversals
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 from soilml.row_status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.
-NODES, ROUGH_NODES = 16, 5
-#: Stands for no depth, where the stress is zero: log(0) has no derivative.
-NO_DEPTH = 1e-300
+NODES, COARSE_NODES = 16, 5
+#: Largest initial sinkage, as a fraction of the radius.
+LARGEST_INITIAL = 0.5
 
 
 @dataclass(frozen=True)
 class Sole:
-    """The part of a foot's circle that stands in the soil; angles from straight down, (batch,).
+    """The part of a foot's circle that is in the soil; angles from straight down, (batch,).
 
     The foot's arc ends at `top`: at `entry`, where its circle meets the surface, while the foot
     is not wholly under it (low sinkage), else at the arc's own end. Where that lies below `peak`
@@ -37,7 +38,7 @@ class Sole:
     sinkage: Array  # m
     radius: Real  # m
     width: Real  # m
-    raised: Real  # m, how far the hub stands above the centre of the arc
+    hub_offset: Real  # m, d, height of the hub above the centre of the arc
 
 
 @final
@@ -97,21 +98,21 @@ class Midstance:
         """The sole of the whole foot, m^2: the patch A_s of the shear modulus K = K_A sqrt(A_s)."""
         return self.radius * self.arc * self.width
 
-    def deepest(self) -> Real:
-        """The centre of the foot's arc stands at the free surface, m."""
+    def largest_sinkage(self) -> Real:
+        """The radius, m: the centre of the foot's arc is at the free surface."""
         return self.radius
 
-    def guess(self, soil: Soil, at: Operating) -> Array:
-        """Where a plate of the foot's size would rest, m, within what the gear holds for."""
+    def initial_sinkage(self, soil: Soil, at: Operating) -> Array:
+        """Sinkage of a plate of the foot's area, m, at most half the radius."""
         xp = namespace(at.load)
         pressure = at.load / self.area
         sinkage = (pressure / (soil.kc / self.width + soil.kphi)) ** (1.0 / soil.n)
-        return xp.minimum(sinkage, 0.5 * self.radius + 0.0 * sinkage)
+        return xp.minimum(sinkage, LARGEST_INITIAL * self.radius + 0.0 * sinkage)
 
-    def shape(self, sinkage: Array, soil: Soil, at: Operating) -> Sole:
-        """The sole of a foot that has sunk this deep (m), its heel end straight below the hub."""
+    def contact_geometry(self, sinkage: Array, soil: Soil, at: Operating) -> Sole:
+        """The sole of a foot at this sinkage (m), its heel end straight below the hub."""
         xp = namespace(sinkage)
-        entry = 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * self.radius)))
+        entry = entry_angle(sinkage, self.radius)
         return Sole(
             entry=entry,
             peak=(soil.a0 + soil.a1 * at.slip) * entry,
@@ -119,74 +120,77 @@ class Midstance:
             sinkage=sinkage,
             radius=self.radius,
             width=self.width,
-            raised=self.leg_length + self.tip_height - self.radius,
+            hub_offset=self.leg_length + self.tip_height - self.radius,
         )
 
-    def flaw(self, shape: Sole) -> Array:
+    def geometry_status(self, geometry: Sole) -> Array:
         """`Status.NO_PEAK` where the maximum stress does not lie on the circle's arc, else 0."""
-        xp = namespace(shape.entry)
-        ok = xp.zeros_like(shape.entry, dtype=xp.int64)
-        inside = (shape.peak > 0) & (shape.peak < shape.entry)
+        xp = namespace(geometry.entry)
+        ok = xp.zeros_like(geometry.entry, dtype=xp.int64)
+        inside = (geometry.peak > 0) & (geometry.peak < geometry.entry)
         return xp.where(inside, ok, ok + int(Status.NO_PEAK))
 
-    def contact(self, shape: Sole, at: Operating) -> Contact:
+    def contact(self, geometry: Sole, at: Operating) -> Contact:
         """The points along the sole."""
-        return _cut(shape, at, NODES)
+        return _sole_contact(geometry, at, NODES)
 
-    def rough(self, shape: Sole, at: Operating) -> Contact:
-        """Few points."""
-        return _cut(shape, at, ROUGH_NODES)
+    def coarse_contact(self, geometry: Sole, at: Operating) -> Contact:
+        """Few points along the sole."""
+        return _sole_contact(geometry, at, COARSE_NODES)
 
-    def stations(self, shape: Sole, at: Operating, points: int) -> tuple[Array, Contact]:
-        """Evenly spaced from the top of the sole to below the hub; they stand for no area."""
-        xp = namespace(shape.entry)
-        angle = xp.linspace(1.0, 0.0, points, dtype=shape.entry.dtype)[:, None] * shape.top
-        return angle, _along(shape, at, angle, xp.zeros_like(angle))
+    def profile_contact(self, geometry: Sole, at: Operating, points: int) -> tuple[Array, Contact]:
+        """Evenly spaced points from the top of the sole to below the hub, without area."""
+        xp = namespace(geometry.entry)
+        fraction = xp.linspace(1.0, 0.0, points, dtype=geometry.entry.dtype)[:, None]
+        angle = fraction * geometry.top
+        return angle, _contact_at(geometry, at, angle, xp.zeros_like(angle))
 
 
-def _cut(sole: Sole, at: Operating, count: int) -> Contact:
+def _sole_contact(sole: Sole, at: Operating, count: int) -> Contact:
     """Parts that end at the maximum stress and where a braking foot's shear changes direction."""
     xp = namespace(sole.entry)
-    bare = 0.0 * sole.top
+    heel = 0.0 * sole.top  # straight below the hub
     inner = [xp.minimum(sole.peak, sole.top)]
     if bool(xp.any(at.slip < 0)):
-        turn, turns = reversals(sole.entry, bare, at.slip)
-        inner.append(xp.minimum(xp.where(turns[0, :], turn[0, :], 0.5 * sole.top), sole.top))
-    between = xp.sort(xp.stack(inner, axis=0), axis=0)
-    ends = [bare, *(between[i, :] for i in range(len(inner))), sole.top]
-    x, weight = (
-        xp.asarray(v[:, None], dtype=bare.dtype, device=bare.device) for v in crowded_ends(count)
-    )
+        # the heel is not behind the hub, where a second reversal could be
+        reversal, exists = reversals(sole.entry, heel, at.slip)
+        first = xp.where(exists[0, :], reversal[0, :], 0.5 * sole.top)
+        inner.append(xp.minimum(first, sole.top))
+    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
+    ends = [heel, *(ordered[i, :] for i in range(len(inner))), sole.top]
+    x, weight = columns(crowded_ends(count), heel)
     angle = xp.concat([low + (high - low) * x for low, high in pairwise(ends)], axis=0)
     arc = xp.concat([(high - low) * weight for low, high in pairwise(ends)], axis=0)
-    return _along(sole, at, angle, arc)
+    return _contact_at(sole, at, angle, arc)
 
 
-def _along(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
-    """Contact at these angles (rad), each standing for `arc` (rad); arrays (points, batch).
-
-    Sines and cosines follow from the tangents of half the angles passed since entry, and their
-    differences do not cancel.
-    """
+def _contact_at(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
+    """Contact at these angles (rad), each representing `arc` (rad); arrays (points, batch)."""
     xp = namespace(angle)
-    sin_entry, cos_entry = xp.sin(sole.entry), xp.cos(sole.entry)
     passed = sole.entry - angle
+    # behind the maximum, the angle before it that has the same pressure
     mirrored = angle * ((sole.entry - sole.peak) / sole.peak)
-    t = xp.tan(0.5 * xp.where(angle < sole.peak, mirrored, passed))
-    depth = 2.0 * sole.radius * t / (1.0 + t * t) * (sin_entry - t * cos_entry)
-    t = xp.tan(0.5 * passed)
-    double = 2.0 * t / (1.0 + t * t)
-    sin_gone = double * (cos_entry + t * sin_entry)
-    sin, cos = sin_entry - sin_gone, cos_entry + double * (sin_entry - t * cos_entry)
+    depth = _depth_at(sole, xp.where(angle < sole.peak, mirrored, passed))
+    sin_difference, cos_difference = differences_from_entry(sole.entry, passed)
+    sin = xp.sin(sole.entry) - sin_difference
+    cos = xp.cos(sole.entry) + cos_difference
     area = sole.radius * sole.width * arc
     return Contact(
-        depth=xp.maximum(depth, xp.zeros_like(depth) + NO_DEPTH),
-        sheared=sole.radius * (passed - (1.0 - at.slip) * sin_gone),
-        rolled=sole.radius * passed,
+        depth=xp.maximum(depth, xp.zeros_like(depth) + SMALLEST_DEPTH),
+        shear_displacement=sole.radius * (passed - (1.0 - at.slip) * sin_difference),
+        surface_travel=sole.radius * passed,
         area=area,
-        up=area * cos,
-        ahead=area * sin,
-        lever=sole.radius + sole.raised * cos,
-        normal_lever=-sole.raised * sin,
+        horizontal_area=area * cos,
+        frontal_area=area * sin,
+        shear_lever_arm=sole.radius + sole.hub_offset * cos,
+        normal_lever_arm=-sole.hub_offset * sin,
         width=sole.width,
     )
+
+
+def _depth_at(sole: Sole, passed: Array) -> Array:
+    """Depth (m) of points of the arc below the free surface, by the angle passed since entry."""
+    xp = namespace(passed)
+    # R (cos(theta) - cos(theta_1)), as in `differences_from_entry`
+    t = xp.tan(0.5 * passed)
+    return 2.0 * sole.radius * t / (1.0 + t * t) * (xp.sin(sole.entry) - t * xp.cos(sole.entry))

@@ -43,8 +43,8 @@ def bekker_stress_profile(
         )
     depth = np.asarray([sinkage], dtype=np.float64)
     conditions = Operating(slip=np.asarray([slip], dtype=np.float64), load=np.ones(1))
-    rim = wheel.shape(depth, soil, conditions)
+    rim = wheel.contact_geometry(depth, soil, conditions)
     rim = replace(rim, exit=-2.0 * np.arcsin(np.sqrt(rebound * depth / (2.0 * wheel.radius))))
-    angle, contact = wheel.stations(rim, conditions, POINTS)
+    angle, contact = wheel.profile_contact(rim, conditions, POINTS)
     normal = stress(contact, soil, conditions).normal
     return StressProfile(angle[::-1, 0], normal[::-1, 0])

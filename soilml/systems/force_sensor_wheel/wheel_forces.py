@@ -11,7 +11,7 @@ from soilml.arrays import Array, Real
 from soilml.parameters import Parameter, check
 from soilml.physics.contact import Stress, integrate
 from soilml.physics.gears.rigid_wheel import WheelArc
-from soilml.physics.gears.wheel import contact_along
+from soilml.physics.gears.wheel import contact_at
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
@@ -133,10 +133,10 @@ def integrate_profile(profile: StressProfile, inputs: ShearInputs) -> WheelForce
         width=width,
     )
     none = np.zeros_like(angle)
-    contact = contact_along(rim, Operating(slip=slip, load=none), entry - angle, none, arc)
+    contact = contact_at(rim, Operating(slip=slip, load=none), entry - angle, none, arc)
     pressed = magnification * normal
     strength = cohesion + pressed * np.tan(friction)
-    mobilised = -np.expm1(-np.abs(contact.sheared) / modulus)
+    mobilised = -np.expm1(-np.abs(contact.shear_displacement) / modulus)
     shear = np.where(slip < 0, -1.0, 1.0) * strength * mobilised
     load, pull, torque = integrate(Stress(contact=contact, normal=pressed, shear=shear))
     load, pull, torque = (np.broadcast_to(part, batch) for part in (load, pull, torque))

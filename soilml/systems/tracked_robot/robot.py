@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from soilml.errors import InputError
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
-from soilml.physics.gears.track_geometry import FRONT, MIDDLE, REAR, gone
+from soilml.physics.gears.track_geometry import FRONT, MIDDLE, REAR, distance_along
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -109,10 +109,10 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     track, force = _track(model), model(soil, at)
     if points < 3:
         raise InputError(f"points is {points}; needed are 3 or more along the belt")
-    belt = track.shape(force.sinkage, soil, at)
+    belt = track.contact_geometry(force.sinkage, soil, at)
     profile = model.profile(soil, at, points)
-    ends = [gone(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
-    step = gone(belt, REAR, -belt.exit)[0] / (points - 1)
+    ends = [distance_along(belt, a, i) for a, i in ((FRONT, -belt.leave), (MIDDLE, belt.meet))]
+    step = distance_along(belt, REAR, -belt.exit)[0] / (points - 1)
     way = step * np.arange(points).reshape(-1, *[1] * np.ndim(step))
     lift = profile.normal * np.cos(profile.angle) + profile.shear * np.sin(profile.angle)
     front, rear = way < ends[0][0], way > ends[1][0]

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.optimize import brentq
 
-from soilml.numerics.root_finding import crossing, scan
+from soilml.numerics.root_finding import first_bracket, rising_root
 
 
 def test_finds_every_root_of_a_batch_of_steep_and_flat_functions():
@@ -14,8 +14,8 @@ def test_finds_every_root_of_a_batch_of_steep_and_flat_functions():
         return np.log(0.1 + np.exp(power * (x - place))) - np.log(1.1)
 
     low, high = np.full(400, -20.0), np.full(400, 5.0)
-    root = crossing(f, low, high, np.full(400, 0.0), np.full(400, 1.0))
-    assert root.found.all()
+    root = rising_root(f, low, high, np.full(400, 0.0), np.full(400, 1.0))
+    assert root.converged.all()
     for i in range(0, 400, 37):
         exact = brentq(
             lambda x, i=i: np.log(0.1 + np.exp(power[i] * (x - place[i]))) - np.log(1.1), -20, 5
@@ -23,27 +23,27 @@ def test_finds_every_root_of_a_batch_of_steep_and_flat_functions():
         assert abs(root.x[i] - exact) < 1e-9
 
 
-def test_says_so_where_there_is_no_root_and_ends_at_the_upper_bound():
+def test_without_a_root_the_search_ends_at_the_upper_bound_unconverged():
     top = np.asarray([0.5, -0.5])
-    root = crossing(
+    root = rising_root(
         lambda x: np.minimum(x, top), np.full(2, -9.0), np.full(2, 3.0), np.zeros(2) - 1, np.ones(2)
     )
-    assert root.found.tolist() == [True, False]
+    assert root.converged.tolist() == [True, False]
     assert root.x[1] == 3.0
 
 
-def test_scan_takes_the_first_of_several_crossings():
+def test_the_bracket_is_that_of_the_first_of_several_crossings():
     grid = np.linspace(0.1, 9.0, 200)[:, None]
-    low, high, exists, _ = scan(lambda x: np.sin(x) - 0.5, grid)
+    low, high, exists, _ = first_bracket(lambda x: np.sin(x) - 0.5, grid)
     assert exists.all()
     assert low[0] < np.pi / 6 <= high[0]
-    _, _, exists, peak = scan(lambda x: np.sin(x) - 1.5, grid)
+    _, _, exists, peak = first_bracket(lambda x: np.sin(x) - 1.5, grid)
     assert not exists.any()
     assert abs(np.sin(grid[peak[0], 0]) - 1.0) < 1e-3
 
 
-def test_scan_points_to_a_peak_before_the_crossing():
+def test_the_peak_is_that_before_the_crossing():
     grid = np.linspace(0.1, 9.0, 200)[:, None]
-    low, _, exists, peak = scan(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
+    low, _, exists, peak = first_bracket(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
     assert exists.all() and low[0] > 6.0
     assert abs(grid[peak[0], 0] - np.pi / 2) < 0.2

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Stress
+from soilml.physics.contact import Stress, slip_sign
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.gears.track import Track
@@ -53,12 +53,11 @@ class TrackGrousers(SlipLoadScaling):
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
         contact, soil = stress.contact, load_case.soil
-        xp = namespace(contact.sheared)
-        share = xp.abs(contact.sheared) / (self.yielding * soil.shear_modulus)
+        xp = namespace(contact.shear_displacement)
+        share = xp.abs(contact.shear_displacement) / (self.yielding * soil.shear_modulus)
         share = xp.clip(share, 1e-30, 1.0)  # the root of nothing has no derivative
         sides = 1.0 + 2.0 * self.height / contact.width
         strength = soil.cohesion * sides + stress.normal * xp.tan(soil.friction_angle)
-        sign = xp.where(load_case.at.slip < 0, -xp.ones_like(share), xp.ones_like(share))
-        between = sign * strength * xp.exp(self.power * xp.log(share))
-        grown = self.scaled(self.spacing, load_case)
-        return replace(stress, shear=(1.0 - grown) * stress.shear + grown * between)
+        between = slip_sign(load_case.at) * strength * xp.exp(self.power * xp.log(share))
+        weight = self.scaled(self.spacing, load_case)
+        return replace(stress, shear=(1.0 - weight) * stress.shear + weight * between)

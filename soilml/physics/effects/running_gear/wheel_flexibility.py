@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, final
 
-from soilml.arrays import Real, namespace
+from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
@@ -42,12 +43,10 @@ class WheelFlexibility(SlipLoadScaling):
     compliance: Annotated[Real, Parameter("m/N", 0.0, 1e-2, "C, deflection per load")] = 0.0
 
     def on_contact(self, rim: WheelArc, load_case: LoadCase) -> WheelArc:
-        xp = namespace(rim.entry)
         deflection = self.scaled(self.compliance, load_case) * load_case.at.load
         larger = 1.0 + deflection / rim.sinkage
         radius = rim.radius * larger
-        # the formula of the gear, so that a stiff wheel is the rigid one to the last bit
-        entry = 2.0 * xp.asin(xp.sqrt(rim.sinkage / (2.0 * radius)))
+        entry = entry_angle(rim.sinkage, radius)
         share = entry / rim.entry
         return replace(
             rim,

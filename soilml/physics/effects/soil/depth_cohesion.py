@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Stress
+from soilml.physics.contact import Stress, mobilised_fraction, slip_sign
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.load_case import LoadCase
@@ -38,9 +38,9 @@ class DepthCohesion(SlipLoadScaling):
     c1: Annotated[Real, Parameter("Pa/m", 0.0, 1e6, "growth of cohesion with depth")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
-        contact, slip = stress.contact, load_case.at.slip
+        contact = stress.contact
         xp = namespace(contact.depth)
-        mobilised = -xp.expm1(-xp.abs(contact.sheared) / load_case.soil.shear_modulus)
-        sign = xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
-        more = self.scaled(self.c1, load_case) * contact.depth
-        return replace(stress, shear=stress.shear + sign * more * mobilised)
+        mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), load_case.soil)
+        cohesion = self.scaled(self.c1, load_case) * contact.depth
+        more = slip_sign(load_case.at) * cohesion * mobilised
+        return replace(stress, shear=stress.shear + more)

@@ -12,6 +12,7 @@ from soilml.errors import InputError
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 
@@ -55,5 +56,5 @@ class ExitAngle(SlipLoadScaling):
         kappa = xp.minimum(
             self.scaled(self.kappa, load_case) + 0.0 * rim.entry, xp.ones_like(rim.entry)
         )
-        behind = -2.0 * xp.asin(xp.sqrt(kappa * rim.sinkage / (2.0 * rim.radius)))
+        behind = -entry_angle(kappa * rim.sinkage, rim.radius)
         return replace(rim, exit=rim.exit + behind + self.b0 * rim.entry)

@@ -43,10 +43,10 @@ class LateralSlip(SlipLoadScaling):
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
         contact, modulus = stress.contact, load_case.soil.shear_modulus
         beta = covariate(load_case, "slip_angle", self.name)
-        xp = namespace(contact.sheared)
+        xp = namespace(contact.shear_displacement)
         aside = self.scaled(self.share, load_case) * (1.0 - load_case.at.slip) * xp.tan(beta)
-        aside = aside * contact.rolled
-        ahead = xp.maximum(xp.abs(contact.sheared), xp.full_like(aside, 1e-100))
+        aside = aside * contact.surface_travel
+        ahead = xp.maximum(xp.abs(contact.shear_displacement), xp.full_like(aside, 1e-100))
         both = xp.where(aside == 0, ahead, xp.hypot(ahead, aside))
         # forward stress of the whole displacement over that of its forward part alone
         factor = (xp.expm1(-both / modulus) / both) / (xp.expm1(-ahead / modulus) / ahead)

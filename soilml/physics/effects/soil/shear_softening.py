@@ -44,7 +44,7 @@ class ShearSoftening(SlipLoadScaling):
     peak: Annotated[Real, Parameter("1", 0.2, 10.0, "K_w / K, where the peak is")] = 1.5
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
-        sheared = stress.contact.sheared
+        sheared = stress.contact.shear_displacement
         xp = namespace(sheared)
         # the ratio of the curves has a limit where neither has moved
         moved = xp.maximum(xp.abs(sheared), xp.full_like(sheared, 1e-100))

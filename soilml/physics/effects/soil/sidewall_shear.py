@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Force
+from soilml.physics.contact import Force, mobilised_fraction, slip_sign
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.gears.rigid_wheel import RigidWheel
@@ -56,8 +56,7 @@ class SidewallShear(SlipLoadScaling):
         pressure = (1.0 - xp.sin(soil.friction_angle)) * soil.unit_weight * radius * depth
         strength = soil.cohesion + pressure * xp.tan(soil.friction_angle)
         moved = radius * xp.abs(entry - (1.0 - slip) * sin)
-        sign = xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
-        shear = sign * strength * -xp.expm1(-moved / soil.shear_modulus)
+        shear = slip_sign(load_case.at) * strength * mobilised_fraction(moved, soil)
         pull = 2.0 * self.scaled(self.share, load_case) * shear * radius**2 * area
         lever = radius * (depth + xp.cos(entry))
         return replace(

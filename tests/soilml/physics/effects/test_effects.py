@@ -13,7 +13,7 @@ from soilml.parameters import check, declared
 from soilml.physics import effects
 from soilml.physics.effects.base import KINDS, STAGES, Effect
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
-from soilml.physics.equilibrium import prepared
+from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import COVARIATES
@@ -80,7 +80,7 @@ def test_finite_over_the_whole_box_or_flagged(name, gear):
             assert np.isfinite(getattr(force, channel)[ok]).all()
             assert np.isnan(getattr(force, channel)[~ok]).all()
         at = Operating(slip=box["slip"], load=box["load"], **known)
-        true = prepared(LoadCase(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
+        true = apply_input_effects(LoadCase(Wheel(radius=0.1, width=0.1), SAND, at, (effect,))).at
         np.testing.assert_allclose(force.load[ok], true.load[ok], rtol=1e-6)
         assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
 

@@ -71,7 +71,7 @@ def test_lugs_move_the_shearing_radius():
 def test_a_small_wheel_feels_stress_over_the_front_thirty_of_seventy_degrees():
     sunk = np.asarray([0.15 * (1.0 - np.cos(np.deg2rad(70.0)))])
     at = replace(AT, slip=np.asarray([0.3]))
-    rim = GEAR.shape(sunk, SAND, at)
+    rim = GEAR.contact_geometry(sunk, SAND, at)
     moved = EFFECTS["stress-shift"](shift=4 / 7).on_contact(rim, LoadCase(GEAR, SAND, at))
     assert np.rad2deg([moved.entry[0], moved.exit[0]]) == pytest.approx([70.0, 40.0])
     place = (moved.entry - moved.peak) / (moved.entry - moved.exit)

@@ -51,10 +51,13 @@ def test_weights_are_the_integrals_of_the_straight_lines():
     from dataclasses import replace
 
     at = Operating(slip=np.asarray([0.3]), load=np.asarray([60.0]))
-    shape = gear.shape(np.asarray([R * (1 - np.cos(0.5))]), SOIL, at)
+    shape = gear.contact_geometry(np.asarray([R * (1 - np.cos(0.5))]), SOIL, at)
     shape = replace(shape, exit=np.asarray([-0.1]), peak=np.asarray([0.2]))
     contact = gear.contact(shape, at)
-    for weight, function in ((contact.up, sp.cos(t)), (contact.ahead, sp.sin(t))):
+    for weight, function in (
+        (contact.horizontal_area, sp.cos(t)),
+        (contact.frontal_area, sp.sin(t)),
+    ):
         middle = sp.integrate(rear * function, (t, t2, tm))
         middle += sp.integrate(front * function, (t, tm, t1))
         end = sp.integrate((1 - rear) * function, (t, t2, tm))

@@ -107,7 +107,9 @@ def test_forces_and_their_slopes_run_on_from_case_to_case(slip):
         entry = edge * (1.0 + np.asarray([-2e-6, -1e-6, 1e-6, 2e-6]))
         sinkage = FOOT.radius * (1 - np.cos(entry))
         at = Operating(slip=np.full(4, slip), load=np.ones(4))
-        found = integrate(stress(FOOT.contact(FOOT.shape(sinkage, SAND, at), at), SAND, at))
+        found = integrate(
+            stress(FOOT.contact(FOOT.contact_geometry(sinkage, SAND, at), at), SAND, at)
+        )
         for value in found:
             assert np.abs(np.diff(value)).max() < 1e-4 * abs(value[0])
             before, after = value[1] - value[0], value[3] - value[2]

@@ -88,7 +88,7 @@ def test_agrees_with_a_dense_walk_along_the_belt(ground, shape):
         assert load > 60.0 or (force.status == Status.OK).all()
         for i, slip in enumerate(at.slip):
             if force.status[i] == Status.TOO_HEAVY:
-                assert walked(track, ground, slip, float(track.deepest()))[0] < load
+                assert walked(track, ground, slip, float(track.largest_sinkage()))[0] < load
                 continue
             carried, pull, torque = walked(track, ground, slip, float(force.sinkage[i]))
             assert carried == pytest.approx(load, rel=4e-5)
@@ -190,14 +190,14 @@ def test_gradients_flow_through_the_equilibrium(path):
 
 
 def test_load_carried_is_smooth_in_sinkage():
-    from soilml.physics.equilibrium import loaded
+    from soilml.physics.forces import forces_at_sinkage
     from soilml.physics.load_case import LoadCase
     from soilml.physics.model import flattened
 
     z = np.linspace(1e-4, 0.08, 4001)
     slack = replace(GEAR, leaving=0.1)
-    scene, _ = flattened(LoadCase(slack, CLAY, Operating(slip=0.3 + 0.0 * z, load=LOAD)))
-    load = loaded(scene, z).load
+    load_case, _ = flattened(LoadCase(slack, CLAY, Operating(slip=0.3 + 0.0 * z, load=LOAD)))
+    load = forces_at_sinkage(load_case, z).load
     assert (np.diff(load) > 0).all()
     steepness = np.diff(load) / np.diff(z)
     assert np.abs(np.diff(steepness)[40:]).max() < 0.02 * steepness.max()
@@ -218,7 +218,7 @@ def test_profile_follows_the_law_and_is_nothing_where_the_belt_does_not_touch():
 def test_torque_and_load_of_the_profile_are_those_of_the_force():
     at = Operating(slip=0.3, load=LOAD)
     profile, force = TRACK.profile(CLAY, at, points=20_001), TRACK(CLAY, at)
-    belt = GEAR.shape(np.asarray(float(force.sinkage)), CLAY, at)
+    belt = GEAR.contact_geometry(np.asarray(float(force.sinkage)), CLAY, at)
     length = GEAR.radius * (belt.entry + belt.leave + belt.meet + belt.exit)
     length = length + belt.arc_radius * (belt.leave + belt.meet)
     along = np.linspace(0.0, float(length), 20_001)

@@ -1,0 +1,186 @@
+"""Points along a track's belt, and the unloading and reloading of the soil beneath it."""
+
+from __future__ import annotations
+
+from soilml.arrays import Array, namespace
+from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_start, gauss
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.track_geometry import (
+    FRONT,
+    MIDDLE,
+    REAR,
+    Belt,
+    arc_radius,
+    distance_along,
+    height_above_front,
+    inclination_at_height,
+    middle_arc_top,
+)
+from soilml.physics.operating_point import Operating
+
+#: Fraction of the peak pressure over which the shear of unloading soil fades out.
+FADING_PRESSURE = 0.05
+
+
+def equivalent_depth(belt: Belt, deepest: Array, height: Array) -> Array:
+    r"""Depth (m) at which virgin soil has the pressure of soil unloaded by `height`.
+
+    .. math::
+        \sigma = k z_u^n - k_u (z_u - z) = k z_e^n, \quad k_u = \frac{k z_u^{n-1}}{\rho}, \quad
+        z_e = z_u \left(1 - \frac{z_u - z}{\rho z_u}\right)^{1/n}
+
+    `deepest` is z_u, the depth (m) to which the soil was loaded, and `height` is z_u - z (m).
+    References: Wang et al. 2018, eq. 1, unloading and reloading along one line.
+    """
+    xp = namespace(height)
+    pressure = 1.0 - height / (belt.rebound * deepest)  # as a fraction of the largest
+    positive = xp.maximum(pressure, xp.full_like(pressure, SMALLEST_DEPTH))
+    return deepest * xp.exp(xp.log(positive) / belt.n)
+
+
+def shear_retention(belt: Belt, deepest: Array, height: Array) -> Array:
+    r"""Fraction of the shear displacement that soil unloaded by `height` (m) retains.
+
+    .. math:: 1 - e^{-\sigma / (0.05 \sigma_u)}
+
+    It is 1 except in the last few per cent of the pressure, and 0 where the belt does not touch:
+    otherwise cohesion would end abruptly there, and the pull would have no derivative where the
+    belt is about to lift off. The form is ours.
+    """
+    xp = namespace(height)
+    pressure = 1.0 - height / (belt.rebound * deepest)  # as a fraction of the largest
+    return -xp.expm1(-xp.maximum(pressure, xp.zeros_like(pressure)) / FADING_PRESSURE)
+
+
+def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int) -> Contact:
+    """The points along the belt where it touches, by numbers of nodes.
+
+    Eight segments end where the soil is unloaded, reloaded or released, or loaded deeper than
+    before: on each of them the pressure follows one law.
+    """
+    xp = namespace(belt.entry)
+    level = xp.zeros_like(belt.entry)
+    first, second = belt.sinkage, belt.rear
+    further = second - first
+    top = middle_arc_top(belt)
+    # soil unloaded from the depth `first` has no pressure left at the height rebound * first;
+    # behind the front wheel:
+    released = xp.minimum(inclination_at_height(belt.rebound * first, belt.radius), belt.leave)
+    # on both sides of the top of the middle arc, whose inclination is counted from there:
+    off_ground = inclination_at_height(top - belt.rebound * first, belt.arc_radius)
+    off, on = xp.minimum(off_ground, belt.leave), xp.minimum(off_ground, belt.meet)
+    # behind the top, where the belt comes back to the depth `first`:
+    deeper = xp.minimum(inclination_at_height(top, belt.arc_radius), belt.meet)
+    deeper = xp.maximum(deeper, on)
+    # in front of the rear wheel, where it meets the rebounded soil, and the depth `first`:
+    met = inclination_at_height(further + belt.rebound * first, belt.radius)
+    met = xp.minimum(met, belt.meet)
+    rear_deeper = xp.minimum(inclination_at_height(further, belt.radius), met)
+    # behind the rear wheel, unloaded from the depth `second`:
+    out = xp.minimum(inclination_at_height(belt.rebound * second, belt.radius), belt.exit)
+    segments = (
+        (FRONT, (belt.entry, level), None, crowded_start(entry)),
+        (FRONT, (level, -released), first, gauss(short)),
+        (MIDDLE, (-belt.leave, -off), first, crowded_ends(middle)),
+        (MIDDLE, (on, deeper), first, crowded_ends(middle)),
+        (MIDDLE, (deeper, belt.meet), None, gauss(short)),
+        (REAR, (met, rear_deeper), first, gauss(short)),
+        (REAR, (rear_deeper, level), None, gauss(short)),
+        (REAR, (level, -out), second, gauss(short)),
+    )
+    parts = [_segment_contact(belt, at, *segment) for segment in segments]
+    by_point = (
+        *("depth", "shear_displacement", "surface_travel"),
+        *("area", "horizontal_area", "frontal_area"),
+    )
+    joined = {name: xp.concat([getattr(p, name) for p in parts], axis=0) for name in by_point}
+    return Contact(**joined, shear_lever_arm=belt.radius, width=belt.width)
+
+
+def _segment_contact(
+    belt: Belt,
+    at: Operating,
+    arc: int,
+    ends: tuple[Array, Array],
+    deepest: Array | None,
+    nodes: Nodes,
+) -> Contact:
+    """Points of a segment between two inclinations (rad) on one arc.
+
+    `deepest` (m) is the depth to which the soil under it was loaded before, None where the belt
+    loads it deeper than ever.
+    """
+    xp = namespace(belt.entry)
+    x, weight = columns(nodes, belt.entry)
+    start, end = ends
+    inclination = start + (end - start) * x
+    height = height_above_front(belt, arc, inclination)
+    along, horizontal = distance_along(belt, arc, inclination)
+    shear_displacement = along - (1.0 - at.slip) * horizontal
+    if deepest is not None:
+        unloaded_by = height - (belt.sinkage - deepest)
+        depth = equivalent_depth(belt, deepest, unloaded_by)
+        shear_displacement = shear_displacement * shear_retention(belt, deepest, unloaded_by)
+    elif arc == FRONT:  # as a product: near the entry a difference would lose its digits
+        sin_half = xp.sin(0.5 * (belt.entry - inclination)) * xp.sin(
+            0.5 * (belt.entry + inclination)
+        )
+        depth = 2.0 * belt.radius * sin_half
+    else:
+        depth = belt.sinkage - height
+    area = belt.width * arc_radius(belt, arc) * xp.abs(end - start) * weight
+    return Contact(
+        depth=xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)),
+        shear_displacement=shear_displacement,
+        surface_travel=along,
+        area=area,
+        horizontal_area=area * xp.cos(inclination),
+        frontal_area=area * xp.sin(inclination),
+        shear_lever_arm=belt.radius,
+        width=belt.width,
+    )
+
+
+def belt_profile(belt: Belt, at: Operating, points: int) -> tuple[Array, Contact]:
+    """Inclinations (rad) of evenly spaced points from entry to exit, and their contact."""
+    xp = namespace(belt.entry)
+    fraction = xp.linspace(0.0, 1.0, points, dtype=belt.entry.dtype)[:, None]
+    front_end = distance_along(belt, FRONT, -belt.leave)[0]
+    middle_end = distance_along(belt, MIDDLE, belt.meet)[0]
+    along = fraction * distance_along(belt, REAR, -belt.exit)[0]
+
+    def of_its_arc(front: Array, middle: Array, rear: Array) -> Array:
+        return xp.where(along < front_end, front, xp.where(along < middle_end, middle, rear))
+
+    # inclination that the point would have on each of the three arcs
+    arcs = (
+        (FRONT, belt.entry - along / belt.radius),
+        (MIDDLE, (along - front_end) / belt.arc_radius - belt.leave),
+        (REAR, belt.meet - (along - middle_end) / belt.radius),
+    )
+    inclination = of_its_arc(*(angle for _, angle in arcs))
+    depth = belt.sinkage - of_its_arc(
+        *(height_above_front(belt, arc, angle) for arc, angle in arcs)
+    )
+    behind_rear = (along >= middle_end) & (inclination < 0.0)
+    before_front = (along < front_end) & (inclination >= 0.0)
+    deepest = xp.where(behind_rear, belt.rear + 0.0 * along, belt.sinkage + 0.0 * along)
+    virgin, unloaded_by = before_front | (depth > deepest), deepest - depth
+    pressed = xp.where(virgin, depth, equivalent_depth(belt, deepest, unloaded_by))
+    displacements = (
+        travel - (1.0 - at.slip) * horizontal
+        for travel, horizontal in (distance_along(belt, *arc) for arc in arcs)
+    )
+    sheared = of_its_arc(*displacements)
+    retained = sheared * shear_retention(belt, deepest, unloaded_by)
+    none = xp.zeros_like(along)
+    return inclination, Contact(
+        depth=xp.maximum(pressed, none + SMALLEST_DEPTH),
+        shear_displacement=xp.where(virgin, sheared, retained),
+        surface_travel=along,
+        area=none,
+        horizontal_area=none,
+        frontal_area=none,
+        shear_lever_arm=belt.radius,
+        width=belt.width,
+    )
