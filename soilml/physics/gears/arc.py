@@ -16,7 +16,9 @@ def entry_angle(sinkage: Array, radius: Real) -> Array:
     return 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * radius)))
 
 
-def differences_from_entry(entry: Array, passed: Array) -> tuple[Array, Array]:
+def differences_from_entry(
+    sin_entry: Array, cos_entry: Array, passed: Array
+) -> tuple[Array, Array]:
     r"""Differences of sine and cosine between the entry angle and a point of the arc.
 
     .. math::
@@ -25,10 +27,9 @@ def differences_from_entry(entry: Array, passed: Array) -> tuple[Array, Array]:
         t = \tan\frac{\theta_1 - \theta}{2}, \quad u = \frac{2 t}{1 + t^2}
 
     so that nothing cancels close to the entry. `passed` (rad) is the angle passed since entry,
-    theta_1 - theta; `entry` broadcasts against it.
+    theta_1 - theta; the sine and cosine of theta_1 broadcast against it.
     """
     xp = namespace(passed)
-    sin_entry, cos_entry = xp.sin(entry), xp.cos(entry)
     t = xp.tan(0.5 * passed)
     u = 2.0 * t / (1.0 + t * t)
     return u * (cos_entry + t * sin_entry), u * (sin_entry - t * cos_entry)

@@ -62,15 +62,14 @@ def belt_contact(belt: Belt, at: Operating, entry: int, middle: int, short: int)
     level = xp.zeros_like(belt.entry)
     first, second = belt.sinkage, belt.rear
     further = second - first
-    top = middle_arc_top(belt)
     # soil unloaded from the depth `first` has no pressure left at the height rebound * first;
     # behind the front wheel:
     released = xp.minimum(inclination_at_height(belt.rebound * first, belt.radius), belt.leave)
     # on both sides of the top of the middle arc, whose inclination is counted from there:
-    off_ground = inclination_at_height(top - belt.rebound * first, belt.arc_radius)
+    off_ground = inclination_at_height(middle_arc_top(belt) - belt.rebound * first, belt.arc_radius)
     off, on = xp.minimum(off_ground, belt.leave), xp.minimum(off_ground, belt.meet)
     # behind the top, where the belt comes back to the depth `first`:
-    deeper = xp.minimum(inclination_at_height(top, belt.arc_radius), belt.meet)
+    deeper = xp.minimum(inclination_at_height(middle_arc_top(belt), belt.arc_radius), belt.meet)
     deeper = xp.maximum(deeper, on)
     # in front of the rear wheel, where it meets the rebounded soil, and the depth `first`:
     met = inclination_at_height(further + belt.rebound * first, belt.radius)

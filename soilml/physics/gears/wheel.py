@@ -134,15 +134,16 @@ def contact_at(rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: A
     `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
     """
     xp = namespace(passed)
-    sin_difference, cos_difference = differences_from_entry(rim.entry, passed)
+    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
+    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
     area = rim.radius * rim.width * arc
     return Contact(
         depth=depth,
         shear_displacement=rim.shear_radius * (passed - (1.0 - at.slip) * sin_difference),
         surface_travel=rim.shear_radius * passed,
         area=area,
-        horizontal_area=area * (xp.cos(rim.entry) + cos_difference),
-        frontal_area=area * (xp.sin(rim.entry) - sin_difference),
+        horizontal_area=area * (cos_entry + cos_difference),
+        frontal_area=area * (sin_entry - sin_difference),
         shear_lever_arm=rim.lever,
         width=rim.width,
     )

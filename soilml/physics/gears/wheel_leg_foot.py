@@ -167,13 +167,15 @@ def _sole_contact(sole: Sole, at: Operating, count: int) -> Contact:
 def _contact_at(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
     """Contact at these angles (rad), each representing `arc` (rad); arrays (points, batch)."""
     xp = namespace(angle)
+    sin_entry, cos_entry = xp.sin(sole.entry), xp.cos(sole.entry)
     passed = sole.entry - angle
     # behind the maximum, the angle before it that has the same pressure
     mirrored = angle * ((sole.entry - sole.peak) / sole.peak)
-    depth = _depth_at(sole, xp.where(angle < sole.peak, mirrored, passed))
-    sin_difference, cos_difference = differences_from_entry(sole.entry, passed)
-    sin = xp.sin(sole.entry) - sin_difference
-    cos = xp.cos(sole.entry) + cos_difference
+    # depth R (cos(theta) - cos(theta_1)), as in `differences_from_entry`
+    t = xp.tan(0.5 * xp.where(angle < sole.peak, mirrored, passed))
+    depth = 2.0 * sole.radius * t / (1.0 + t * t) * (sin_entry - t * cos_entry)
+    sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
+    sin, cos = sin_entry - sin_difference, cos_entry + cos_difference
     area = sole.radius * sole.width * arc
     return Contact(
         depth=xp.maximum(depth, xp.zeros_like(depth) + SMALLEST_DEPTH),
@@ -186,11 +188,3 @@ def _contact_at(sole: Sole, at: Operating, angle: Array, arc: Array) -> Contact:
         normal_lever_arm=-sole.hub_offset * sin,
         width=sole.width,
     )
-
-
-def _depth_at(sole: Sole, passed: Array) -> Array:
-    """Depth (m) of points of the arc below the free surface, by the angle passed since entry."""
-    xp = namespace(passed)
-    # R (cos(theta) - cos(theta_1)), as in `differences_from_entry`
-    t = xp.tan(0.5 * passed)
-    return 2.0 * sole.radius * t / (1.0 + t * t) * (xp.sin(sole.entry) - t * xp.cos(sole.entry))
