@@ -84,6 +84,13 @@ COLUMNS: dict[str, Quantity] = {quantity.column: quantity for quantity in _ALL}
 SHEAR = ("cohesion", "friction_angle", "shear_modulus")
 #: Channels that a rover can measure and a model predicts.
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
+#: Quantiles of the standard normal distribution: 50 % and 90 % of it lie within +- Z_50, +- Z_90.
+Z_50, Z_90 = 0.6744897501960817, 1.6448536269514722
+#: Remaining fraction of the prior's standard deviation above which a parameter is not identified:
+#: the measurement has then removed less than 36 % of the prior's variance.
+NOT_IDENTIFIED_ABOVE = 0.8
+#: The same above which it is weakly identified: less than 75 % of the variance removed.
+WEAKLY_IDENTIFIED_ABOVE = 0.5
 
 
 def column(name: str) -> str:

@@ -14,7 +14,8 @@ from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import PoolingCalibration, PoolingRule, pool_within_prior
-from training.calibration.metrics import NINETY, Metrics, compute_metrics
+from soilml.quantities import Z_90
+from training.calibration.metrics import Metrics, compute_metrics
 from training.calibration.recalibration import (
     CalibratedRegressor,
     covariance_matrices,
@@ -283,4 +284,4 @@ def _pool(
 ) -> tuple[Floats, Floats]:
     """Pooled mean, and the standard deviation of a Gaussian with the same 90 % interval."""
     pooled = pool_within_prior(mean, covariance, prior, rule)
-    return pooled.mean, np.sqrt(np.diag(pooled.covariance)) * rule.coverage_factor / NINETY
+    return pooled.mean, np.sqrt(np.diag(pooled.covariance)) * rule.coverage_factor / Z_90

@@ -15,7 +15,7 @@ from soilml.cli import main
 from soilml.io.atomic_files import atomic_output, save_text
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text, format_table
-from soilml.quantities import QUANTITIES, SHEAR, column
+from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 
 HERE = Path(__file__).parent.relative_to(Path.cwd())
 OUT = Path("demo")
@@ -161,7 +161,7 @@ def draw(rows, joint, truth, nonlinear, estimator) -> None:  # type: ignore[no-u
             lw=2,
             label="all, trained model",
         )
-        std = 1.645 * nonlinear[name]["std"] * factor
+        std = Z_90 * nonlinear[name]["std"] * factor
         axis.errorbar(
             [end + 2],
             [nonlinear[name]["value"] * factor],

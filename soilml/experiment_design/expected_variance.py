@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.experiment_design.parameter_samples import ParameterSamples, resampled
+from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.experiment_design.predicted_readings import PredictedReadings
+from soilml.numerics.resampling import systematic_resampling
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -94,5 +95,5 @@ def expected_variance(
     belief: ParameterSamples, channels: int, count: int = OUTCOMES, seed: int = 0
 ) -> ExpectedVariance:
     """Soils of a belief to be taken for true in turn, as probable as it says."""
-    index = resampled(belief.weights, count, np.random.default_rng(seed))
+    index = systematic_resampling(belief.weights, count, np.random.default_rng(seed).random())
     return ExpectedVariance(index, np.zeros((channels, count)), belief).with_noise(seed)

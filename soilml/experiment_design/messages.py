@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.experiment_design.design import Advice, RatedRow
-from soilml.identification.diagnostics import NOT
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
 
 Floats = NDArray[np.float64]
 
@@ -17,9 +17,9 @@ NEGLIGIBLE = 0.02
 def is_identified(left: Floats) -> NDArray[np.bool_]:
     """Whether rows told a parameter, by the width that they leave of its prior.
 
-    Above `NOT` the answer is mostly the prior: abstain.
+    Above `NOT_IDENTIFIED_ABOVE` the answer is mostly the prior: abstain.
     """
-    return np.asarray(left <= NOT)
+    return np.asarray(left <= NOT_IDENTIFIED_ABOVE)
 
 
 def abstention_message(name: str, left: float, what: str = "these rows do") -> str:

@@ -13,7 +13,8 @@ from soilml.config.case import Case
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
 from soilml.identification.posterior import settled_samples
-from soilml.numerics.maximum_entropy import quantiles
+from soilml.numerics.maximum_entropy import prior_quantiles
+from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ def samples_of_prior(
     """Nothing was measured: the prior, one sample in each slice of every parameter."""
     rng = np.random.default_rng(seed)
     return ParameterSamples(
-        tuple(free), _spread(count, len(free), rng), np.full(count, 1.0 / count)
+        tuple(free), latin_hypercube(count, len(free), rng), np.full(count, 1.0 / count)
     )
 
 
@@ -68,7 +69,8 @@ def samples_of_rows(
     found, misfit, surplus = settled_samples(case, data, free)
     larger = float(np.sqrt(misfit)) if surplus else 1.0
     index, times = np.unique(
-        resampled(found.weights, count, np.random.default_rng(seed)), return_counts=True
+        systematic_resampling(found.weights, count, np.random.default_rng(seed).random()),
+        return_counts=True,
     )
     return ParameterSamples(tuple(free), found.u[index], times / times.sum(), larger)
 
@@ -83,12 +85,12 @@ def samples_of_moments(
 ) -> ParameterSamples:
     """Mean (q,) and covariance (q, q) of some parameters, as a model file estimates them.
 
-    Each lies as `marginal.quantiles` says, the correlations are those of a Gaussian (a Gaussian
+    Each lies as `prior_quantiles` says, the correlations are those of a Gaussian (a Gaussian
     copula); parameters that are not named are as their prior. An approximation: a posterior whose
     ridge is bent is not told by its moments.
     """
     rng = np.random.default_rng(seed)
-    u = _spread(count, len(free), rng)
+    u = latin_hypercube(count, len(free), rng)
     std = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(std, std)
     size = np.linalg.cholesky(0.999 * correlation + 0.001 * np.eye(len(names)))
@@ -98,17 +100,5 @@ def samples_of_moments(
     for k, name in enumerate(names):
         if name in place:
             prior = free[place[name]].prior
-            u[:, place[name]] = quantiles(prior, float(mean[k]), float(std[k]), below[:, k])
+            u[:, place[name]] = prior_quantiles(prior, float(mean[k]), float(std[k]), below[:, k])
     return ParameterSamples(tuple(free), u, np.full(count, 1.0 / count))
-
-
-def resampled(weights: Floats, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Indices (count,) of samples, each as often as its weight says, within one."""
-    place = (np.arange(count) + rng.random()) / count
-    index = np.searchsorted(np.cumsum(weights), place)
-    return np.asarray(np.minimum(index, len(weights) - 1))
-
-
-def _spread(count: int, p: int, rng: np.random.Generator) -> Floats:
-    ranks = np.stack([rng.permutation(count) for _ in range(p)], axis=1)
-    return (ranks + rng.random((count, p))) / count

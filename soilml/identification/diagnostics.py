@@ -12,16 +12,15 @@ from soilml.config.case import Case
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
-from soilml.onboard.estimate import VAGUE
 from soilml.parameters import unit_text
-from soilml.quantities import column
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, column
 
-#: Share of the prior's width above which a parameter counts as not identified, or hardly.
-NOT = VAGUE
-HARDLY = 0.5
-TRADE_OFF = 0.95
-#: What a warning of residuals beyond the declared noise says.
-SURPLUS = "times the declared noise"
+#: Size r of a correlation from which on two parameters are reported as a trade-off: one combination
+#: of the two, scaled to equal widths, is then known sqrt((1 + r) / (1 - r)) > 6 times better than
+#: the other.
+STRONG_CORRELATION = 0.95
+#: Words by which a warning of residuals beyond the declared noise is recognised.
+EXCESS_RESIDUALS = "times the declared noise"
 
 
 def at_prior_bound(u: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -44,11 +43,11 @@ def with_warnings(
     said = []
     for i, f in enumerate(free):
         left = fit.left[f.path]
-        if one_load and f.path == "cohesion" and left > HARDLY:
+        if one_load and f.path == "cohesion" and left > WEAKLY_IDENTIFIED_ABOVE:
             said.append("one load only: cohesion is not identified")
-        elif left > NOT:
+        elif left > NOT_IDENTIFIED_ABOVE:
             said.append(f"{f.path} is not identified: the rows leave {left:.0%} of its prior")
-        elif left > HARDLY:
+        elif left > WEAKLY_IDENTIFIED_ABOVE:
             said.append(f"{f.path} is hardly identified: the rows leave {left:.0%} of its prior")
         if at_prior_bound(u)[i]:
             end = "lower" if u[i] < 0.5 else "upper"
@@ -56,7 +55,7 @@ def with_warnings(
         if f.assumed:
             ends = f"{f.prior.lower:g} to {f.prior.upper:g} {unit_text(f.unit)}".rstrip()
             said.append(f"{f.path} has no prior: {ends} is assumed")
-    if one_load and "cohesion" in fit.names and fit.left["cohesion"] <= HARDLY:
+    if one_load and "cohesion" in fit.names and fit.left["cohesion"] <= WEAKLY_IDENTIFIED_ABOVE:
         said.append("one load only: cohesion rests on the change with slip alone")
     if data.cells < len(free):
         count = "1 reading" if data.cells == 1 else f"{data.cells} readings"
@@ -64,8 +63,8 @@ def with_warnings(
     said += _trade_offs(fit)
     if surplus:
         said.append(
-            f"residuals are {np.sqrt(fit.misfit):.1f} {SURPLUS}: the model lacks something or the "
-            "noise is understated; std is widened by as much"
+            f"residuals are {np.sqrt(fit.misfit):.1f} {EXCESS_RESIDUALS}: the model lacks something "
+            "or the noise is understated; std is widened by as much"
         )
     if undeclared:
         names = ", ".join(column(c.name) for c in data.channels if not c.declared)
@@ -81,5 +80,5 @@ def _trade_offs(fit: Fit) -> list[str]:
         "the rows fix a combination of them better than either"
         for i, a in enumerate(fit.names)
         for j, b in enumerate(fit.names)
-        if i < j and abs(correlation[i, j]) > TRADE_OFF
+        if i < j and abs(correlation[i, j]) > STRONG_CORRELATION
     ]

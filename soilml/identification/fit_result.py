@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.quantities import Z_90
 
-#: Half-width of a Gaussian's 90 % interval in its standard deviations.
-GAUSSIAN_90 = 1.645
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Fit:
     #: mean squared residual in standard deviations of the noise, per degree of freedom
     misfit: float = float("nan")
     channels: tuple[str, ...] = ()
-    #: ends of the 90 % interval, (p,), where the method knows them; else +- 1.645 std holds it
+    #: ends of the 90 % interval, (p,), where the method knows them; else +- `Z_90` std holds it
     low: Floats | None = None
     high: Floats | None = None
 
@@ -43,7 +42,7 @@ class Fit:
     def interval(self) -> tuple[Floats, Floats]:
         """Ends of the 90 % interval, (p,)."""
         if self.low is None or self.high is None:
-            return self.values - GAUSSIAN_90 * self.std, self.values + GAUSSIAN_90 * self.std
+            return self.values - Z_90 * self.std, self.values + Z_90 * self.std
         return self.low, self.high
 
     @property

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.resampling import effective_size, latin_hypercube, weighted_quantiles
+
 Floats = NDArray[np.float64]
 
 #: Samples of the first round, spread over the cube, and of each round after it.
@@ -33,20 +35,16 @@ class ImportanceSample:
 
     @property
     def effective(self) -> float:
-        """How many equally weighted samples are worth as much."""
-        return float(1.0 / np.sum(self.weights**2))
+        """Effective sample size."""
+        return effective_size(self.weights)
 
     def mean(self, values: Floats) -> Floats:
         """Mean of values (n, ...) under the density."""
         return np.asarray(np.tensordot(self.weights, values, axes=1))
 
     def quantiles(self, values: Floats, fractions: Floats) -> Floats:
-        """Values below which fractions (k,) of the density lie, of columns (n, q): (k, q)."""
-        order = np.argsort(values, axis=0)
-        ranked = np.take_along_axis(values, order, axis=0)
-        below = np.cumsum(self.weights[order], axis=0) - 0.5 * self.weights[order]
-        columns = zip(below.T, ranked.T, strict=True)
-        return np.stack([np.interp(fractions, b, v) for b, v in columns], axis=1)
+        """Quantiles (k, q) of columns of values (n, q) at fractions (k,)."""
+        return weighted_quantiles(values, self.weights, fractions)
 
 
 def importance_sample(
@@ -66,7 +64,7 @@ def importance_sample(
     2012 (adaptive multiple importance sampling).
     """
     rng = np.random.default_rng(seed)
-    u = _spread(FIRST, p, rng)
+    u = latin_hypercube(FIRST, p, rng)
     logs = log_density(u)
     mixtures: list[_Mixture] = []
     drawn = np.full(len(u), float(FIRST))  # sum over rounds of n_k q_k at each sample
@@ -85,12 +83,6 @@ def importance_sample(
         mixtures.append(mixture)
         found = _weighed(u, logs, drawn)
     return found
-
-
-def _spread(count: int, p: int, rng: np.random.Generator) -> Floats:
-    """Points over the cube, one in each slice of every axis."""
-    ranks = np.stack([rng.permutation(count) for _ in range(p)], axis=1)
-    return (ranks + rng.random((count, p))) / count
 
 
 def _weighed(u: Floats, logs: Floats, drawn: Floats) -> ImportanceSample:

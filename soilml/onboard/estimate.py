@@ -8,12 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 
-#: Share of the prior's spread above which an estimate is mostly the prior.
-VAGUE = 0.8
-#: Half-width of the 90 % interval of a Gaussian, in its standard deviations.
-GAUSSIAN_90 = 1.645
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ class Estimate:
         The interval is cut at the ends of the prior's range. Where `in_range` is false, the
         coverage factor of a Gaussian is used instead of the calibrated one, (q,).
         """
-        half = np.where(in_range[..., None], coverage_factor, GAUSSIAN_90) * std
+        half = np.where(in_range[..., None], coverage_factor, Z_90) * std
         return Estimate(
             names=names,
             units=units,
@@ -108,7 +105,7 @@ class Estimate:
         q = len(names)
         mean, std = (np.broadcast_to(x, (*shape, q)).copy() for x in (prior.mean, prior.std))
         covariance = np.broadcast_to(np.diag(prior.std**2), (*shape, q, q)).copy()
-        in_range, factor = np.zeros(shape, dtype=bool), np.full(q, GAUSSIAN_90)
+        in_range, factor = np.zeros(shape, dtype=bool), np.full(q, Z_90)
         return Estimate.gaussian(names, units, prior, mean, covariance, std, in_range, factor)
 
     @staticmethod
@@ -126,7 +123,7 @@ class Estimate:
     @property
     def abstains(self) -> NDArray[np.bool_]:
         """Whether each quantity is still mostly the prior, (..., q), or the row is out of range."""
-        vague = self.std > VAGUE * self.prior_std
+        vague = self.std > NOT_IDENTIFIED_ABOVE * self.prior_std
         return np.asarray(vague | ~np.asarray(self.in_range)[..., None])
 
     @property

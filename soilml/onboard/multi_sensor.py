@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES
-from soilml.onboard.estimate import GAUSSIAN_90, Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.gaussian_pooling import pool
+from soilml.quantities import Z_90
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
     prior, n = first.prior, used.shape[1]
     out_mean = np.tile(prior.mean, (n, 1))
     out_covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
-    out_ends = np.stack([out_mean - GAUSSIAN_90 * prior.std, out_mean + GAUSSIAN_90 * prior.std])
+    out_ends = np.stack([out_mean - Z_90 * prior.std, out_mean + Z_90 * prior.std])
     for pattern in np.unique(used, axis=1).T:
         rows, members = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
         if members.size == 1:
@@ -90,7 +91,7 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
         elif members.size > 1:
             parts = mean[members][:, rows], covariance[members][:, rows]
             out_mean[rows], out_covariance[rows] = _fuse(*parts, prior, rule)
-            half = GAUSSIAN_90 * np.sqrt(np.diagonal(out_covariance[rows], axis1=1, axis2=2))
+            half = Z_90 * np.sqrt(np.diagonal(out_covariance[rows], axis1=1, axis2=2))
             out_ends[:, rows] = out_mean[rows] - half, out_mean[rows] + half
     low, high = np.clip(out_ends, prior.lower, prior.upper).reshape(2, *shape, q)
     return MultiSensorEstimate(

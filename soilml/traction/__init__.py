@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.traction.by_load import LoadPrediction, predictions_by_load
 from soilml.traction.moment_draws import estimated_draws
-from soilml.traction.pull_and_slope import QuantileBand, Traction, quantile_band, traction
+from soilml.traction.pull_and_slope import Traction, traction
 from soilml.traction.soil_draws import SoilDraws, posterior_draws, prior_draws
 
 __all__ = [

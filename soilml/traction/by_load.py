@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.row_status import Status
 from soilml.traction.messages import DrivenRange, warnings
-from soilml.traction.pull_and_slope import QuantileBand, Traction, quantile_band, traction
+from soilml.traction.pull_and_slope import Traction, traction
 from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]

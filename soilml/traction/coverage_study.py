@@ -12,11 +12,12 @@ from soilml.config.case import Case
 from soilml.identification.free_parameters import select_free
 from soilml.identification.observations import read_observations
 from soilml.io.table import Table
+from soilml.numerics.quantile_band import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from soilml.traction.onboard_draws import onboard_draws
-from soilml.traction.pull_and_slope import QUANTILES, Traction, quantile_band, traction
+from soilml.traction.pull_and_slope import Traction, traction
 from soilml.traction.soil_draws import COUNT, SoilDraws, posterior_draws
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.identification.diagnostics import HARDLY, NOT
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.traction.pull_and_slope import Traction
 
 Floats = NDArray[np.float64]
@@ -56,9 +56,9 @@ def warnings(known: Traction, left: tuple[float, float], driven: DrivenRange) ->
 def _learned(left: tuple[float, float]) -> Iterator[str]:
     for name, share in zip(("largest pull", "steepest slope"), left, strict=True):
         wide = f"its band is {min(share, 1.0):.0%} as wide as the prior's"
-        if share > NOT:
+        if share > NOT_IDENTIFIED_ABOVE:
             yield f"the {name} is not known: {wide}, the rows tell nothing of it; do not use it"
-        elif share > HARDLY:
+        elif share > WEAKLY_IDENTIFIED_ABOVE:
             yield f"the {name} is hardly known: {wide}"
 
 

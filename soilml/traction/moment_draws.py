@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.identification.free_parameters import FreeParameter
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.traction.soil_draws import COUNT, SoilDraws, systematic_resampling
+from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.maximum_entropy import moment_matched_weights
+from soilml.numerics.resampling import systematic_resampling
+from soilml.traction.soil_draws import COUNT, SoilDraws
 
 Floats = NDArray[np.float64]
-
-#: Means and products of the draws agree with the estimate to this share of its widths.
-AGREED = 1e-4
-MOST_STEPS = 60
-#: Effective samples below which no step is taken: the estimate has moments that no density in the
-#: range has.
-FEWEST = 200.0
 
 
 def estimated_draws(
@@ -54,46 +48,6 @@ def estimated_draws(
         return np.asarray(np.linalg.solve(factor, (u - middle).T).T)
 
     found = importance_sample(lambda u: -0.5 * (white(u) ** 2).sum(axis=1), len(free), seed)
-    rows = systematic_resampling(_tilted(found, white(found.u)), count, np.random.default_rng(seed))
+    weights = moment_matched_weights(found.weights, white(found.u))
+    rows = systematic_resampling(weights, count, np.random.default_rng(seed).random())
     return SoilDraws(tuple(f.path for f in free), low + wide * found.u[rows])
-
-
-def _tilted(found: ImportanceSample, white: Floats) -> ImportanceSample:
-    """The samples weighed anew, so that `white` (n, p) has mean 0 and covariance 1.
-
-    Newton steps on the convex dual, log sum w exp(lambda f) - lambda f_0.
-    """
-    p = white.shape[1]
-    i, j = np.triu_indices(p)
-    features = np.hstack([white, white[:, i] * white[:, j]])
-    features -= np.concatenate([np.zeros(p), (i == j).astype(float)])
-    multipliers = np.zeros(features.shape[1])
-    best, height = found, _height(found, features, multipliers)[0]
-    for _ in range(MOST_STEPS):
-        off = best.mean(features)
-        if np.abs(off).max() < AGREED:
-            break
-        centred = features - off
-        hessian = (centred.T * best.weights) @ centred
-        step = np.linalg.solve(hessian + 1e-9 * np.trace(hessian) * np.eye(len(off)), off)
-        for share in 0.5 ** np.arange(12):
-            tried, new = _height(found, features, multipliers - share * step)
-            if tried < height and new.effective >= FEWEST:
-                best, height, multipliers = new, tried, multipliers - share * step
-                break
-        else:
-            break
-    return best
-
-
-def _height(
-    found: ImportanceSample, features: Floats, multipliers: Floats
-) -> tuple[float, ImportanceSample]:
-    """The dual at some multipliers, and the samples with the weights that go with them."""
-    logs = features @ multipliers
-    top = float(logs.max())
-    weights = found.weights * np.exp(logs - top)
-    total = float(weights.sum())
-    if not total > 0.0:
-        return float("inf"), found
-    return top + float(np.log(total)), replace(found, weights=weights / total)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.traction.by_load import SAME_LOAD
-from soilml.traction.pull_and_slope import QuantileBand, quantile_band
 from soilml.traction.report import PullReport
 
 if TYPE_CHECKING:

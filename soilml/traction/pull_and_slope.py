@@ -16,26 +16,10 @@ from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]
 
-#: Shares of draws below the band's lower end, its middle and its upper end.
-QUANTILES = (0.05, 0.5, 0.95)
 #: Steepest slope that is searched, rad (86 degrees); a wheel that sticks to more is held there.
 STEEPEST = 1.5
 #: Kinds of effects that belong to the rig and the sensors that the rows came from.
 LEFT_BEHIND = ("rig", "sensor")
-
-
-@dataclass(frozen=True)
-class QuantileBand:
-    """Middle of the draws and the band that holds nine tenths of them; arrays of one shape."""
-
-    lower: Floats
-    middle: Floats
-    upper: Floats
-
-    @property
-    def width(self) -> Floats:
-        """From the lower to the upper end."""
-        return np.asarray(self.upper - self.lower)
 
 
 @dataclass(frozen=True)
@@ -83,14 +67,6 @@ class Traction:
     def _slip_of(self, values: Floats) -> Floats:
         found = self.slip[np.argmax(np.nan_to_num(values, nan=-np.inf), axis=1)]
         return np.where(np.isfinite(values).any(axis=1), found, np.nan)
-
-
-def quantile_band(draws: Floats) -> QuantileBand:
-    """The band of draws (n, ...), of those that have an answer; NaN where none has."""
-    answered = np.isfinite(draws).any(axis=0)
-    some = np.where(answered, draws, 0.0)
-    ends = np.where(answered, np.nanquantile(some, QUANTILES, axis=0), np.nan)
-    return QuantileBand(*ends)
 
 
 def traction(

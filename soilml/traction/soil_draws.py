@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
 from soilml.identification.posterior import settled_samples
-from soilml.numerics.importance_sampling import ImportanceSample
+from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 
 Floats = NDArray[np.float64]
 
@@ -55,28 +55,14 @@ def posterior_draws(
     carry the loads somewhere in the prior.
     """
     found, misfit, surplus = settled_samples(case, data, free)
-    rows = systematic_resampling(found, count, np.random.default_rng(seed))
+    rows = systematic_resampling(found.weights, count, np.random.default_rng(seed).random())
     return PosteriorDraws(_valued(free, found.u[rows]), found.effective, misfit, surplus)
 
 
 def prior_draws(free: Sequence[FreeParameter], count: int = COUNT, seed: int = 0) -> SoilDraws:
     """Soils drawn from the priors, one in each slice of every prior."""
     rng = np.random.default_rng(seed)
-    ranks = np.stack([rng.permutation(count) for _ in free], axis=1)
-    return _valued(free, (ranks + rng.random(ranks.shape)) / count)
-
-
-def systematic_resampling(
-    found: ImportanceSample, count: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    """Indices of `count` equally weighted samples, by systematic resampling.
-
-    One random offset and equal steps along the sum of the weights. References: Carpenter, Clifford
-    and Fearnhead, IEE Proc. Radar, Sonar and Navigation 146(1), 1999.
-    """
-    reached = np.cumsum(found.weights)
-    steps = (rng.random() + np.arange(count)) / count * reached[-1]
-    return np.asarray(np.minimum(np.searchsorted(reached, steps), len(reached) - 1))
+    return _valued(free, latin_hypercube(count, len(free), rng))
 
 
 def _valued(free: Sequence[FreeParameter], u: Floats) -> SoilDraws:

@@ -19,6 +19,7 @@ from soilml.identification.posterior import most_misfit
 from soilml.identification.predictions import readings
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.resampling import systematic_resampling
 from training.benchmark.chebyshev_surrogate import fit_chebyshev_surrogate
 from training.benchmark.designs import (
     DesignSets,
@@ -31,7 +32,6 @@ from training.benchmark.posterior_summary import (
     FRACTIONS,
     HPD_DRAWS,
     PosteriorSummary,
-    systematic_resample,
 )
 
 Floats = NDArray[np.float64]
@@ -101,7 +101,8 @@ def exact_posterior(
     mean = sample.mean(values)
     deviation = values - mean
     at_truth = [f.prior.fraction(float(t)) for f, t in zip(free, truth, strict=True)]
-    density = log_likelihood(np.vstack([at_truth, systematic_resample(sample, HPD_DRAWS)]))
+    draws = sample.u[systematic_resampling(sample.weights, HPD_DRAWS, 0.5)]
+    density = log_likelihood(np.vstack([at_truth, draws]))
     return PosteriorSummary(
         mean=mean,
         covariance=(deviation.T * sample.weights) @ deviation,

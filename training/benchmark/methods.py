@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
-from soilml.identification.diagnostics import SURPLUS
+from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
-from soilml.quantities import column
+from soilml.quantities import Z_50, Z_90, column
 from training.benchmark.designs import select_channels
 from training.benchmark.method_kind import MethodKind, classify_estimator
-from training.calibration.metrics import HALF, NINETY
 
 Floats = NDArray[np.float64]
 
@@ -129,8 +128,8 @@ def gaussian_estimate(
     """An estimate with Gaussian intervals, unless the method provides its own 90 % interval."""
     std = np.sqrt(np.diag(covariance))
     if interval90 is None:
-        interval90 = np.stack([mean - NINETY * std, mean + NINETY * std])
-    interval50 = np.stack([mean - HALF * std, mean + HALF * std])
+        interval90 = np.stack([mean - Z_90 * std, mean + Z_90 * std])
+    interval50 = np.stack([mean - Z_50 * std, mean + Z_50 * std])
     return MethodEstimate(mean, covariance, interval50, interval90, flagged)
 
 
@@ -175,7 +174,7 @@ def model_file_methods(label: str, estimator: Estimator) -> list[Method]:
 
 def onboard_estimate(estimate: Estimate) -> MethodEstimate:
     """An estimate of the onboard runtime, with a Gaussian 50 % interval."""
-    half = HALF * estimate.std
+    half = Z_50 * estimate.std
     return MethodEstimate(
         estimate.mean,
         estimate.covariance,
@@ -199,7 +198,7 @@ def analytic_method(case: Case, name: str, names: Sequence[str]) -> Method:
         covariance = np.where(pairs, fit.covariance[np.ix_(index, index)], np.nan)
         interval90 = np.where(np.isnan(mean), np.nan, np.stack(fit.interval)[:, index])
         return gaussian_estimate(
-            mean, covariance, interval90, any(SURPLUS in w for w in fit.warnings)
+            mean, covariance, interval90, any(EXCESS_RESIDUALS in w for w in fit.warnings)
         )
 
     inputs = ", ".join(["slip", "load", *channels]) + fixed

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.importance_sampling import ImportanceSample
-
 Floats = NDArray[np.float64]
 
 #: Quantiles that are stored: ends of the 90 % and of the 50 % interval.
@@ -37,10 +35,3 @@ class PosteriorSummary:
     log_density: float
     hpd_level: float
     flagged: bool
-
-
-def systematic_resample(sample: ImportanceSample, count: int) -> Floats:
-    """Equally weighted draws (count, p) of a weighted sample, at even quantiles of its weights."""
-    places = (np.arange(count) + 0.5) / count
-    rows = np.searchsorted(np.cumsum(sample.weights), places)
-    return sample.u[np.minimum(rows, len(sample.u) - 1)]

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.quantities import Z_50, Z_90
 
-#: Half-widths of the 50 and 90 % intervals of a Gaussian, in standard deviations.
-HALF, NINETY = 0.6744897501960817, 1.6448536269514722
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ def compute_metrics(truth: Floats, mean: Floats, std: Floats, prior_std: Floats)
         rmse=np.sqrt(np.mean(error**2, axis=0)),
         relative=np.sqrt(np.mean(error**2, axis=0)) / prior_std,
         nll=np.mean(0.5 * z**2 + logs, axis=0) + 0.5 * np.log(2.0 * np.pi),
-        cover50=np.mean(z <= HALF, axis=0),
-        cover90=np.mean(z <= NINETY, axis=0),
+        cover50=np.mean(z <= Z_50, axis=0),
+        cover90=np.mean(z <= Z_90, axis=0),
         rows=len(truth),
     )

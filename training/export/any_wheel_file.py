@@ -8,9 +8,8 @@ import os
 from typing import Any
 
 from soilml import __version__
-from soilml.onboard.estimate import GAUSSIAN_90
 from soilml.onboard.model_file import FORMAT
-from soilml.quantities import QUANTITIES, SHEAR, column
+from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
 from training.set_posterior.graph import SetPosteriorGraph
@@ -28,7 +27,7 @@ NO_POOLING: dict[str, Any] = {
     "upper": [],
     "std": [],
     "kinds": [],
-    "alone": [GAUSSIAN_90] * len(SHEAR),
+    "alone": [round(Z_90, 3)] * len(SHEAR),
     "doubt": [],
 }
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.estimate import VAGUE
 from soilml.onboard.set_contract import SET_PREFIX
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, sqrt, where
 from training.set_posterior.credible_interval import INTERVAL, add_standardised_quantiles
 from training.set_posterior.importance_sampler import WeightedSample
@@ -57,7 +57,7 @@ def add_posterior_outputs(
     chosen = where(consistent, covariance, np.diag(prior["std"] ** 2))
     (chosen * scales).named(f"{prefix}{SET_PREFIX}covariance")
     consistent.reshape(1).named(f"{prefix}{SET_PREFIX}in_range")
-    vague = std > VAGUE * prior["std"][:, None]
+    vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]
     (vague | ~consistent).reshape(q).named(f"{prefix}{SET_PREFIX}abstains")
     sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
 

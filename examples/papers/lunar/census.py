@@ -21,7 +21,7 @@ from lunar.sweep import Floats, driven, noisy, soils, table, three_loads
 
 from soilml import Case, Estimator, Model, Wheel, identify
 from soilml.io.text_tables import format_table
-from soilml.quantities import SHEAR
+from soilml.quantities import SHEAR, Z_90
 
 SOILS, FITTED = 200, 25
 SLIPS = np.linspace(0.2, 0.6, 9)
@@ -120,7 +120,7 @@ def _fits(case: Case, truth: Case, load: float, rng: np.random.Generator) -> lis
     spread = np.asarray([case.prior[name].std for name in SHEAR])
     pull = driven(truth, values[:, None, :], SLIPS, load).drawbar_pull
     found = Foretold(*band(case, *everywhere(mean, covariance, len(SLIPS)), SLIPS, load, rng))
-    return [*_errors(off, np.abs(off) <= 1.645 * std, spread), _score(found, pull)]
+    return [*_errors(off, np.abs(off) <= Z_90 * std, spread), _score(found, pull)]
 
 
 def _errors(off: Floats, inside: Mask, spread: Floats) -> list[str]:

@@ -12,6 +12,7 @@ from lunar.sweep import Floats
 
 from soilml import Estimate
 from soilml.io.atomic_files import atomic_output
+from soilml.quantities import Z_90
 
 #: Factor from SI and unit by parameter, in order.
 SHOWN = ((1e-3, "kPa"), (57.29578, "deg"), (1e3, "mm"))
@@ -82,7 +83,7 @@ def _parameter(axis: Any, sweep: Sweep, k: int) -> None:
         [0.62], [joint.mean[k] * factor], np.asarray(ends) * factor,
         fmt="D", color=ALL, label="all, LS-SVM", **bar,
     )  # fmt: skip
-    reach = 1.645 * std[k]
+    reach = Z_90 * std[k]
     inside = np.clip([value[k] - reach, value[k] + reach], *(end[k] for end in sweep.prior))
     ends = [[value[k] - inside[0]], [inside[1] - value[k]]]
     axis.errorbar(

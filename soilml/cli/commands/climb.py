@@ -14,7 +14,7 @@ from soilml.io.atomic_files import atomic_outputs, create_folder, output_files, 
 from soilml.io.text_tables import csv_text, format_table
 
 if TYPE_CHECKING:
-    from soilml.systems.climbing.ability import Band
+    from soilml.numerics.quantile_band import QuantileBand
     from soilml.systems.climbing.files.report import ClimbingReport
 
 #: Files that the output folder receives.
@@ -152,16 +152,16 @@ def _runs(report: ClimbingReport) -> dict[str, Any]:
 
 
 def _text(report: ClimbingReport) -> str:
-    from soilml.systems.climbing.ability import band
+    from soilml.numerics.quantile_band import quantile_band
 
     fit, ability = report.ground.fit, report.ability
-    best, where = band(ability.steepest), band(ability.steepest_slip)
+    best, where = quantile_band(ability.steepest), quantile_band(ability.steepest_slip)
     found = [
         f"steepest slope {_band_text(best, _UNITS['rad'][0], '.1f')} deg, at slip "
         f"{_band_text(where, 1.0, '.2f')}"
     ]
     if report.slip_limit is not None:
-        within = band(ability.steepest_within(report.slip_limit))
+        within = quantile_band(ability.steepest_within(report.slip_limit))
         text = _band_text(within, _UNITS["rad"][0], ".1f")
         found.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
     climbs, slopes = fit.rows_used, report.ground.distinct_slopes
@@ -183,7 +183,7 @@ def _text(report: ClimbingReport) -> str:
 
 
 def _parameters(report: ClimbingReport) -> list[tuple[str, ...]]:
-    from soilml.identification.diagnostics import NOT
+    from soilml.quantities import NOT_IDENTIFIED_ABOVE
 
     fit = report.ground.fit
     rows: list[tuple[str, ...]] = []
@@ -193,7 +193,7 @@ def _parameters(report: ClimbingReport) -> list[tuple[str, ...]]:
         if name in fit.names:
             std = f"{factor * fit.std[fit.names.index(name)]:.2g}"
             left = fit.left[name]
-            said = "not identified" if left > NOT else f"{factor * value:.4g}"
+            said = "not identified" if left > NOT_IDENTIFIED_ABOVE else f"{factor * value:.4g}"
             rows.append((name, said, std, shown, f"{left:.0%}"))
         else:
             rows.append((name, f"{factor * value:.4g}", "given", shown, ""))
@@ -208,6 +208,6 @@ def _point(report: ClimbingReport, i: int) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _band_text(found: Band, factor: float, form: str) -> str:
+def _band_text(found: QuantileBand, factor: float, form: str) -> str:
     low, middle, high = (factor * float(v) for v in (found.lower, found.middle, found.upper))
     return f"{middle:{form}} ({low:{form}} to {high:{form}})"

@@ -28,8 +28,8 @@ from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 
 if TYPE_CHECKING:
+    from soilml.numerics.quantile_band import QuantileBand
     from soilml.traction.by_load import LoadPrediction
-    from soilml.traction.pull_and_slope import QuantileBand
     from soilml.traction.report import PullReport
 
 #: The printed curve has every second slip; largest number of loads.
@@ -180,7 +180,7 @@ def _curves(by: str | None, found: dict[str, PullReport]) -> dict[str, Any]:
 
 
 def _columns(one: LoadPrediction) -> dict[str, Any]:
-    from soilml.traction.pull_and_slope import quantile_band
+    from soilml.numerics.quantile_band import quantile_band
 
     known, prior = one.known, one.prior
     count = len(known.slip)
@@ -224,8 +224,8 @@ def _text(report: PullReport) -> str:
 
 
 def _load_text(one: LoadPrediction) -> str:
-    from soilml.identification.diagnostics import NOT
-    from soilml.traction.pull_and_slope import quantile_band
+    from soilml.numerics.quantile_band import quantile_band
+    from soilml.quantities import NOT_IDENTIFIED_ABOVE
 
     known, prior = one.known, one.prior
     pull, slope, before = (
@@ -244,8 +244,10 @@ def _load_text(one: LoadPrediction) -> str:
         cells += [f"{DEGREES * v[i]:.1f}" for v in _ends(slope)]
         lines.append((*cells, f"{before.lower[i]:.1f}", f"{before.upper[i]:.1f}"))
     ends = quantile_band(known.best_slip), quantile_band(known.steepest_slip)
-    pulled = _value_text(quantile_band(known.largest_pull), 1.0, one.left[0] > NOT)
-    climbed = _value_text(quantile_band(known.steepest), DEGREES, one.left[1] > NOT)
+    pulled = _value_text(quantile_band(known.largest_pull), 1.0, one.left[0] > NOT_IDENTIFIED_ABOVE)
+    climbed = _value_text(
+        quantile_band(known.steepest), DEGREES, one.left[1] > NOT_IDENTIFIED_ABOVE
+    )
     best = [
         f"largest pull    {pulled} N, at slip {_slips(ends[0])}; "
         f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",

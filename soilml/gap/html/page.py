@@ -11,6 +11,7 @@ from soilml.gap.html import formatting
 from soilml.gap.results import STATUSES, Curves, GapReport, Value
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
+from soilml.quantities import Z_90
 
 if TYPE_CHECKING:
     from soilml.gap.html.plots import Shown
@@ -249,7 +250,7 @@ def _soil(report: GapReport) -> list[dict[str, Any]]:
 
 def _strip(old: Value, new: Value) -> list[dict[str, str]]:
     """Where value and 90 % interval lie between the ends of a strip, in percent of its length."""
-    ends = [v.value + k * 1.645 * v.std for v in (old, new) for k in (-1, 1)]
+    ends = [v.value + k * Z_90 * v.std for v in (old, new) for k in (-1, 1)]
     if not all(math.isfinite(e) for e in ends) or max(ends) <= min(ends):
         return []
     low, span = min(ends), max(ends) - min(ends)
@@ -258,6 +259,6 @@ def _strip(old: Value, new: Value) -> list[dict[str, str]]:
         return f"{5.0 + 110.0 * (x - low) / span:.1f}"
 
     return [
-        {"low": at(v.value - 1.645 * v.std), "at": at(v.value), "high": at(v.value + 1.645 * v.std)}
+        {"low": at(v.value - Z_90 * v.std), "at": at(v.value), "high": at(v.value + Z_90 * v.std)}
         for v in (old, new)
     ]

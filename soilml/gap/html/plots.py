@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from soilml.gap.html.formatting import channel, channel_unit, figure, joined
 from soilml.gap.results import Curves
+from soilml.quantities import Z_90
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +29,7 @@ BEFORE, AFTER, LONE = "#cc7a00", "#005b96", "#4d4d4d"
 LOADS = ("#0d0887", "#5c01a6", "#9c179e", "#cc4778", "#e0603f", "#d98300")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 #: Runs drawn at most, the width of a picture in pixels, and the quantile of 90 % of a normal.
-MOST_RUNS, WIDTH, NINETY = 6, 380, 1.645
+MOST_RUNS, WIDTH = 6, 380
 _STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,
@@ -155,7 +156,7 @@ def _drawn(
     axes: Axes, curves: Curves, here: NDArray[np.int64], factor: float, run: Shown, changed: bool
 ) -> None:
     slip = curves.slip[here]
-    band = NINETY * np.hypot(curves.after_std[here], curves.std[here])
+    band = Z_90 * np.hypot(curves.after_std[here], curves.std[here])
     line = np.unique(slip).size > 1
     for y, dashes in ((curves.before, (4, 2.2)), (curves.after, ())):
         if dashes and not changed:
@@ -175,7 +176,7 @@ def _drawn(
 
 
 def _left(axes: Axes, curves: Curves, here: NDArray[np.int64], changed: bool) -> None:
-    axes.axhspan(-NINETY, NINETY, color="#dddddd", lw=0)
+    axes.axhspan(-Z_90, Z_90, color="#dddddd", lw=0)
     axes.axhline(0.0, color="#555555", lw=0.8)
     most = 3.5
     for y, colour, marker in ((curves.before, BEFORE, "x"), (curves.after, AFTER, "o")):

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.statistics.reml_covariance import Covariance
+from soilml.quantities import Z_50
 
 Floats = NDArray[np.float64]
 
@@ -30,5 +31,5 @@ def outliers(covariance: Covariance, residual: Floats, space: Floats) -> NDArray
     diagonal = np.diag(p)
     sure = diagonal > 1e-3 / covariance.std**2
     t = np.where(sure, (p @ residual) / np.sqrt(np.where(sure, diagonal, 1.0)), 0.0)
-    typical = max(1.0, float(np.median(np.abs(t[sure]))) / 0.6745) if sure.any() else 1.0
+    typical = max(1.0, float(np.median(np.abs(t[sure]))) / Z_50) if sure.any() else 1.0
     return np.asarray(np.abs(t) > THRESHOLD * typical)

@@ -2,11 +2,14 @@
 
 `identify_ground` estimates cohesion, friction angle and shear modulus from `Climb`s,
 `StressBySlip.fit` describes the stress on the rims as a function of slip, and `climbing_ability`
-predicts drawbar pull and slope against slip; `band` summarises the samples. `SimulatedRover`
-provides climbs on a known soil. Source: Nagatani et al., online estimation of climbing ability.
+predicts drawbar pull and slope against slip; `quantile_band` summarises the samples.
+`SimulatedRover` provides climbs on a known soil.
+
+Source: Nagatani et al., online estimation of climbing ability.
 """
 
-from soilml.systems.climbing.ability import Band, ClimbingAbility, band, climbing_ability
+from soilml.numerics.quantile_band import quantile_band
+from soilml.systems.climbing.ability import ClimbingAbility, climbing_ability
 from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
 from soilml.systems.climbing.identify import GroundEstimate, identify_ground
 from soilml.systems.climbing.rover import Rover
@@ -15,7 +18,6 @@ from soilml.systems.climbing.simulated_rover import SimulatedRover
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 
 __all__ = [
-    "Band",
     "Climb",
     "ClimbingAbility",
     "GroundEstimate",
@@ -24,8 +26,8 @@ __all__ = [
     "StressBySlip",
     "Uncertainty",
     "WheelRun",
-    "band",
     "climbing_ability",
     "identify_ground",
     "modulus_per_climb",
+    "quantile_band",
 ]

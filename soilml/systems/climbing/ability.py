@@ -21,17 +21,6 @@ Floats = NDArray[np.float64]
 #: resample. Forces are computed for all soils of a resample at once: 24 x 16 samples determine the
 #: ends of a 90 % interval to about 1.5 % of probability.
 CURVE_SLIPS, STRESS_RESAMPLES, SOILS_PER_RESAMPLE = 25, 24, 16
-#: Shares of draws below the band and below its upper end.
-BAND = (0.05, 0.95)
-
-
-@dataclass(frozen=True)
-class Band:
-    """Middle of the draws and the band that holds nine tenths of them; arrays of one shape."""
-
-    middle: Floats
-    lower: Floats
-    upper: Floats
 
 
 @dataclass(frozen=True)
@@ -66,12 +55,6 @@ class ClimbingAbility:
         at_limit = np.asarray([np.interp(slip_limit, self.slip, slope) for slope in self.slope])
         below = np.where(self.slip <= slip_limit, self.slope, -np.inf).max(axis=1)
         return np.asarray(np.maximum(at_limit, below))
-
-
-def band(draws: Floats) -> Band:
-    """The band of draws (draws, ...)."""
-    lower, middle, upper = np.quantile(draws, (BAND[0], 0.5, BAND[1]), axis=0)
-    return Band(middle, lower, upper)
 
 
 def shared_slips(front: StressBySlip, rear: StressBySlip) -> tuple[float, float]:
@@ -123,14 +106,14 @@ def climbing_ability(
 
     Examples
     --------
-    >>> from soilml.systems.climbing import SimulatedRover, band, identify_ground
+    >>> from soilml.systems.climbing import SimulatedRover, quantile_band, identify_ground
     >>> true, rng = SimulatedRover(), np.random.default_rng(0)
     >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist(), repeats=2)
     >>> sand = {"cohesion": 0.0, "friction_angle": 0.6632}
     >>> ground = identify_ground(true.rover, climbs, fixed=sand)
     >>> front, rear = true.simulate_artificial_slip(rng)
     >>> ability = climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
-    >>> round(float(np.rad2deg(band(ability.steepest).middle)))  # 14.6 is the truth
+    >>> round(float(np.rad2deg(quantile_band(ability.steepest).middle)))  # 14.6 is the truth
     15
     """
     lowest, highest = shared_slips(front, rear)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.quantile_band import QUANTILES
 from soilml.quantities import SHEAR
-from soilml.systems.climbing.ability import BAND, climbing_ability
+from soilml.systems.climbing.ability import climbing_ability
 from soilml.systems.climbing.identify import identify_ground
 from soilml.systems.climbing.rover import Rover
 from soilml.systems.climbing.simulated_rover import SimulatedRover, StressArc
@@ -32,7 +33,7 @@ class PredictionCoverage:
     @property
     def inside(self) -> float:
         """Fraction of rovers whose true value lies in the 90 % interval."""
-        return float(np.mean((self.below > BAND[0]) & (self.below < BAND[1])))
+        return float(np.mean((self.below > QUANTILES[0]) & (self.below < QUANTILES[-1])))
 
     @property
     def score(self) -> float:

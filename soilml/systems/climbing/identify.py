@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError, InputError
-from soilml.identification.diagnostics import HARDLY, NOT, TRADE_OFF
+from soilml.identification.diagnostics import STRONG_CORRELATION
 from soilml.identification.fit_result import Fit
 from soilml.numerics.prior import Prior
-from soilml.quantities import QUANTITIES, SHEAR
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, SHEAR, WEAKLY_IDENTIFIED_ABOVE
 from soilml.systems.climbing.balance_likelihood import ForceBalances
 from soilml.systems.climbing.balance_noise import ShearParameters
 from soilml.systems.climbing.climb import Climb, Uncertainty, group_by_slope
@@ -177,9 +177,9 @@ def _fit(
     )
     warnings = []
     for name, left in fit.left.items():
-        if left > NOT:
+        if left > NOT_IDENTIFIED_ABOVE:
             warnings.append(f"{name} is not identified: {left:.0%} of its prior width remains")
-        elif left > HARDLY:
+        elif left > WEAKLY_IDENTIFIED_ABOVE:
             warnings.append(f"{name} is hardly identified: {left:.0%} of its prior width remains")
     correlation = fit.correlation
     warnings += [
@@ -187,7 +187,7 @@ def _fit(
         "pull that follows from both, not on each value"
         for i, a in enumerate(free)
         for j, b in enumerate(free)
-        if i < j and abs(correlation[i, j]) > TRADE_OFF
+        if i < j and abs(correlation[i, j]) > STRONG_CORRELATION
     ]
     if posterior.noise_scale > 1.0:
         warnings.append(

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.identification import Fit, identify
-from soilml.identification.diagnostics import HARDLY
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
-from soilml.quantities import column
+from soilml.quantities import WEAKLY_IDENTIFIED_ABOVE, column
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +65,11 @@ class GroupFits:
     @property
     def unidentified(self) -> tuple[str, ...]:
         """Parameters whose average is determined mostly by the prior."""
-        return tuple(name for name, share in self.remaining_fraction.items() if share > HARDLY)
+        return tuple(
+            name
+            for name, share in self.remaining_fraction.items()
+            if share > WEAKLY_IDENTIFIED_ABOVE
+        )
 
 
 def identify_groups(

@@ -8,7 +8,7 @@ from soilml.experiment_design import samples_of_moments, samples_of_prior, sampl
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.observations import read_observations
 from soilml.io.table import Table
-from soilml.numerics.maximum_entropy import quantiles
+from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.prior import Prior
 
 BELOW = (np.arange(4000) + 0.5) / 4000
@@ -29,14 +29,14 @@ def test_the_prior_is_as_wide_as_itself(model_file):
 @pytest.mark.parametrize("prior", [Prior(0.0, 3000.0), Prior(1e6, 1e8, log=True)])
 def test_moments_of_the_prior_give_the_prior_back(prior):
     value = prior.at(BELOW)
-    found = quantiles(prior, float(value.mean()), float(value.std()), BELOW)
+    found = prior_quantiles(prior, float(value.mean()), float(value.std()), BELOW)
     np.testing.assert_allclose(found, BELOW, atol=2e-3)
 
 
 @pytest.mark.parametrize(("mean", "std"), [(0.5, 0.1), (0.05, 0.04), (0.9, 0.2), (0.4, 0.01)])
 def test_a_parameter_has_the_mean_and_std_that_it_was_told_and_stays_inside(mean, std):
     prior = Prior(0.0, 1.0)
-    value = prior.at(quantiles(prior, mean, std, BELOW))
+    value = prior.at(prior_quantiles(prior, mean, std, BELOW))
     assert value.mean() == pytest.approx(mean, abs=0.02 * std + 2e-4)
     assert value.std() == pytest.approx(std, rel=0.03)
     assert value.min() >= 0.0 and value.max() <= 1.0
@@ -45,7 +45,7 @@ def test_a_parameter_has_the_mean_and_std_that_it_was_told_and_stays_inside(mean
 def test_moments_that_no_density_has_give_fractions_of_the_prior_all_the_same():
     prior = Prior(0.0, 1.0)
     for mean, std in ((0.0, 0.3), (1.0, 0.3), (0.5, 0.7), (0.3, 0.0), (2.0, 0.1)):
-        found = quantiles(prior, mean, std, BELOW)
+        found = prior_quantiles(prior, mean, std, BELOW)
         assert np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0
 
 

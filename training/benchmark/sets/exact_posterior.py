@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
-from training.benchmark.posterior_summary import systematic_resample
 from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
 from training.set_posterior.monomials import monomial_terms, monomials
 from training.set_posterior.response_surface import NORMAL_TRUNCATION
@@ -56,7 +56,9 @@ def exact_set_posterior(family: WheelFamily, sets: SimulatedSets, index: int) ->
     summary, sample = sample_posterior(unknowns, likelihood, truth)
     if surrogate is None:
         return summary
-    x = np.vstack([truth, unknowns.x(systematic_resample(sample, CHECK_POINTS))])
+    x = np.vstack(
+        [truth, unknowns.x(sample.u[systematic_resampling(sample.weights, CHECK_POINTS, 0.5)])]
+    )
     error = _rms_error_over_noise(sets, index, surrogate(x), physics(x))
     return replace(summary, flagged=summary.flagged or not error < TOLERANCE)
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.resampling import systematic_resampling
 from training.benchmark.posterior_summary import (
     FRACTIONS,
     HPD_DRAWS,
     PosteriorSummary,
-    systematic_resample,
 )
 from training.set_posterior.response_surface import NORMAL_TRUNCATION
 from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
@@ -86,7 +86,7 @@ def sample_posterior(
     values = unknowns.values(unknowns.x(sample.u))
     mean = sample.mean(values)
     deviation = values - mean
-    draws = unknowns.x(systematic_resample(sample, HPD_DRAWS))
+    draws = unknowns.x(sample.u[systematic_resampling(sample.weights, HPD_DRAWS, 0.5)])
     log_density = log_likelihood(np.vstack([truth, draws]))
     true_values = unknowns.values(truth[None])
     summary = RankedPosterior(

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.ability import (
-    Band,
     ClimbingAbility,
-    band,
     check_slip,
     climbing_ability,
     shared_slips,
@@ -46,14 +45,14 @@ class ClimbingReport:
     slip_limit: float | None
 
     @property
-    def pull(self) -> Band:
+    def pull(self) -> QuantileBand:
         """Drawbar pull on level ground over the slips of `ability`, N."""
-        return band(self.ability.pull)
+        return quantile_band(self.ability.pull)
 
     @property
-    def slope(self) -> Band:
+    def slope(self) -> QuantileBand:
         """Slope climbed over the slips of `ability`, rad."""
-        return band(self.ability.slope)
+        return quantile_band(self.ability.slope)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -88,7 +87,7 @@ class ClimbingReport:
         ]
         if outside:
             warnings.append(f"the slip of run {', '.join(outside)} lies outside the curve")
-        most = float(band(self.ability.steepest).upper)
+        most = float(quantile_band(self.ability.steepest).upper)
         warnings += [
             f"run {climb.name} climbed {climb.slope:.3g} rad, more than predicted (at most "
             f"{most:.3g}): it is inconsistent with the others"
@@ -127,19 +126,19 @@ class ClimbingReport:
                 "drawbar_pull_N": _listed(self.pull),
                 "slope_rad": _listed(self.slope),
             },
-            "steepest_slope_rad": _listed(band(self.ability.steepest)),
-            "slip_at_steepest": _listed(band(self.ability.steepest_slip)),
+            "steepest_slope_rad": _listed(quantile_band(self.ability.steepest)),
+            "slip_at_steepest": _listed(quantile_band(self.ability.steepest_slip)),
             "slips_with_stress": [float(self.ability.slip[0]), float(self.ability.slip[-1])],
             "warnings": list(self.warnings),
         }
         if self.slip_limit is not None:
             within = self.ability.steepest_within(self.slip_limit)
-            content["steepest_slope_within_slip_limit_rad"] = _listed(band(within))
+            content["steepest_slope_within_slip_limit_rad"] = _listed(quantile_band(within))
             content["slip_limit"] = self.slip_limit
         return content
 
 
-def _listed(interval: Band) -> dict[str, Any]:
+def _listed(interval: QuantileBand) -> dict[str, Any]:
     names = ("median", "p05", "p95")
     values = (interval.middle, interval.lower, interval.upper)
     return {n: np.asarray(v).tolist() for n, v in zip(names, values, strict=True)}

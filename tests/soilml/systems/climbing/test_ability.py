@@ -11,9 +11,9 @@ from soilml.errors import FitError, InputError
 from soilml.systems.climbing import (
     SimulatedRover,
     StressBySlip,
-    band,
     climbing_ability,
     identify_ground,
+    quantile_band,
 )
 from soilml.systems.climbing.climb import WheelRun
 from soilml.systems.climbing.simulated_rover import StressArc
@@ -81,12 +81,12 @@ def test_redrawn_stress_scatters_as_the_readings_do(true, stresses):
 
 
 def test_steep_slopes_are_predicted_from_gentle_ones(true, ability):
-    slope = band(ability.slope)
+    slope = quantile_band(ability.slope)
     for driven in np.deg2rad([8.0, 10.0, 12.0]):
         at = true.slip_at(driven)
         low, high = (np.interp(at, ability.slip, v) for v in (slope.lower, slope.upper))
         assert low - 0.005 < driven < high + 0.005
-    best = band(ability.steepest)
+    best = quantile_band(ability.steepest)
     assert best.lower - 0.005 < true.steepest < best.upper + 0.005
     assert best.upper - best.lower < 0.06
 
@@ -141,5 +141,5 @@ def test_the_lines_on_the_page_run():
     page = (Path(__file__).parents[4] / "docs/papers/nagatani_climbing.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
-    best = band(names["ability"].steepest)
+    best = quantile_band(names["ability"].steepest)
     assert best.lower < names["true"].steepest < best.upper
