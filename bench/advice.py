@@ -63,7 +63,7 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
         table = _measured(case, truth, [first] * rows, normal[:rows])
         data = read_observations(case, table)
         belief = samples_of_rows(case, data, free, samples)
-        best = advise(case, belief, candidate_grid(SLIPS, LOADS), reads=("torque",)).best()
+        best = advise(case, belief, candidate_grid(SLIPS, LOADS), channels=("torque",)).best()
         points = {
             "repeat": first,
             "random": other,
@@ -76,7 +76,7 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
             (
                 [(fit.values - values) / spread for fit in fits],
                 [fit.std / spread for fit in fits],
-                best.left,
+                best.remaining_fraction,
             )
         )
     error, std, expected = (np.asarray(part) for part in zip(*found, strict=True))
@@ -89,7 +89,7 @@ def planned(case: Case, rows: int, soils: int, seed: int) -> dict[str, np.ndarra
     free = select_free(case, None)
     spread = np.asarray([f.prior.std for f in free])
     ranges = candidate_grid(SLIPS, LOADS)
-    plan = advise(case, samples_of_prior(free), ranges, reads=("torque",), count=rows).sequence
+    plan = advise(case, samples_of_prior(free), ranges, channels=("torque",), count=rows).sequence
     best = [(choice.candidate.slip, choice.candidate.load) for choice in plan]
     left: dict[str, list[np.ndarray]] = {"drawn": [], "planned": []}
     for _ in range(soils):
@@ -101,7 +101,7 @@ def planned(case: Case, rows: int, soils: int, seed: int) -> dict[str, np.ndarra
             left[name].append(identify(case, table, None, "posterior").std / spread)
     return {
         **{name: np.asarray(values) for name, values in left.items()},
-        "planned, as expected": plan[-1].left[None],
+        "planned, as expected": plan[-1].remaining_fraction[None],
     }
 
 
@@ -177,9 +177,9 @@ def from_file(soils: int = SOILS, seed: int = 5) -> str:
         readings = {"slip": point[0], "load": point[1], "torque": float(table["torque_Nm"][0])}
         told = estimator(**readings)
         moments = samples_of_moments(free, estimator.names, told.mean, told.covariance)
-        theirs = advise(case, moments, ranges, reads=("torque",)).best().candidate
+        theirs = advise(case, moments, ranges, channels=("torque",)).best().candidate
         exact = advise(case, samples_of_rows(case, read_observations(case, table), free), ranges)
-        torque = exact.of(("torque",))
+        torque = exact.with_channels(("torque",))
         left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
         left["the posterior's"].append(exact.best().overall)
         left["any"].append(_all(np.asarray([c.overall for c in torque])))

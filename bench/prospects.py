@@ -48,12 +48,12 @@ def table(kinds: Mapping[str, Mapping[float, Coverage]]) -> str:
 
 def _lines(name: str, found: Mapping[float, Coverage]) -> Iterator[str]:
     for load, one in found.items():
-        pulls = " | ".join(f"{100 * share:.0f} %" for share in one.pull.inside)
-        wide = np.rad2deg(np.median(one.steepest.width))
-        reach = np.rad2deg(np.quantile(np.abs(one.steepest.off), 0.9))
-        bias = np.rad2deg(np.mean(one.steepest.off))
+        pulls = " | ".join(f"{100 * share:.0f} %" for share in one.pull.covered)
+        wide = np.rad2deg(np.median(one.steepest_slope.width))
+        reach = np.rad2deg(np.quantile(np.abs(one.steepest_slope.error), 0.9))
+        bias = np.rad2deg(np.mean(one.steepest_slope.error))
         yield (
-            f"| {name} | {load:g} | {pulls} | {100 * one.steepest.inside:.0f} % "
+            f"| {name} | {load:g} | {pulls} | {100 * one.steepest_slope.covered:.0f} % "
             f"| {wide:.1f} | {reach:.1f} | {bias:+.1f} |"
         )
 

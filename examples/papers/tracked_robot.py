@@ -121,7 +121,7 @@ def eight_groups() -> tuple[Case, GroupFits]:
         print(
             f"{name:14s} {scale * true:7.4g}  {scale * groups.mean[i]:7.4g}  "
             f"{scale * groups.std[i]:7.2g}  {scale * PRIOR[name].std:9.2g}  "
-            f"{groups.left[name]:22.0%}  {groups.joint.left[name]:8.0%}"
+            f"{groups.left[name]:22.0%}  {groups.joint.remaining_fraction[name]:8.0%}"
         )
     print(f"told hardly or not at all by a group: {', '.join(groups.open)}")
     return case, groups

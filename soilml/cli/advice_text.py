@@ -55,8 +55,10 @@ def advice_after_fit(
     try:
         data = read_observations(case, table)
         belief = samples_of_rows(case, data, select_free(case, free), QUICK_SAMPLES)
-        now = np.asarray([fit.left[f.path] for f in belief.free])
-        return _quick(case, belief, candidate_grid(None, None, data.load), data.at, now=now)
+        current = np.asarray([fit.remaining_fraction[f.path] for f in belief.free])
+        return _quick(
+            case, belief, candidate_grid(None, None, data.load), data.at, current_fraction=current
+        )
     except (FitError, InputError):
         return None
 
@@ -80,7 +82,7 @@ def advice_after_estimate(
         return []
     case, ranges = found
     slip, load = (np.atleast_1d(readings[key]) for key in ("slip", "load"))
-    now = np.sqrt(np.diag(covariance)) / estimator.prior.std
+    current = np.sqrt(np.diag(covariance)) / estimator.prior.std
     try:
         free = select_free(case, None)
         if slip.size <= FEW:
@@ -93,13 +95,13 @@ def advice_after_estimate(
             belief,
             ranges,
             Operating(slip=slip, load=load),
-            reads=estimator.inputs,
-            wanted=estimator.names,
-            now=now,
+            channels=estimator.inputs,
+            parameters=estimator.names,
+            current_fraction=current,
         )
     except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
         return []
-    return next_row_messages(advice, "this row does" if slip.size == 1 else "these rows do")
+    return next_row_messages(advice, "this row" if slip.size == 1 else "these rows")
 
 
 def _shares(estimate: Estimate) -> NDArray[np.float64]:
@@ -131,20 +133,20 @@ def _quick(
     ranges: CandidateGrid,
     driven: Operating,
     *,
-    reads: tuple[str, ...] | None = None,
-    wanted: tuple[str, ...] | None = None,
-    now: Floats | None = None,
+    channels: tuple[str, ...] | None = None,
+    parameters: tuple[str, ...] | None = None,
+    current_fraction: Floats | None = None,
 ) -> Advice:
     return advise(
         case,
         belief,
         ranges,
-        driven=driven,
+        measured=driven,
         count=AHEAD,
         covariates=mean_covariates(driven),
-        reads=reads,
-        wanted=wanted,
-        now=now,
+        channels=channels,
+        parameters=parameters,
+        current_fraction=current_fraction,
         outcome_count=QUICK_OUTCOMES,
     )
 

@@ -1,4 +1,4 @@
-"""Which measurement to make next: what each would leave open, and what none has told yet."""
+"""Experiment design: the next measurement with the least expected posterior variance."""
 
 from soilml.experiment_design.candidate_rows import CandidateGrid, CandidateRow, candidate_grid
 from soilml.experiment_design.design import Advice, RatedRow, advise

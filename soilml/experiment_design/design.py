@@ -1,4 +1,4 @@
-"""Which measurement to make next, and what it would leave open."""
+"""Which measurement to make next, and the uncertainty expected to remain after it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from soilml.experiment_design.candidate_rows import (
     CandidateGrid,
     CandidateRow,
     channel_sets,
-    repeats,
+    repeated_points,
 )
 from soilml.experiment_design.expected_variance import OUTCOMES, ExpectedVariance, expected_variance
 from soilml.experiment_design.parameter_samples import ParameterSamples
@@ -27,165 +27,212 @@ Floats32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class RatedRow:
-    """A measurement, and the width that it is expected to leave of each prior, (p,).
+    """A candidate row and the fraction of each prior's width expected to remain after it, (p,).
 
-    `left` is the root of the expected variance over the prior's standard deviation.
+    The fraction is the root of the expected variance over the prior's standard deviation.
     """
 
     candidate: CandidateRow
-    left: Floats
+    remaining_fraction: Floats
 
     @property
     def overall(self) -> float:
-        """Root mean square of `left` over the parameters: 1 where nothing would be known."""
-        return float(np.sqrt(np.mean(self.left**2)))
+        """Root mean square of the fractions: 1 where nothing is known."""
+        return float(np.sqrt(np.mean(self.remaining_fraction**2)))
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What each next measurement would leave open, and the best sequence of several.
+    """Expected effect of each next measurement, and the best sequence of several.
 
-    `now` (p,) is the width left of each prior before it. `sequence` holds the best first row, the
-    best second one after it, and so on; their `left` is what remains after all so far.
+    Attributes
+    ----------
+    names
+        The p parameters that are rated.
+    current_fraction
+        Fraction (p,) of each prior's width that remains before the next measurement.
+    choices
+        All candidates at which the wheel can be driven.
+    repetitions
+        Rows that repeat measured operating points.
+    sequence
+        The best first row, the best second one after it, and so on; their fractions are those after
+        all rows so far.
+    excluded_points
+        Number of grid points at which the wheel might not be carried.
     """
 
     names: tuple[str, ...]
-    now: Floats
+    current_fraction: Floats
     choices: tuple[RatedRow, ...]
-    again: tuple[RatedRow, ...]
+    repetitions: tuple[RatedRow, ...]
     sequence: tuple[RatedRow, ...]
-    stuck: int
+    excluded_points: int
 
-    def of(self, channels: tuple[str, ...]) -> tuple[RatedRow, ...]:
-        """The choices that read these channels."""
+    def with_channels(self, channels: tuple[str, ...]) -> tuple[RatedRow, ...]:
+        """The choices that measure these channels."""
         return tuple(c for c in self.choices if c.candidate.channels == channels)
 
     @property
-    def sets(self) -> tuple[tuple[str, ...], ...]:
+    def channel_sets(self) -> tuple[tuple[str, ...], ...]:
         """Sets of channels among the choices, the smallest first."""
         return tuple(dict.fromkeys(c.candidate.channels for c in self.choices))
 
     def best(self, name: str | None = None, channels: tuple[str, ...] | None = None) -> RatedRow:
-        """The choice that leaves least of one parameter, or of all on average."""
-        return least(self.of(channels or self.sets[0]), self.names, name)
+        """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
+        choices = self.with_channels(channels or self.channel_sets[0])
+        return best_row(choices, self.names, name)
 
-    def repeat(self, name: str | None = None) -> RatedRow | None:
-        """The best repetition of what was driven; None where nothing was."""
-        return least(self.again, self.names, name) if self.again else None
+    def best_repetition(self, name: str | None = None) -> RatedRow | None:
+        """The best repetition of a measured operating point; None without measured rows."""
+        return best_row(self.repetitions, self.names, name) if self.repetitions else None
 
 
-def least(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:
-    """The choice that leaves least of one parameter, or of all on average."""
+def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:
+    """The choice with the least remaining fraction of one parameter, or of all (`overall`)."""
     if name is None:
         return min(choices, key=lambda c: c.overall)
     i = list(names).index(name)
-    return min(choices, key=lambda c: float(c.left[i]))
+    return min(choices, key=lambda c: float(c.remaining_fraction[i]))
 
 
 def advise(
     case: Case,
-    belief: ParameterSamples,
+    samples: ParameterSamples,
     grid: CandidateGrid,
     *,
-    driven: Operating | None = None,
+    measured: Operating | None = None,
     count: int = 1,
     covariates: Mapping[str, float] | None = None,
-    reads: Sequence[str] | None = None,
-    wanted: Sequence[str] | None = None,
-    now: Floats | None = None,
+    channels: Sequence[str] | None = None,
+    parameters: Sequence[str] | None = None,
+    current_fraction: Floats | None = None,
     outcome_count: int = OUTCOMES,
     seed: int = 0,
 ) -> Advice:
-    """Score every slip, load and set of channels by the variance that a row there would leave.
+    """Rate every slip, load and set of channels by the variance expected to remain after a row.
 
-    `driven` are rows whose repetition is compared, `count` how many rows the sequence plans,
-    `covariates` further fields of `Operating`, `reads` the channels that there are (default: those
-    with declared noise), `wanted` the parameters that are looked at (default: all of the belief),
-    `now` (p,) the width left of them where it is known better than by few samples. Points at which
-    a twentieth of what is believed possible leaves the wheel stuck are left out, and counted. The
-    sequence is greedy, each row the best after those before it; it reads the first set of channels.
-    Raises `FitError` where no point is left, `InputError` where no noise is declared.
+    The sequence is greedy, each row the best after those before it, with the first set of channels.
+    All ratings assume that the model is correct. A remaining fraction is an expectation over
+    readings; the one realised differs.
 
-    It believes the model: where an effect is missing, the best row is not the one said here. A
-    width is one expected over all that may be read; the one that comes out differs.
+    Parameters
+    ----------
+    case
+        Model, soil, priors and noise.
+    samples
+        What is known of the parameters: samples of the prior, of a posterior, or of moments.
+    grid
+        Slips and loads (N) that can be driven.
+    measured
+        Operating points of earlier rows, whose repetition is rated for comparison.
+    count
+        Length of the sequence.
+    covariates
+        Further fields of `Operating`, the same for all candidates.
+    channels
+        Channels that can be measured; by default those with declared noise.
+    parameters
+        Parameters that are rated; by default all of the samples.
+    current_fraction
+        Remaining fraction (p,) of `parameters` where it is known more precisely than from the
+        samples.
+    outcome_count
+        Number of simulated readings of each candidate.
+    seed
+        Of the simulated noise.
+
+    Raises
+    ------
+    FitError
+        Where every point has a probability of 5 % or more that the wheel is not carried.
+    InputError
+        Where no noise is declared.
+
+    References
+    ----------
+    Chaloner and Verdinelli, Statistical Science 10, 1995.
     """
-    trial = _trial(case, belief, grid, driven, covariates or {}, wanted, now)
-    sets = channel_sets([c for c in trial.ahead.channels if reads is None or c in reads])
-    soils = expected_variance(belief, len(trial.ahead.channels), outcome_count, seed)
-    first = trial.of(grid.candidates(sets[:1]), soils)
+    rating = _rating(case, samples, grid, measured, covariates or {}, parameters, current_fraction)
+    predicted = rating.predicted.channels
+    sets = channel_sets([c for c in predicted if channels is None or c in channels])
+    outcomes = expected_variance(samples, len(predicted), outcome_count, seed)
+    first = rating.rate(grid.candidates(sets[:1]), outcomes)
     if not first:
         raise FitError(
-            "at each of these slips and loads some soil that is still possible would not carry the "
+            "at each of these slips and loads some soils that are still possible do not carry the "
             "wheel: try smaller loads, or narrow [soil.prior]"
         )
-    sequence, before = [least(first, trial.names, None)], None
+    sequence, earlier = [best_row(first, rating.names, None)], None
     for step in range(1, count):
-        logs = trial.logs(sequence[-1].candidate, soils)
-        before = logs if before is None else before + logs
-        soils = soils.with_noise(seed + step)
-        second = trial.of([c.candidate for c in first], soils, before)
-        sequence.append(least(second, trial.names, None))
-    soils = soils.with_noise(seed)
+        log_likelihood = rating.log_likelihood(sequence[-1].candidate, outcomes)
+        earlier = log_likelihood if earlier is None else earlier + log_likelihood
+        outcomes = outcomes.with_noise(seed + step)
+        after = rating.rate([c.candidate for c in first], outcomes, earlier)
+        sequence.append(best_row(after, rating.names, None))
+    outcomes = outcomes.with_noise(seed)
+    repetitions = [] if measured is None else repeated_points(measured, sets[0])
     return Advice(
-        names=trial.names,
-        now=trial.now,
-        choices=(*first, *trial.of(grid.candidates(sets[1:]), soils)),
-        again=tuple(trial.of([] if driven is None else repeats(driven, sets[0]), soils)),
+        names=rating.names,
+        current_fraction=rating.current_fraction,
+        choices=(*first, *rating.rate(grid.candidates(sets[1:]), outcomes)),
+        repetitions=tuple(rating.rate(repetitions, outcomes)),
         sequence=tuple(sequence),
-        stuck=len(grid.slips) * len(grid.loads) - len(first),
+        excluded_points=len(grid.slips) * len(grid.loads) - len(first),
     )
 
 
 @dataclass(frozen=True)
-class _Trial:
-    """What candidates are judged by: readings ahead at each point, and what is looked at."""
+class _Rating:
+    """Predicted readings at all points, and the parameters that candidates are rated by."""
 
     names: tuple[str, ...]
-    now: Floats
-    looked: list[int]
-    scale: Floats
-    ahead: PredictedReadings
-    place: dict[tuple[float, float], int]
+    current_fraction: Floats
+    columns: list[int]  # of the rated parameters among those of the samples
+    scale: Floats  # current fraction over that of the samples
+    predicted: PredictedReadings
+    index: dict[tuple[float, float], int]  # of each slip and load among the points
 
-    def logs(self, c: CandidateRow, soils: ExpectedVariance) -> Floats32:
-        return soils.logs(self.ahead, c.channels, self.place[c.slip, c.load])
+    def log_likelihood(self, row: CandidateRow, outcomes: ExpectedVariance) -> Floats32:
+        return outcomes.log_likelihood(self.predicted, row.channels, self.index[row.slip, row.load])
 
-    def of(
+    def rate(
         self,
         candidates: Sequence[CandidateRow],
-        soils: ExpectedVariance,
-        before: Floats32 | None = None,
+        outcomes: ExpectedVariance,
+        earlier: Floats32 | None = None,
     ) -> list[RatedRow]:
-        """Those of the candidates that can be driven, after rows whose likelihood is `before`."""
-        found = []
-        for c in candidates:
-            if self.ahead.drivable[self.place[c.slip, c.load]]:
-                logs = self.logs(c, soils)
-                left = soils.remaining(logs if before is None else logs + before)[self.looked]
-                found.append(RatedRow(c, self.scale * np.sqrt(left)))
-        return found
+        """Candidates that can be driven, after rows with the log likelihood `earlier`."""
+        rated = []
+        for row in candidates:
+            if self.predicted.drivable[self.index[row.slip, row.load]]:
+                logs = self.log_likelihood(row, outcomes)
+                logs = logs if earlier is None else logs + earlier
+                variance = outcomes.remaining_variance(logs)[self.columns]
+                rated.append(RatedRow(row, self.scale * np.sqrt(variance)))
+        return rated
 
 
-def _trial(
+def _rating(
     case: Case,
-    belief: ParameterSamples,
+    samples: ParameterSamples,
     grid: CandidateGrid,
-    driven: Operating | None,
+    measured: Operating | None,
     covariates: Mapping[str, float],
-    wanted: Sequence[str] | None,
-    now: Floats | None,
-) -> _Trial:
-    """Readings at all points, those driven among them."""
+    parameters: Sequence[str] | None,
+    current_fraction: Floats | None,
+) -> _Rating:
+    """Predicted readings at all points of the grid and at measured ones."""
     points = [(c.slip, c.load) for c in grid.candidates([()])]
-    if driven is not None:
-        points += [(c.slip, c.load) for c in repeats(driven)]
-    place = {point: k for k, point in enumerate(dict.fromkeys(points))}
-    slip, load = np.asarray(list(place)).T
-    known = {key: np.full(len(place), value) for key, value in covariates.items()}
-    ahead = predicted_readings(case, belief, Operating(slip=slip, load=load, **known))
-    every = [f.path for f in belief.free]
-    names = tuple(wanted or every)
-    looked = [every.index(name) for name in names]
-    left = belief.left[looked]
-    now = left if now is None else now
-    return _Trial(names, now, looked, now / left, ahead, place)
+    if measured is not None:
+        points += [(c.slip, c.load) for c in repeated_points(measured)]
+    index = {point: k for k, point in enumerate(dict.fromkeys(points))}
+    slip, load = np.asarray(list(index)).T
+    others = {key: np.full(len(index), value) for key, value in covariates.items()}
+    predicted = predicted_readings(case, samples, Operating(slip=slip, load=load, **others))
+    paths = [f.path for f in samples.free]
+    names = tuple(parameters or paths)
+    columns = [paths.index(name) for name in names]
+    sampled = samples.remaining_fraction[columns]
+    current = sampled if current_fraction is None else current_fraction
+    return _Rating(names, current, columns, current / sampled, predicted, index)

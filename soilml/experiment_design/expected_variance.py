@@ -1,4 +1,4 @@
-"""The width that is expected to remain of each parameter after a measurement."""
+"""Expected posterior variance of each parameter after a measurement."""
 
 from __future__ import annotations
 
@@ -15,85 +15,105 @@ from soilml.numerics.resampling import systematic_resampling
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
-#: Logarithm of a likelihood that no sample has.
+#: Stands for the logarithm of a vanishing likelihood where it is subtracted.
 LEAST_LOG = -1e30
-#: Soils among the samples whose readings are simulated.
+#: Number of simulated readings.
 OUTCOMES = 256
 
 
 @dataclass(frozen=True)
 class ExpectedVariance:
-    """Soils `index` (j,) taken for true in turn, and the standard normal draws of their noise.
+    """Simulated outcomes: the sample that each is simulated from, and its standardised noise.
 
-    All candidates share both, so that their differences are not those of luck.
+    All candidates share both (common random numbers), so that their differences are not those of
+    chance.
     """
 
-    index: NDArray[np.int64]
+    index: NDArray[np.int64]  # (j,) of the samples
     normal: Floats  # (c, j)
-    belief: ParameterSamples
+    samples: ParameterSamples
 
     def with_noise(self, seed: int) -> ExpectedVariance:
-        """The same soils with fresh noise, for another row."""
+        """The same samples with fresh noise, for another row."""
         normal = np.random.default_rng(seed).standard_normal(self.normal.shape)
         return replace(self, normal=normal)
 
-    def logs(self, foreseen: PredictedReadings, channels: Sequence[str], point: int) -> Floats32:
-        """Logarithm of the likelihood (j, n) of each simulated reading under each sample.
+    def log_likelihood(
+        self, predicted: PredictedReadings, channels: Sequence[str], point: int
+    ) -> Floats32:
+        """Log likelihood (j, n) of each simulated outcome under each sample, up to a constant.
 
-        A wheel that is stuck is a reading too: of the soils that do not carry it, and of no other.
+        A wheel that is not carried is an outcome too: certain under the samples without an
+        equilibrium at this point, impossible under the others.
         """
-        total = np.zeros((len(self.index), len(self.belief.weights)), dtype=np.float32)
+        total = np.zeros((len(self.index), len(self.samples.weights)), dtype=np.float32)
         for name in channels:
-            c = foreseen.channels.index(name)
-            y, std = foreseen.y[c, point], foreseen.std[c, point]
-            read = y[self.index] + std[self.index] * self.normal[c]
-            scale = (1.0 / std).astype(np.float32)
-            off = np.multiply.outer(read.astype(np.float32), scale)
-            off -= (y / std).astype(np.float32)
-            off *= off
-            off += 2.0 * np.log(std).astype(np.float32)
-            total -= off
+            c = predicted.channels.index(name)
+            total -= self._squared_deviation(predicted.y[c, point], predicted.std[c, point], c)
         total *= 0.5
-        stuck = np.asarray(np.isnan(foreseen.y[:, point]).any(axis=0))
-        if stuck.any():
-            same = stuck[self.index][:, None] == stuck
-            total = np.where(same, np.where(stuck, np.float32(0.0), total), np.float32(-np.inf))
+        failed = np.asarray(np.isnan(predicted.y[:, point]).any(axis=0))
+        if failed.any():
+            same = failed[self.index][:, None] == failed
+            carried = np.where(failed, np.float32(0.0), total)
+            total = np.where(same, carried, np.float32(-np.inf))
         return total
 
-    def remaining(self, logs: Floats32) -> Floats:
-        r"""Expected variance (p,) in squared standard deviations of the prior.
+    def _squared_deviation(self, y: Floats, std: Floats, c: int) -> Floats32:
+        """Squared standardised deviation plus log variance, (j, n), in single precision."""
+        reading = y[self.index] + std[self.index] * self.normal[c]
+        deviation = np.multiply.outer(reading.astype(np.float32), (1.0 / std).astype(np.float32))
+        deviation -= (y / std).astype(np.float32)
+        deviation *= deviation
+        deviation += 2.0 * np.log(std).astype(np.float32)
+        return np.asarray(deviation)
+
+    def remaining_variance(self, log_likelihood: Floats32) -> Floats:
+        r"""Expected posterior variance (p,) in units of the prior's.
 
         .. math::
             E \operatorname{Var}(\theta | y) \approx \frac{1}{J} \sum_j \frac{1}{2}
             \left[ \sum_i W_{ji} (\theta_i - m_j)^2 + (\theta_j - m_j)^2 \right], \quad
             W_{ji} \propto w_i \, p(y_j | \theta_i), \; i \ne j, \quad m_j = \sum_i W_{ji} \theta_i
 
-        The soil that made the reading takes no part in what is inferred from it. Both terms are
-        the variance as the samples grow dense; where few lie within the noise, the first is too
-        small and the second too large by the same share, which cancels in their mean. On average no
-        reading widens what is believed. References: Lindley, Annals of Mathematical Statistics 27,
-        1956; Chaloner and Verdinelli, Statistical Science 10, 1995, section 2 (the expected
-        posterior variance as what an experiment is worth).
+        The sample that an outcome is simulated from is left out of its posterior. Both terms
+        converge to the variance as the samples grow dense. Where few samples lie within the noise,
+        the first is too small and the second too large by the same amount, which cancels in their
+        mean. The result is at most the current variance, as no reading widens a posterior on
+        average.
+
+        References
+        ----------
+        Lindley, Annals of Mathematical Statistics 27, 1956. Chaloner and Verdinelli, Statistical
+        Science 10, 1995, section 2.
         """
-        weight = logs + np.log(self.belief.weights).astype(np.float32)
+        weights = self._leave_one_out_weights(log_likelihood)
+        theta = self.samples.standardised
+        own = theta[self.index]
+        columns = np.column_stack([np.ones(len(theta)), theta, theta**2])
+        sums = (weights @ columns.astype(np.float32)).astype(np.float64)
+        total = sums[:, 0]
+        isolated = total == 0.0  # no other sample can produce this outcome
+        moments = sums[:, 1:] / np.where(isolated, 1.0, total)[:, None]
+        mean, mean_square = np.split(moments, 2, axis=1)
+        mean[isolated] = own[isolated]
+        mean_square[isolated] = mean[isolated] ** 2
+        within = mean_square - mean**2
+        expected = 0.5 * (within + (own - mean) ** 2).mean(axis=0)
+        return np.asarray(np.minimum(expected, self.samples.remaining_fraction**2))
+
+    def _leave_one_out_weights(self, log_likelihood: Floats32) -> Floats32:
+        """Posterior weights (j, n) up to a factor of each outcome, zero for its own sample."""
+        weight = log_likelihood + np.log(self.samples.weights).astype(np.float32)
         weight[np.arange(len(self.index)), self.index] = -np.inf
         weight -= np.maximum(weight.max(axis=1, keepdims=True), np.float32(LEAST_LOG))
         np.exp(weight, out=weight)
-        shares = self.belief.shares
-        columns = np.column_stack([np.ones(len(shares)), shares, shares**2])
-        sums = (weight @ columns.astype(np.float32)).astype(np.float64)
-        alone = sums[:, 0] == 0.0  # no other sample could have read so
-        mean, square = np.split(sums[:, 1:] / np.where(alone, 1.0, sums[:, 0])[:, None], 2, axis=1)
-        mean[alone] = shares[self.index[alone]]
-        square[alone] = mean[alone] ** 2
-        off = shares[self.index] - mean
-        found = 0.5 * (square - mean**2 + off**2).mean(axis=0)
-        return np.asarray(np.minimum(found, self.belief.left**2))
+        return np.asarray(weight)
 
 
 def expected_variance(
-    belief: ParameterSamples, channels: int, count: int = OUTCOMES, seed: int = 0
+    samples: ParameterSamples, channels: int, count: int = OUTCOMES, seed: int = 0
 ) -> ExpectedVariance:
-    """Soils of a belief to be taken for true in turn, as probable as it says."""
-    index = systematic_resampling(belief.weights, count, np.random.default_rng(seed).random())
-    return ExpectedVariance(index, np.zeros((channels, count)), belief).with_noise(seed)
+    """Outcomes of `count` samples, resampled by their weights, for a number of channels."""
+    offset = np.random.default_rng(seed).random()
+    index = systematic_resampling(samples.weights, count, offset)
+    return ExpectedVariance(index, np.zeros((channels, count)), samples).with_noise(seed)

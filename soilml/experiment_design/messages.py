@@ -1,4 +1,4 @@
-"""What rows have told and what not, and what to drive next, in words."""
+"""Messages: which parameters are not identified, and which row to measure next."""
 
 from __future__ import annotations
 
@@ -10,88 +10,91 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 
 Floats = NDArray[np.float64]
 
-#: Differences of width, in shares of the prior's, that are not worth a word.
+#: Differences of remaining fractions that are not reported: the sampling error of one call.
 NEGLIGIBLE = 0.02
 
 
-def is_identified(left: Floats) -> NDArray[np.bool_]:
-    """Whether rows told a parameter, by the width that they leave of its prior.
-
-    Above `NOT_IDENTIFIED_ABOVE` the answer is mostly the prior: abstain.
-    """
-    return np.asarray(left <= NOT_IDENTIFIED_ABOVE)
+def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
+    """Whether the remaining fraction of a prior is at most `NOT_IDENTIFIED_ABOVE`."""
+    return np.asarray(remaining_fraction <= NOT_IDENTIFIED_ABOVE)
 
 
-def abstention_message(name: str, left: float, what: str = "these rows do") -> str:
-    """That a parameter was not told; `what` names the rows: these rows do, this row does."""
+def abstention_message(name: str, remaining_fraction: float, rows: str = "these rows") -> str:
+    """That a parameter is not identified; `rows` is "these rows" or "this row"."""
     name = name.replace("_", " ")
-    return f"{name}: {left:.0%} of the prior's width remains: {what} not tell it"
+    return (
+        f"{name}: not identified by {rows}, {remaining_fraction:.0%} of the prior's width remains"
+    )
 
 
-def next_row_messages(advice: Advice, what: str = "these rows do") -> list[str]:
-    """A line for each parameter that was not told, and one of the row that helps most in all.
+def next_row_messages(advice: Advice, rows: str = "these rows") -> list[str]:
+    """A line for each parameter that is not identified, and one of the best row for all.
 
-    `what` as for `abstention_message`.
+    `rows` as for `abstention_message`.
     """
-    said = [
-        f"{abstention_message(name, left, what)}. {_helps(advice, name)}"
-        for name, left, ok in zip(advice.names, advice.now, is_identified(advice.now), strict=True)
+    current = advice.current_fraction
+    texts = [
+        f"{abstention_message(name, fraction, rows)}. {_most_informative(advice, name)}"
+        for name, fraction, ok in zip(advice.names, current, is_identified(current), strict=True)
         if not ok
     ]
-    return [*said, f"next row that helps most in all: {row_message(advice, advice.best())}"]
+    return [*texts, f"best next row for all parameters: {row_message(advice, advice.best())}"]
 
 
 def row_message(advice: Advice, choice: RatedRow) -> str:
-    """A row, and what it is expected to leave of each prior."""
-    pairs = zip(advice.names, choice.left, strict=True)
-    shares = ", ".join(f"{name.replace('_', ' ')} {left:.0%}" for name, left in pairs)
-    return f"{choice.candidate.said} (expected to leave {shares})"
+    """A row, and the fraction of each prior expected to remain after it."""
+    pairs = zip(advice.names, choice.remaining_fraction, strict=True)
+    fractions = ", ".join(f"{name.replace('_', ' ')} {fraction:.0%}" for name, fraction in pairs)
+    return f"{choice.candidate.description} (expected to leave {fractions})"
 
 
-def _helps(advice: Advice, name: str) -> str:
-    """The row that tells most of one parameter, against repeating what was driven."""
+def _most_informative(advice: Advice, name: str) -> str:
+    """The best row for one parameter, compared with repeating measured points."""
     i = advice.names.index(name)
     best = advice.best(name)
-    left = float(best.left[i])
-    if left > advice.now[i] - NEGLIGIBLE:
-        return f"No single row would: {_together(advice, i)}"
-    text = f"Most helpful next: {best.candidate.said} (leaves {left:.0%})"
-    others = [(own, float(advice.best(name, own).left[i])) for own in advice.sets[1:]]
-    better = [(own, share) for own, share in others if share < left - NEGLIGIBLE]
+    fraction = float(best.remaining_fraction[i])
+    if fraction > advice.current_fraction[i] - NEGLIGIBLE:
+        return f"No single row identifies it: {_sequence(advice, i)}"
+    text = f"Most informative next: {best.candidate.description} (leaves {fraction:.0%})"
+    others = [
+        (channels, float(advice.best(name, channels).remaining_fraction[i]))
+        for channels in advice.channel_sets[1:]
+    ]
+    better = [(channels, other) for channels, other in others if other < fraction - NEGLIGIBLE]
     if better:
-        own, share = min(better, key=lambda pair: pair[1])
-        text += f", with {own[1].replace('_', ' ')} {share:.0%}"
-    repeat = advice.repeat(name)
-    if repeat is not None:
-        text += f"; repeating what was driven leaves {repeat.left[i]:.0%}"
-    return text if is_identified(np.asarray(left)) else f"{text}; {_together(advice, i)}"
+        channels, other = min(better, key=lambda pair: pair[1])
+        text += f", with {channels[1].replace('_', ' ')} {other:.0%}"
+    repetition = advice.best_repetition(name)
+    if repetition is not None:
+        text += f"; a repetition leaves {repetition.remaining_fraction[i]:.0%}"
+    return text if is_identified(np.asarray(fraction)) else f"{text}; {_sequence(advice, i)}"
 
 
-def _together(advice: Advice, i: int) -> str:
-    """What several rows leave of parameter `i`."""
+def _sequence(advice: Advice, i: int) -> str:
+    """What remains of parameter `i` after several rows."""
     if len(advice.sequence) < 2:
         return "several rows at other slips and loads may"
-    rows = ", then ".join(c.candidate.said for c in advice.sequence)
-    count = len(advice.sequence)
-    return f"{count} rows together leave {advice.sequence[-1].left[i]:.0%}: {rows}"
+    rows = ", then ".join(c.candidate.description for c in advice.sequence)
+    fraction = advice.sequence[-1].remaining_fraction[i]
+    return f"{len(advice.sequence)} rows leave {fraction:.0%}: {rows}"
 
 
 def as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
-    """A row to drive, and the width that it is expected to leave of each prior."""
+    """A row, and the fraction of each prior expected to remain after it."""
     c = choice.candidate
     return {
         "slip": c.slip,
         "load_N": c.load,
         "channels": list(c.channels),
-        "left_of_prior": dict(zip(advice.names, choice.left.tolist(), strict=True)),
+        "left_of_prior": dict(zip(advice.names, choice.remaining_fraction.tolist(), strict=True)),
     }
 
 
 def summary(advice: Advice) -> dict[str, object]:
-    """The best next rows: in all, for each parameter, and the best repetition."""
-    repeat = advice.repeat()
+    """The best next rows: for all parameters, for each, and the best repetition."""
+    repetition = advice.best_repetition()
     return {
         "next": as_json(advice, advice.best()),
         "next_for": {name: as_json(advice, advice.best(name)) for name in advice.names},
-        "repeat": None if repeat is None else as_json(advice, repeat),
+        "repeat": None if repetition is None else as_json(advice, repetition),
     }

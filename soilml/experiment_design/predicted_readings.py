@@ -1,4 +1,4 @@
-"""What sensors would read at other slips and loads, for every sample of a belief."""
+"""Predicted readings at other slips and loads, for every parameter sample."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.identification.observations import LEAST_STD, Channel, Observations
-from soilml.identification.predictions import input_noise, predicted
+from soilml.identification.observations import LEAST_RELATIVE_STD
+from soilml.identification.predictions import predict_channels, propagated_input_noise
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 
 
-#: Share of what is believed possible that may leave the wheel stuck at a point that is advised.
-STUCK = 0.05
+#: Largest probability of no equilibrium at a point that is advised.
+MOST_FAILURE = 0.05
 
 
 @dataclass(frozen=True)
 class PredictedReadings:
     """Readings y (c, m, n) of channels at m operating points for n samples, and their noise.
 
-    NaN where that soil does not carry the wheel; `drivable` (m,) are points at which less than
-    `STUCK` of the belief is such.
+    NaN where that soil does not carry the wheel; `drivable` (m,) are points at which the
+    probability of this is less than `MOST_FAILURE`.
     """
 
     at: Operating
@@ -37,35 +37,32 @@ class PredictedReadings:
     drivable: NDArray[np.bool_]
 
 
-def predicted_readings(case: Case, belief: ParameterSamples, at: Operating) -> PredictedReadings:
+def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> PredictedReadings:
     """Predictions of all channels whose noise the case declares; `at` holds arrays (m,).
 
-    Noise of slip and load adds to that of each channel as in the posterior, at one sample near the
-    middle of the belief. Raises `InputError` where no noise is declared.
+    Noise of slip and load is propagated as in the posterior, at the sample nearest to the mean.
+    Raises `InputError` where no noise is declared.
     """
     channels = tuple(name for name in CHANNELS if column(name) in case.noise)
     if not channels:
-        raise InputError("what a measurement would tell needs its noise: declare it in [noise]")
-    found = predicted(case, belief.free, belief.u, at)
-    y = np.stack([found[name].T for name in channels])
-    extra = _input_noise(case, belief, at, channels)
-    std = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
-    std = belief.larger * np.hypot(std, extra[..., None])
-    stuck = np.isnan(y).any(axis=0) @ belief.weights
-    least = LEAST_STD * np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
-    return PredictedReadings(at, channels, y, np.fmax(std, least + 1e-12), stuck < STUCK)
+        raise InputError("no noise is declared: the value of a measurement needs it in [noise]")
+    predicted = predict_channels(case, samples.free, samples.u, at)
+    y = np.stack([predicted[name].T for name in channels])
+    sensor = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
+    from_inputs = _input_noise(case, samples, at)
+    inputs = np.stack([from_inputs[name][0] for name in channels])
+    std = samples.noise_scale * np.hypot(sensor, inputs[..., None])
+    failure = np.isnan(y).any(axis=0) @ samples.weights
+    largest = np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
+    least = LEAST_RELATIVE_STD * largest + 1e-12
+    return PredictedReadings(at, channels, y, np.fmax(std, least), failure < MOST_FAILURE)
 
 
-def _input_noise(
-    case: Case, belief: ParameterSamples, at: Operating, channels: tuple[str, ...]
-) -> Floats:
-    """Standard deviation (c, m) that noise of slip and load adds."""
-    slip, load = np.asarray(at.slip), np.asarray(at.load)
-    stds = {
-        key: case.noise[key].std(value) if key in case.noise else np.zeros_like(value)
-        for key, value in (("slip", slip), ("load_N", load))
-    }
-    blank = [Channel(name, np.zeros_like(slip), np.ones_like(slip), True) for name in channels]
-    data = Observations(at, stds["slip"], stds["load_N"], tuple(blank), ())
-    middle = int(np.argmin((belief.shares**2).sum(axis=1)))
-    return input_noise(case, data, belief.free, belief.u[middle]).reshape(len(channels), -1)
+def _input_noise(case: Case, samples: ParameterSamples, at: Operating) -> dict[str, Floats]:
+    """Standard deviation (1, m) of each channel that noise of slip and load causes."""
+    slip_std, load_std = (
+        case.noise[key].std(value) if key in case.noise else np.zeros_like(value)
+        for key, value in (("slip", np.asarray(at.slip)), ("load_N", np.asarray(at.load)))
+    )
+    nearest = int(np.argmin((samples.standardised**2).sum(axis=1)))
+    return propagated_input_noise(case, samples.free, samples.u[nearest], at, slip_std, load_std)

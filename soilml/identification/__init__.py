@@ -1,7 +1,7 @@
-"""Analytic identification: soil parameters from a table of measurements, without training.
+"""Identification of soil parameters from measured rows, without training.
 
-Every method has one signature, `(case, measured, free) -> Fit`; a new method is one new file and
-one line here.
+Every method has the signature `(case, observations, free) -> Fit`; a new method is one new file and
+one line in `METHODS`.
 """
 
 from __future__ import annotations
@@ -32,42 +32,84 @@ METHODS: dict[str, Method] = {
     "newton": newton,
     "posterior": posterior,
 }
-#: Those that rest on the closed form of a rigid wheel's linear stresses.
+#: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
 
 
 def identify(
     case: Case, table: Table, free: Sequence[str] | None = None, method: str = "nonlinear"
 ) -> Fit:
-    """Soil parameters of a case from measured rows.
+    """Identify parameters of a case from measured rows.
 
-    `free` names parameters (`cohesion`, `kphi`, `slip-sinkage.n1`); without it, those that have a
-    prior are freed. Raises `InputError` for names that do not exist, `FitError` where the rows
-    cannot be fitted as asked.
+    Parameters
+    ----------
+    case
+        Model, soil, priors and noise, as `read_case` returns it.
+    table
+        Measured rows, as `read_table` returns them: `slip`, `load_N`, and one or more of
+        `torque_Nm`, `drawbar_pull_N` and `sinkage_m`; NaN where not measured.
+    free
+        Paths of the free parameters (`cohesion`, `kphi`, `slip-sinkage.n1`); by default those with
+        a prior.
+    method
+        A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
+
+    Returns
+    -------
+    Fit
+        Values, covariance and warnings.
+
+    Raises
+    ------
+    InputError
+        For a method or a parameter that does not exist, or a method that is not for this gear.
+    FitError
+        Where the rows do not determine a fit; the message states what is missing.
+    TableError
+        Where the table names another wheel than the case's.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from soilml import Case, Model, Operating, Table, Wheel, identify, soil
+    >>> from soilml.config.measurement_noise import Noise
+    >>> from soilml.numerics.prior import Prior
+    >>> case = Case(
+    ...     Model(Wheel(radius=0.15, width=0.12)),
+    ...     soil("wong1989/dry_sand"),
+    ...     prior={"friction_angle": Prior(0.4, 0.8)},
+    ...     noise={"torque_Nm": Noise(share=0.02)},
+    ... )
+    >>> slip, load = np.asarray([0.1, 0.3, 0.5]), np.full(3, 60.0)
+    >>> torque = case.model(case.soil, Operating(slip=slip, load=load)).torque
+    >>> rows = Table({"slip": slip, "load_N": load, "torque_Nm": torque})
+    >>> fit = identify(case, rows)
+    >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
+    0.487 +- 0.010 rad
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     if method in CLOSED_FORM and not isinstance(case.model.gear, RigidWheel):
         raise InputError(
-            f"the {method} method has its equations for rigid wheels alone, not for "
-            f"{case.model.gear.name}; take nonlinear"
+            f"the {method} method is for rigid wheels, not for a {case.model.gear.name}; take "
+            "nonlinear"
         )
     data = read_observations(case, table)
     fit = METHODS[method](case, data, select_free(case, free))
-    return replace(fit, warnings=(*fit.warnings, *_not_followed(fit, data, free), *data.notes))
+    return replace(fit, warnings=(*fit.warnings, *_method_limits(fit, data, free), *data.notes))
 
 
-def _not_followed(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:
-    """What was asked for and a method of fixed unknowns did not do."""
-    said = []
+def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:
+    """Parameters not requested, and noise that a closed form does not propagate."""
+    texts = []
     if free is not None and (others := [name for name in fit.names if name not in free]):
-        said.append(
-            f"{', '.join(others)} found too, though not asked for: the {fit.method} method finds "
-            f"{', '.join(fit.names)} together"
+        texts.append(
+            f"{', '.join(others)} identified too, although not requested: the {fit.method} method "
+            f"identifies {', '.join(fit.names)} together"
         )
     if fit.method in CLOSED_FORM and (np.any(data.slip_std) or np.any(data.load_std)):
-        said.append(f"the {fit.method} method does not carry noise of slip and load into std")
-    return said
+        texts.append(f"the {fit.method} method does not propagate noise of slip and load into std")
+    return texts
 
 
 __all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]

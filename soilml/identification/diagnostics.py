@@ -1,4 +1,4 @@
-"""What a user should know of a fit before believing it, in words."""
+"""Warnings about a fit: parameters that are not identified, trade-offs, excess residuals."""
 
 from __future__ import annotations
 
@@ -21,11 +21,21 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, col
 STRONG_CORRELATION = 0.95
 #: Words by which a warning of residuals beyond the declared noise is recognised.
 EXCESS_RESIDUALS = "times the declared noise"
+#: Distance from a bound of the prior, as a fraction of it, at which a value counts as at the bound.
+BOUND_TOLERANCE = 1e-3
+#: Relative range of loads below which they count as one: a scale's error, too little to separate
+#: cohesion from friction.
+ONE_LOAD = 0.02
 
 
 def at_prior_bound(u: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which fractions of priors stand at one of their ends."""
-    return np.asarray(np.minimum(u, 1.0 - u) < 1e-3)
+    """Whether fractions of priors (p,) are at one of the bounds."""
+    return np.asarray(np.minimum(u, 1.0 - u) < BOUND_TOLERANCE)
+
+
+def is_one_load(load: NDArray[np.float64]) -> bool:
+    """Whether all loads (n,) are the same within `ONE_LOAD`."""
+    return float(np.ptp(load)) <= ONE_LOAD * float(np.mean(load))
 
 
 def with_warnings(
@@ -35,49 +45,60 @@ def with_warnings(
     free: Sequence[FreeParameter],
     u: NDArray[np.float64],
     *,
-    surplus: bool,
+    excess_residuals: bool,
     undeclared: bool,
 ) -> Fit:
-    """The same fit with its warnings."""
-    one_load = float(np.ptp(data.load)) <= 0.02 * float(np.mean(data.load))
-    said = []
+    """The same fit with its warnings; `u` (p,) are its values as fractions of the priors."""
+    one_load = is_one_load(data.load)
+    texts = []
     for i, f in enumerate(free):
-        left = fit.left[f.path]
-        if one_load and f.path == "cohesion" and left > WEAKLY_IDENTIFIED_ABOVE:
-            said.append("one load only: cohesion is not identified")
-        elif left > NOT_IDENTIFIED_ABOVE:
-            said.append(f"{f.path} is not identified: the rows leave {left:.0%} of its prior")
-        elif left > WEAKLY_IDENTIFIED_ABOVE:
-            said.append(f"{f.path} is hardly identified: the rows leave {left:.0%} of its prior")
+        texts += _identifiability(f.path, fit.remaining_fraction[f.path], one_load)
         if at_prior_bound(u)[i]:
-            end = "lower" if u[i] < 0.5 else "upper"
-            said.append(f"{f.path} stands at the {end} end of its prior: the prior holds it there")
+            bound = "lower" if u[i] < 0.5 else "upper"
+            texts.append(
+                f"{f.path} is at the {bound} bound of its prior: the prior determines the estimate"
+            )
         if f.assumed:
             ends = f"{f.prior.lower:g} to {f.prior.upper:g} {unit_text(f.unit)}".rstrip()
-            said.append(f"{f.path} has no prior: {ends} is assumed")
-    if one_load and "cohesion" in fit.names and fit.left["cohesion"] <= WEAKLY_IDENTIFIED_ABOVE:
-        said.append("one load only: cohesion rests on the change with slip alone")
-    if data.cells < len(free):
-        count = "1 reading" if data.cells == 1 else f"{data.cells} readings"
-        said.append(f"{count} for {len(free)} parameters: the prior decides the rest")
-    said += _trade_offs(fit)
-    if surplus:
-        said.append(
-            f"residuals are {np.sqrt(fit.misfit):.1f} {EXCESS_RESIDUALS}: the model lacks something "
-            "or the noise is understated; std is widened by as much"
+            texts.append(f"{f.path} has no prior: {ends} is assumed")
+    fraction = fit.remaining_fraction.get("cohesion", 1.0)
+    if one_load and fraction <= WEAKLY_IDENTIFIED_ABOVE:
+        texts.append("one load only: cohesion is determined by the change with slip alone")
+    if data.reading_count < len(free):
+        count = "1 reading" if data.reading_count == 1 else f"{data.reading_count} readings"
+        texts.append(f"{count} for {len(free)} parameters: the prior determines the rest")
+    texts += _trade_offs(fit)
+    if excess_residuals:
+        texts.append(
+            f"residuals are {np.sqrt(fit.misfit):.1f} {EXCESS_RESIDUALS}: the model lacks an "
+            "effect or the noise is understated; std is multiplied by this factor"
         )
     if undeclared:
         names = ", ".join(column(c.name) for c in data.channels if not c.declared)
-        said.append(f"noise of {names} is not declared: estimated from the residuals")
-    said += [f"{name} is not used: its noise is not declared in [noise]" for name in data.left_out]
-    return replace(fit, warnings=(*fit.warnings, *said))
+        texts.append(f"noise of {names} is not declared: estimated from the residuals")
+    texts += [
+        f"{name} is not used: its noise is not declared in [noise]"
+        for name in data.excluded_channels
+    ]
+    return replace(fit, warnings=(*fit.warnings, *texts))
+
+
+def _identifiability(name: str, fraction: float, one_load: bool) -> list[str]:
+    """That a parameter is not or weakly identified, by the remaining fraction of its prior."""
+    if one_load and name == "cohesion" and fraction > WEAKLY_IDENTIFIED_ABOVE:
+        return ["one load only: cohesion is not identified"]
+    if fraction > NOT_IDENTIFIED_ABOVE:
+        return [f"{name} is not identified: {fraction:.0%} of the prior's width remains"]
+    if fraction > WEAKLY_IDENTIFIED_ABOVE:
+        return [f"{name} is weakly identified: {fraction:.0%} of the prior's width remains"]
+    return []
 
 
 def _trade_offs(fit: Fit) -> list[str]:
     correlation = fit.correlation
     return [
-        f"{a} and {b} trade off (correlation {correlation[i, j]:+.2f}): "
-        "the rows fix a combination of them better than either"
+        f"{a} and {b} trade off (correlation {correlation[i, j]:+.2f}): a combination of the two "
+        "is identified better than either"
         for i, a in enumerate(fit.names)
         for j, b in enumerate(fit.names)
         if i < j and abs(correlation[i, j]) > STRONG_CORRELATION

@@ -1,4 +1,4 @@
-"""The answer of an identification."""
+"""The result of an identification."""
 
 from __future__ import annotations
 
@@ -15,44 +15,66 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Fit:
-    """Values, their covariance, and what the user should know before believing them.
+    """Estimates of p parameters with their covariance and warnings.
 
-    `std` is the expected distance between value and truth, given the rows, the sensors' noise and
-    the prior. Where the rows leave a parameter open it is larger than the prior's own: the value of
-    least squares then stands anywhere in the prior, often at its end, and the truth elsewhere.
+    `std` is the expected distance between estimate and true value, given the rows, the noise of the
+    sensors and the prior. For a parameter that the rows do not determine it can exceed the prior's
+    standard deviation: an estimate of least squares may then lie anywhere in the prior.
+
+    Attributes
+    ----------
+    method
+        Name of the method, a key of `METHODS`.
+    names, units
+        Parameter paths and their SI units, p each.
+    values
+        Estimates (p,) in SI units.
+    covariance
+        Covariance (p, p) of the errors of `values`.
+    warnings
+        What limits the result; one sentence each.
+    rows_used
+        Number of rows.
+    remaining_fraction
+        By parameter, its standard deviation after the measurement over that of the prior: 1 where
+        the rows are uninformative. Empty for methods without a prior. `left_of_prior` in JSON.
+    misfit
+        Mean squared residual in standard deviations of the noise, per degree of freedom; NaN where
+        the noise is not declared.
+    channels
+        Columns that were fitted.
+    low, high
+        Ends (p,) of the 90 % interval where the method computes them, as the posterior does.
     """
 
     method: str
     names: tuple[str, ...]
     units: tuple[str, ...]
-    values: Floats  # (p,)
-    covariance: Floats  # (p, p)
+    values: Floats
+    covariance: Floats
     warnings: tuple[str, ...]
     rows_used: int
-    #: width that the rows leave of the prior, 1 where they tell nothing; empty without a prior
-    left: dict[str, float] = field(default_factory=dict)
-    #: mean squared residual in standard deviations of the noise, per degree of freedom
+    remaining_fraction: dict[str, float] = field(default_factory=dict)
     misfit: float = float("nan")
     channels: tuple[str, ...] = ()
-    #: ends of the 90 % interval, (p,), where the method knows them; else +- `Z_90` std holds it
     low: Floats | None = None
     high: Floats | None = None
 
     @property
     def interval(self) -> tuple[Floats, Floats]:
-        """Ends of the 90 % interval, (p,)."""
+        """Ends (p,) of the 90 % interval; Gaussian where the method does not compute them."""
         if self.low is None or self.high is None:
             return self.values - Z_90 * self.std, self.values + Z_90 * self.std
         return self.low, self.high
 
     @property
     def std(self) -> Floats:
-        """Standard deviations, (p,)."""
+        """Standard deviations (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Floats:
-        """Correlations, (p, p)."""
+        """Correlations (p, p)."""
         return np.asarray(self.covariance / np.outer(self.std, self.std))
 
     def __getitem__(self, name: str) -> float:
@@ -61,13 +83,13 @@ class Fit:
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
         rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
-        correlation = self.correlation
+        remaining, correlation = self.remaining_fraction, self.correlation
         return {
             "method": self.method,
             "parameters": {
                 name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
                 | {"unit": unit}
-                | ({"left_of_prior": self.left[name]} if name in self.left else {})
+                | ({"left_of_prior": remaining[name]} if name in remaining else {})
                 for name, v, s, low, high, unit in rows
             },
             "correlation": {

@@ -1,29 +1,49 @@
-"""Which parameters are to be found, and where they may lie."""
+"""Free parameters of an identification, and their priors."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
 
-#: Where the shear parameters of natural soils lie, for a user who gives no prior.
-_USUAL = {
+Floats = NDArray[np.float64]
+
+#: Ranges of natural soils, for parameters without a prior.
+_DEFAULT_PRIORS = {
     "cohesion": Prior(0.0, 10000.0),
     "friction_angle": Prior(0.17, 0.96),
     "shear_modulus": Prior(0.001, 0.1, log=True),
     "n": Prior(0.3, 1.8),
 }
-#: Bounds this many times the value are too wide to search; the search then reaches so far.
-DECADES, REACH = 100.0, 30.0
+#: An upper bound beyond this multiple of the value is too wide to search, two decades; the prior is
+#: then this factor to either side of the value, three decades in all.
+WIDE_BOUND, ASSUMED_FACTOR = 100.0, 30.0
 
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter to be found: its path, its unit, its prior, and the value the case gives it."""
+    """A free parameter of a case.
+
+    Attributes
+    ----------
+    path
+        As in `Case.parameters`: `cohesion`, `slip-sinkage.n1`.
+    unit
+        SI unit of its values.
+    prior
+        The case's prior, or the one that is assumed.
+    nominal
+        The value that the case gives it.
+    assumed
+        Whether the case has no prior for it.
+    """
 
     path: str
     unit: str
@@ -43,22 +63,30 @@ def select_free(case: Case, names: Sequence[str] | None) -> list[FreeParameter]:
     found = []
     for name in wanted:
         if name not in known:
-            raise InputError(f"--free {name!r} is no parameter; there are: {', '.join(known)}")
+            raise InputError(
+                f"--free {name!r}: no such parameter; this model has: {', '.join(known)}"
+            )
         parameter, nominal = known[name]
-        prior = case.prior.get(name) or _USUAL.get(name)
+        prior = case.prior.get(name) or _DEFAULT_PRIORS.get(name)
         if prior is None:
-            prior = _wide(parameter, float(nominal))
+            prior = _wide_prior(parameter, float(nominal))
         found.append(
             FreeParameter(name, parameter.unit, prior, float(nominal), name not in case.prior)
         )
     return found
 
 
-def _wide(parameter: Parameter, nominal: float) -> Prior:
-    """Where a parameter may lie of which nothing is said: its bounds, or within reach of its value.
+def values_at(free: Sequence[FreeParameter], u: Floats) -> tuple[Floats, Floats]:
+    """Values (p,) at fractions u (p,) of the priors, and their derivatives by u (p,)."""
+    each = [u[i : i + 1] for i in range(len(free))]
+    values = [float(f.prior.at(x)[0]) for f, x in zip(free, each, strict=True)]
+    rates = [float(f.prior.rate(x)[0]) for f, x in zip(free, each, strict=True)]
+    return np.asarray(values), np.asarray(rates)
 
-    Bounds that span decades say nothing; thirty times to either side of the value is then taken.
-    """
-    if nominal > 0.0 and parameter.upper > DECADES * nominal:
-        return Prior(max(nominal / REACH, parameter.lower), nominal * REACH, log=True)
+
+def _wide_prior(parameter: Parameter, nominal: float) -> Prior:
+    """The parameter's bounds; about its value where they span too many decades."""
+    if nominal > 0.0 and parameter.upper > WIDE_BOUND * nominal:
+        lower = max(nominal / ASSUMED_FACTOR, parameter.lower)
+        return Prior(lower, nominal * ASSUMED_FACTOR, log=True)
     return Prior(parameter.lower, parameter.upper)

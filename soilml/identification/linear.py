@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
+from soilml.identification.diagnostics import is_one_load
 from soilml.identification.fit_result import Fit
-from soilml.identification.fixed_parameter import with_fixed_parameters
+from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Channel, Observations
 from soilml.physics.effects.base import apply_stage
@@ -20,27 +22,92 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
 Floats = NDArray[np.float64]
-ROUNDS = 50
+#: Most iterations of the stress at the exit and of the weights.
+ITERATIONS = 50
+#: Condition number of the normal equations above which the rows do not determine both unknowns.
+MOST_CONDITION = 1e16
 
 
 def linear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
-    r"""Straight line through the stresses at the angle of maximum stress.
+    r"""Linear least squares on the stresses at the angle of maximum stress.
 
-    With the entry angle from sinkage and K given, load and torque give sigma_m and tau_m of the
+    With the entry angle from sinkage and K fixed, load and torque give sigma_m and tau_m of the
     linear-stress wheel, and
 
     .. math:: \tau_m / (1 - e^{-j_m / K}) = c + \sigma_m \tan\varphi
 
-    is linear in (c, tan phi); so is the stress tau_0 at the exit, which is kept. sigma_m depends
-    on c a little: it is updated until it stands. References: Iagnemma, Kang, Shibly and Dubowsky,
-    IEEE Trans. Robotics 20(5), 2004. Needs torque and sinkage in every row, driving slip, and two
-    rows at different loads or slips. Effects on soil and contact take part; the difference between
-    straight lines and the full stresses is not in its std.
+    is linear in (c, tan phi). The shear stress tau_0 at the exit, which the reference neglects, is
+    included; as it depends on c, the equations are solved by fixed-point iteration. Effects on soil
+    and contact take part; the difference between linear and exact stress distributions is not in
+    `std`.
+
+    Parameters
+    ----------
+    case
+        Model of a rigid wheel, soil and noise; the shear modulus of its soil is used as it is.
+    data
+        Two or more rows with torque, sinkage and driving slip, at different loads or slips.
+    free
+        The parameters asked for; others than c, phi and K are reported as not identified.
+
+    Raises
+    ------
+    FitError
+        Where torque or sinkage is missing, or the rows do not determine c and phi.
+
+    References
+    ----------
+    Iagnemma, Kang, Shibly and Dubowsky, IEEE Trans. Robotics 20(5), 2004.
     """
-    return with_fixed_parameters(case, "shear_modulus", lambda c: _solved(c, data, free))
+    return with_fixed_parameter(case, "shear_modulus", lambda c: _solve(c, data, free))
 
 
-def _solved(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+@dataclass(frozen=True)
+class _Rows:
+    """Rows (n,) with torque and sinkage under driving slip; noise is NaN where not declared."""
+
+    slip: Floats
+    load: Floats
+    torque: Floats
+    sinkage: Floats
+    torque_std: Floats
+    sinkage_std: Floats
+
+    @property
+    def noise_declared(self) -> bool:
+        return bool(np.isfinite(self.torque_std).all() and np.isfinite(self.sinkage_std).all())
+
+
+def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+    rows = _usable_rows(case, data)
+    declared, freedom = rows.noise_declared, len(rows.slip) - 2
+    if not declared and freedom == 0:
+        raise FitError("two rows leave no residual to estimate the noise: declare it in [noise]")
+    solution, matrix, right, weight = _iterate(case, rows)
+    residual = (right - matrix @ solution) * weight
+    misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
+    noise_variance = misfit if freedom > 0 and (not declared or misfit > 1.0) else 1.0
+    weighted = matrix * weight[:, None]
+    normal = weighted.T @ weighted
+    if np.linalg.cond(normal) > MOST_CONDITION:
+        raise FitError("all rows are equal: the linear method needs different loads or slips")
+    covariance = np.asarray(np.linalg.inv(normal) * noise_variance, dtype=np.float64)
+    angle = float(np.arctan(solution[1]))
+    rate = np.asarray([1.0, np.cos(angle) ** 2])  # of (c, phi) by (c, tan phi)
+    return Fit(
+        method="linear",
+        names=("cohesion", "friction_angle"),
+        units=("Pa", "rad"),
+        values=np.asarray([solution[0], angle]),
+        covariance=covariance * np.outer(rate, rate),
+        warnings=tuple(_limits(case, free, solution, rows.load)),
+        rows_used=len(rows.slip),
+        misfit=misfit if declared else float("nan"),
+        channels=("torque_Nm", "sinkage_m"),
+    )
+
+
+def _usable_rows(case: Case, data: Observations) -> _Rows:
     torque, sinkage = _channel(data, "torque"), _channel(data, "sinkage")
     usable = np.isfinite(torque.reading) & np.isfinite(sinkage.reading) & (data.slip >= 0)
     radius = float(getattr(case.model.gear, "radius"))  # noqa: B009 - gears of other kinds lack it
@@ -50,61 +117,51 @@ def _solved(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fi
             f"{int(usable.sum())} rows with driving slip, torque and sinkage: the linear method "
             "needs two at different loads or slips"
         )
-    T, z = torque.reading[usable], sinkage.reading[usable]
-    slip, load = data.slip[usable], data.load[usable]
-    noise_T, noise_z = torque.std[usable], sinkage.std[usable]
-    known = bool(np.isfinite(noise_T).all() and np.isfinite(noise_z).all())
+    return _Rows(
+        slip=data.slip[usable],
+        load=data.load[usable],
+        torque=torque.reading[usable],
+        sinkage=sinkage.reading[usable],
+        torque_std=torque.std[usable],
+        sinkage_std=sinkage.std[usable],
+    )
 
-    def rows(torques: Floats, depths: Floats, cohesion: float) -> tuple[Floats, Floats]:
-        return _line(case, slip, load, torques, depths, cohesion)
 
-    weight: Floats = np.ones_like(T)
+def _iterate(case: Case, rows: _Rows) -> tuple[Floats, Floats, Floats, Floats]:
+    """Solution (2,), matrix (n, 2), right-hand side (n,) and weights (n,) at the fixed point.
+
+    Weights are the inverse standard deviations of the residuals by propagation of the noise.
+    """
+
+    def system(torque: Floats, sinkage: Floats, cohesion: float) -> tuple[Floats, Floats]:
+        return _equations(case, rows.slip, rows.load, torque, sinkage, cohesion)
+
+    weight: Floats = np.ones_like(rows.torque)
     solution: Floats = np.zeros(2)
-    for _ in range(ROUNDS):
-        matrix, right = rows(T, z, solution[0])
+    for _ in range(ITERATIONS):
+        matrix, right = system(rows.torque, rows.sinkage, solution[0])
         before = solution
         solution = np.asarray(
             np.linalg.lstsq(matrix * weight[:, None], right * weight, rcond=None)[0],
             dtype=np.float64,
         )
-        if known:
-            strayed = [
-                rows(T + noise_T, z, solution[0]),
-                rows(T, z + noise_z, solution[0]),
+        if rows.noise_declared:
+            residual = right - matrix @ solution
+            moved = [
+                system(rows.torque + rows.torque_std, rows.sinkage, solution[0]),
+                system(rows.torque, rows.sinkage + rows.sinkage_std, solution[0]),
             ]
-            off = [(b - m @ solution) - (right - matrix @ solution) for m, b in strayed]
-            weight = 1.0 / np.sqrt(off[0] ** 2 + off[1] ** 2)
+            change = [(b - m @ solution) - residual for m, b in moved]
+            weight = 1.0 / np.sqrt(change[0] ** 2 + change[1] ** 2)
         if np.allclose(solution, before, rtol=1e-10, atol=1e-10):
             break
-    residual = (right - matrix @ solution) * weight
-    freedom = len(T) - 2
-    misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
-    if not known and freedom == 0:
-        raise FitError("two rows leave no residual to tell the noise: declare it in [noise]")
-    scale = misfit if freedom > 0 and (not known or misfit > 1.0) else 1.0
-    normal = (matrix * weight[:, None]).T @ (matrix * weight[:, None])
-    if np.linalg.cond(normal) > 1e16:
-        raise FitError("all rows are alike: the linear method needs different loads or slips")
-    covariance = np.asarray(np.linalg.inv(normal) * scale, dtype=np.float64)
-    angle = float(np.arctan(solution[1]))
-    rate = np.asarray([1.0, np.cos(angle) ** 2])
-    return Fit(
-        method="linear",
-        names=("cohesion", "friction_angle"),
-        units=("Pa", "rad"),
-        values=np.asarray([solution[0], angle]),
-        covariance=covariance * np.outer(rate, rate),
-        warnings=tuple(_said(case, free, solution, load)),
-        rows_used=len(T),
-        misfit=misfit if known else float("nan"),
-        channels=("torque_Nm", "sinkage_m"),
-    )
+    return solution, matrix, right, weight
 
 
-def _line(
+def _equations(
     case: Case, slip: Floats, load: Floats, T: Floats, z: Floats, cohesion: float
 ) -> tuple[Floats, Floats]:
-    """Rows of the system matrix (n, 2) @ (c, tan phi) = right-hand side (n,), all in Pa."""
+    """Matrix (n, 2) and right-hand side (n,), Pa, of equations linear in (c, tan phi)."""
     gear = LinearWheel(radius=case.model.gear.radius, width=case.model.gear.width)
     effects = case.model.effects
     scene = apply_input_effects(LoadCase(gear, case.soil, Operating(slip=slip, load=load), effects))
@@ -125,19 +182,22 @@ def _channel(data: Observations, name: str) -> Channel:
     for channel in data.channels:
         if channel.name == name:
             return channel
-    raise FitError(f"the linear method needs {name} in every row, with its noise declared or none")
+    raise FitError(
+        f"the linear method needs {name}; declare the noise of torque and sinkage, or of no channel"
+    )
 
 
-def _said(case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats) -> list[str]:
-    said = [
+def _limits(case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats) -> list[str]:
+    """What the closed form leaves out, and values outside what soil can have."""
+    texts = [
         f"{f.path} is not identified by the linear method"
         for f in free
         if f.path not in ("cohesion", "friction_angle", "shear_modulus")
     ]
     if any(effect.overrides("on_stress") for effect in case.model.effects):
-        said.append("the linear method leaves out effects on the stress")
+        texts.append("the linear method neglects effects on the stress")
     if solution[0] < 0 or solution[1] < 0:
-        said.append("the straight line gives a negative value: outside what soil can be")
-    if np.ptp(load) <= 0.02 * np.mean(load):
-        said.append("one load only: cohesion is not identified")
-    return said
+        texts.append("the linear method gives a negative value, which no soil has")
+    if is_one_load(load):
+        texts.append("one load only: cohesion is not identified")
+    return texts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,209 +12,273 @@ from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.observations import Observations
 from soilml.identification.predictions import (
-    input_noise,
-    linearised,
+    linearise,
     noise_at_prediction,
-    predicted,
-    readings,
-    stack_readings,
+    predict_channels,
+    propagated_input_noise,
+    stack_channels,
+    stacked_readings,
 )
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Points of the prior looked at, and how many of the best are then descended from.
-LOOKS = 64
+#: Sobol points of the prior that are evaluated, and how many of the best are descended from.
+SOBOL_POINTS = 64
 STARTS = 4
-#: Two descents that end this close, as shares of the priors, found the same optimum.
-SAME = 1e-4
-#: Squared residuals, summed, that as many parameters as readings should never leave.
-UNEXPLAINED = 9.0
+#: Two descents that end this close, as fractions of the priors, found the same optimum.
+SAME_OPTIMUM = 1e-4
+#: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
+#: likelihood.
+EQUAL_COST = 0.02
+#: Rounds in which undeclared noise is estimated from residuals and the fit repeated.
+NOISE_ROUNDS = 3
+#: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
+INITIAL_NOISE = 0.05
+#: Sum of squared residuals that is significant where no degree of freedom is left: 3 sigma.
+SIGNIFICANT_COST = 9.0
 #: Precision of a uniform distribution over the unit interval: 1 / its variance.
-UNIFORM = 12.0
+UNIFORM_PRECISION = 12.0
 #: Residual, in standard deviations, of a row that has no equilibrium at a trial.
-NO_ANSWER = 1e3
+NO_EQUILIBRIUM = 1e3
 
 
 @dataclass(frozen=True)
 class _Optimum:
     u: Floats  # (p,) fractions of the priors
-    residual: Floats  # (cells,) in standard deviations
-    slope: Floats  # (cells, p)
+    residual: Floats  # (k,) in standard deviations
+    jacobian: Floats  # (k, p)
 
     @property
     def cost(self) -> float:
         return float(self.residual @ self.residual)
 
 
+@dataclass(frozen=True)
+class _Problem:
+    case: Case
+    data: Observations
+    free: Sequence[FreeParameter]
+    reading: Floats  # (k,)
+    std: Floats  # (k,)
+
+    def predict(self, u: Floats) -> Floats:
+        """Predictions (sets, k) at u (sets, p)."""
+        return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
+
+    def whitened(self, prediction: Floats) -> Floats:
+        """Residuals in standard deviations."""
+        return np.nan_to_num((prediction - self.reading) / self.std, nan=NO_EQUILIBRIUM)
+
+    def linearised(self, u: Floats) -> tuple[Floats, Floats]:
+        """Whitened residuals (k,) and Jacobian (k, p)."""
+        prediction, jacobian = linearise(self.case, self.data, self.free, u)
+        return self.whitened(prediction), np.nan_to_num(jacobian / self.std[:, None])
+
+    def with_noise_at(self, optimum: _Optimum) -> _Problem:
+        """The same problem, noise taken at the optimum's predictions or from its residuals."""
+        case, data, free = self.case, self.data, self.free
+        declared = noise_at_prediction(case, data, self.predict(optimum.u[None, :]))[0]
+        from_inputs = propagated_input_noise(
+            case, free, optimum.u, data.at, data.slip_std, data.load_std
+        )
+        total = np.hypot(declared, stack_channels(data, from_inputs)[0])
+        estimated = _residual_noise(data, self.reading, optimum.residual * self.std, len(free))
+        return replace(self, std=np.where(np.isfinite(total), total, estimated))
+
+
 def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
-    r"""Weighted, bounded least squares from several starts.
+    r"""Weighted least squares within the bounds of the priors, from several starts.
 
     .. math:: \min_\theta \sum_i \left(\frac{y_i - f(s_i, W_i; \theta)}{\sigma_i}\right)^2
 
-    over the priors' ranges, with noise of slip and load carried into sigma (effective variance).
-    Noise that is a share is taken of the prediction: of the reading it would draw the fit low, by
-    about twice its square, since readings that err low would count for more.
-    The covariance is that of the linearised problem together with the prior, and the distance
-    from the optimum to where the prior would draw it is added: a parameter that the rows do not
-    determine keeps an honest width. Where the optimum stands at an end of a prior, values as good
-    lie along a valley that bends away from it: covariance and distance are then also taken where
-    the prior, as a Gaussian of its width, draws the optimum itself, and the wider std holds.
-    References: Bard, Nonlinear Parameter Estimation, 1974; Orear, Am. J. Phys. 50(10), 1982
-    (effective variance).
+    Noise of slip and load is propagated into sigma (effective variance). Relative noise is taken
+    relative to the prediction: relative to the reading it would bias the fit low, by about twice
+    its square, since readings with negative errors would have the larger weights.
+
+    The covariance is that of the linearised problem with a Gaussian prior of the uniform one's
+    variance, enlarged by the squared distance between the optimum and the posterior mean: `std`
+    stays realistic for a parameter that the rows do not determine. Where the optimum lies at a
+    bound, equally good values lie along a valley that bends away from it. Covariance and distance
+    are then also computed at the optimum with the Gaussian prior included, and the larger std is
+    used.
+
+    Parameters
+    ----------
+    case
+        Model, soil, priors and noise.
+    data
+        Rows with k readings.
+    free
+        The p free parameters.
+
+    Returns
+    -------
+    Fit
+        With the remaining fraction of each prior.
+
+    Raises
+    ------
+    FitError
+        Where noise is undeclared and there are no more readings than parameters, or where the model
+        has no equilibrium at the measured loads for any parameters in the prior.
+
+    References
+    ----------
+    Bard, Nonlinear Parameter Estimation, 1974. Orear, Am. J. Phys. 50(10), 1982 (effective
+    variance).
     """
-    undeclared = [c for c in data.channels if not c.declared]
-    if undeclared and data.cells <= len(free):
+    undeclared = any(not c.declared for c in data.channels)
+    if undeclared and data.reading_count <= len(free):
         raise FitError(
-            f"{data.cells} readings cannot give {len(free)} parameters and their own noise; "
-            "declare it in [noise]"
+            f"{data.reading_count} readings cannot determine {len(free)} parameters and their own "
+            "noise; declare it in [noise]"
         )
-    reading, declared = readings(data)
-    std = np.where(np.isfinite(declared), declared, _first_guess(data))
-    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    best = _best(case, data, free, reading, std, nominal)
-    for _ in range(3 if undeclared else 1):
-        declared = noise_at_prediction(case, data, free, best.u)
-        total = np.hypot(declared, input_noise(case, data, free, best.u))
-        std = np.where(np.isfinite(total), total, _estimated(data, reading, best, std, len(free)))
-        best = _descended(case, data, free, reading, std, best.u)
-    centre = best
-    if np.any(at_prior_bound(best.u)):
-        centre = _descended(case, data, free, reading, std, best.u, UNIFORM)
-    return _finished(case, data, free, best, centre, undeclared=bool(undeclared))
+    reading, declared = stacked_readings(data)
+    std = np.where(np.isfinite(declared), declared, _initial_noise(data))
+    problem = _Problem(case, data, free, reading, std)
+    optimum = _global_optimum(problem)
+    for _ in range(NOISE_ROUNDS if undeclared else 1):
+        problem = problem.with_noise_at(optimum)
+        optimum = _descend(problem, optimum.u)
+    with_prior = optimum
+    if np.any(at_prior_bound(optimum.u)):
+        with_prior = _descend(problem, optimum.u, UNIFORM_PRECISION)
+    return _fit(problem, optimum, with_prior, undeclared=undeclared)
 
 
-def _finished(
-    case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
-    best: _Optimum,
-    centre: _Optimum,
-    *,
-    undeclared: bool,
-) -> Fit:
-    p, cells = len(free), len(best.residual)
-    freedom = cells - p
-    misfit = best.cost / freedom if freedom > 0 else float("nan")
-    # residuals beyond the declared noise are noise too, whatever causes them
-    expected = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else UNEXPLAINED / cells
-    per_reading = misfit if freedom > 0 else best.cost / cells
-    surplus = not undeclared and per_reading > expected
-    scale = per_reading if surplus else 1.0
-    inverse = np.linalg.inv(best.slope.T @ best.slope / scale + UNIFORM * np.eye(p))
-    pulled = inverse @ (UNIFORM * (0.5 - best.u))
-    spread = np.sqrt(np.diag(inverse))
-    bent = np.linalg.inv(centre.slope.T @ centre.slope / scale + UNIFORM * np.eye(p))
-    beside = np.hypot(np.sqrt(np.diag(bent)), centre.u - best.u)
-    wide = np.maximum(np.hypot(spread, pulled), beside)
-    total = inverse * np.outer(wide / spread, wide / spread)
-    rate = np.asarray([float(f.prior.rate(best.u[i : i + 1])[0]) for i, f in enumerate(free)])
+def _fit(problem: _Problem, optimum: _Optimum, with_prior: _Optimum, *, undeclared: bool) -> Fit:
+    """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
+    data, free = problem.data, problem.free
+    p, k = len(free), len(optimum.residual)
+    freedom = k - p
+    misfit = optimum.cost / freedom if freedom > 0 else float("nan")
+    per_reading = misfit if freedom > 0 else optimum.cost / k
+    # mean plus two standard deviations of chi-squared over its degrees of freedom
+    limit = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else SIGNIFICANT_COST / k
+    excess = bool(not undeclared and per_reading > limit)
+    covariance, linear_std = _covariance(optimum, with_prior, per_reading if excess else 1.0)
+    values, rate = values_at(free, optimum.u)
     fit = Fit(
         method="nonlinear",
         names=tuple(f.path for f in free),
         units=tuple(f.unit for f in free),
-        values=np.asarray([float(f.prior.at(best.u[i : i + 1])[0]) for i, f in enumerate(free)]),
-        covariance=total * np.outer(rate, rate),
+        values=values,
+        covariance=covariance * np.outer(rate, rate),
         warnings=(),
         rows_used=len(data.slip),
-        left={f.path: float(np.sqrt(UNIFORM) * spread[i]) for i, f in enumerate(free)},
-        misfit=per_reading if surplus else misfit,
+        remaining_fraction={
+            f.path: float(np.sqrt(UNIFORM_PRECISION) * linear_std[i]) for i, f in enumerate(free)
+        },
+        misfit=per_reading if excess else misfit,
         channels=tuple(column(c.name) for c in data.channels),
     )
     return with_warnings(
-        fit, case, data, free, best.u, surplus=bool(surplus), undeclared=undeclared
+        fit,
+        problem.case,
+        data,
+        free,
+        optimum.u,
+        excess_residuals=excess,
+        undeclared=undeclared,
     )
 
 
-def _best(
-    case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
-    reading: Floats,
-    std: Floats,
-    nominal: Floats,
-) -> _Optimum:
+def _covariance(
+    optimum: _Optimum, with_prior: _Optimum, noise_variance: float
+) -> tuple[Floats, Floats]:
+    """Covariance (p, p) of the error of `optimum.u`, and the std (p,) of the linearised problem."""
+    linearised = _posterior_covariance(optimum, noise_variance)
+    std = np.sqrt(np.diag(linearised))
+    to_posterior_mean = linearised @ (UNIFORM_PRECISION * (0.5 - optimum.u))
+    along_valley = np.sqrt(np.diag(_posterior_covariance(with_prior, noise_variance)))
+    total = np.maximum(
+        np.hypot(std, to_posterior_mean), np.hypot(along_valley, with_prior.u - optimum.u)
+    )
+    return linearised * np.outer(total / std, total / std), std
+
+
+def _posterior_covariance(at: _Optimum, noise_variance: float) -> Floats:
+    """Inverse of the Gauss-Newton Hessian with a Gaussian prior of the uniform one's variance."""
+    information = at.jacobian.T @ at.jacobian / noise_variance
+    return np.asarray(np.linalg.inv(information + UNIFORM_PRECISION * np.eye(len(at.u))))
+
+
+def _global_optimum(problem: _Problem) -> _Optimum:
     """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
     try:
         from scipy.stats import qmc
     except ImportError:
         raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
-    looks = np.vstack([nominal, qmc.Sobol(len(free), scramble=True, rng=7).random(LOOKS)])
-    y = stack_readings(data, predicted(case, free, looks, data.at))
-    if np.isnan(y).any(axis=1).all():
+    free = problem.free
+    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
+    sobol = qmc.Sobol(len(free), scramble=True, rng=7).random(SOBOL_POINTS)
+    starts = np.vstack([nominal, sobol])
+    prediction = problem.predict(starts)
+    if np.isnan(prediction).any(axis=1).all():
         raise FitError(
-            "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
+            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
         )
-    residual = np.nan_to_num((y - reading) / std, nan=NO_ANSWER)
-    order = np.argsort((residual**2).sum(axis=1), kind="stable")
+    order = np.argsort((problem.whitened(prediction) ** 2).sum(axis=1), kind="stable")
     found: list[_Optimum] = []
-    for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):
-        found.append(_descended(case, data, free, reading, std, looks[i]))
-        if len(found) == 2 and np.abs(found[0].u - found[1].u).max() < SAME:
-            break  # two starts, one optimum
-    lowest = min(f.cost for f in found)
-    level = [f for f in found if f.cost <= lowest + 0.02]
-    return min(level, key=lambda f: float(np.sum((f.u - 0.5) ** 2)))
+    for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):  # the nominal point too
+        found.append(_descend(problem, starts[i]))
+        if len(found) == 2 and np.abs(found[0].u - found[1].u).max() < SAME_OPTIMUM:
+            break
+    lowest = min(optimum.cost for optimum in found)
+    equal = [optimum for optimum in found if optimum.cost <= lowest + EQUAL_COST]
+    return min(equal, key=lambda optimum: float(np.sum((optimum.u - 0.5) ** 2)))
 
 
-def _descended(
-    case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
-    reading: Floats,
-    std: Floats,
-    start: Floats,
-    draw: float = 0.0,
-) -> _Optimum:
-    """The optimum below a start; with the precision `draw` of a prior that draws to its middle."""
+def _descend(problem: _Problem, start: Floats, prior_precision: float = 0.0) -> _Optimum:
+    """The local optimum from a start, with a Gaussian prior of this precision about the middle."""
     from scipy.optimize import least_squares
 
-    last: dict[bytes, tuple[Floats, Floats]] = {}
+    latest: dict[bytes, tuple[Floats, Floats]] = {}  # scipy asks for residual and Jacobian apart
 
-    def around(u: Floats) -> tuple[Floats, Floats]:
+    def linearised(u: Floats) -> tuple[Floats, Floats]:
         key = u.tobytes()
-        if key not in last:
-            last.clear()
-            y, slope = linearised(case, data, free, u)
-            residual = np.nan_to_num((y - reading) / std, nan=NO_ANSWER)
-            last[key] = residual, np.nan_to_num(slope / std[:, None])
-        return last[key]
+        if key not in latest:
+            latest.clear()
+            latest[key] = problem.linearised(u)
+        return latest[key]
 
-    pull = np.sqrt(draw)
+    prior_root = np.sqrt(prior_precision)
     found = least_squares(
-        lambda u: np.append(around(u)[0], pull * (u - 0.5)),
+        lambda u: np.append(linearised(u)[0], prior_root * (u - 0.5)),
         np.clip(start, 1e-6, 1.0 - 1e-6),
-        jac=lambda u: np.vstack([around(u)[1], pull * np.eye(len(u))]),
+        jac=lambda u: np.vstack([linearised(u)[1], prior_root * np.eye(len(u))]),
         bounds=(0.0, 1.0),
         ftol=1e-10,
         xtol=1e-9,
         gtol=1e-10,
     )
-    residual, slope = around(found.x)
-    return _Optimum(u=found.x, residual=residual, slope=slope)
+    residual, jacobian = linearised(found.x)
+    return _Optimum(u=found.x, residual=residual, jacobian=jacobian)
 
 
-def _first_guess(data: Observations) -> Floats:
-    """A twentieth of each channel's size, (cells,), until residuals tell its noise."""
+def _initial_noise(data: Observations) -> Floats:
+    """A fraction of each channel's RMS reading, (k,)."""
     parts = []
     for channel in data.channels:
-        kept = channel.reading[np.isfinite(channel.reading)]
-        parts.append(np.full(kept.size, 0.05 * float(np.sqrt(np.mean(kept**2))) + 1e-12))
+        reading = channel.reading[np.isfinite(channel.reading)]
+        rms = float(np.sqrt(np.mean(reading**2)))
+        parts.append(np.full(reading.size, INITIAL_NOISE * rms + 1e-12))
     return np.concatenate(parts)
 
 
-def _estimated(data: Observations, reading: Floats, best: _Optimum, std: Floats, p: int) -> Floats:
-    """Noise of each channel from its residuals, (cells,)."""
-    off, start = best.residual * std, 0
-    parts = []
+def _residual_noise(data: Observations, reading: Floats, residual: Floats, p: int) -> Floats:
+    """Noise of each channel (k,) from its residuals, p parameters shared among all readings."""
+    start, parts = 0, []
     for channel in data.channels:
         size = int(np.isfinite(channel.reading).sum())
-        own = off[start : start + size]
+        own = residual[start : start + size]
         freedom = max(size - p * size / reading.size, 1.0)
-        floor = 1e-6 * float(np.sqrt(np.mean(reading[start : start + size] ** 2))) + 1e-15
-        parts.append(np.full(size, max(float(np.sqrt(own @ own / freedom)), floor)))
+        rms = float(np.sqrt(np.mean(reading[start : start + size] ** 2)))
+        std = max(float(np.sqrt(own @ own / freedom)), 1e-6 * rms + 1e-15)
+        parts.append(np.full(size, std))
         start += size
     return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""Measured rows as identification takes them: operating points, channels, and their noise."""
+"""Measured rows for identification: operating points, channels and their noise."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from soilml.quantities import CHANNELS, QUANTITIES, column
 
 Floats = NDArray[np.float64]
 
-#: Share of a channel's largest reading below which a standard deviation is not believed.
-LEAST_STD = 1e-6
+#: Standard deviation, as a fraction of a channel's largest reading, up to which it counts as zero:
+#: below any sensor's resolution, and near the rounding errors of a prediction.
+LEAST_RELATIVE_STD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,27 @@ class Channel:
 
 @dataclass(frozen=True)
 class Observations:
-    """Rows (n,): how they were driven, the noise of that, and what is to be explained."""
+    """Rows (n,): operating points with their noise, and the readings of the channels.
+
+    Attributes
+    ----------
+    at
+        Operating points, arrays (n,).
+    slip_std, load_std
+        Standard deviations (n,) of slip and of load (N); 0 where not declared.
+    channels
+        Channels that are fitted.
+    excluded_channels
+        Columns that are not fitted, since their noise is not declared and that of others is.
+    notes
+        Warnings about the table.
+    """
 
     at: Operating
     slip_std: Floats
     load_std: Floats
     channels: tuple[Channel, ...]
-    left_out: tuple[str, ...]
+    excluded_channels: tuple[str, ...]
     notes: tuple[str, ...] = ()
 
     @property
@@ -53,17 +68,24 @@ class Observations:
         return np.asarray(self.at.load)
 
     @property
-    def cells(self) -> int:
-        """How many readings there are."""
+    def reading_count(self) -> int:
+        """Number of readings k of all channels."""
         return sum(int(np.isfinite(c.reading).sum()) for c in self.channels)
 
 
 def read_observations(case: Case, table: Table) -> Observations:
-    """What a table holds for a case; raises `TableError` for a wheel that is not the case's.
+    """Observations of a case in a table.
 
-    Noise comes from `<column>_std`, else from [noise]. A channel for which neither speaks is left
-    out if another is declared; if none is, all are used and their noise is estimated. Rows that
-    have no answer by their status are left out. Raises `FitError` where nothing is left.
+    Noise comes from `<column>_std`, else from the case's [noise]. A channel with neither is
+    excluded if another channel has one; if none has, all are used and their noise is to be
+    estimated. Rows whose status is not ok are excluded.
+
+    Raises
+    ------
+    TableError
+        Where the table names another wheel than the case's.
+    FitError
+        Where no row or no reading remains, or all standard deviations of a channel are zero.
     """
     dropped = int(np.count_nonzero(~table.answered))
     if dropped == len(table):
@@ -72,41 +94,41 @@ def read_observations(case: Case, table: Table) -> Observations:
     check_wheel_size(case, table)
     notes = _notes(case, table)
     if dropped:
-        notes.append(f"{dropped} rows are left out: their status is not ok")
+        notes.append(f"{dropped} rows are excluded: their status is not ok")
     found = []
     for name in CHANNELS:
         key = column(name)
         if key in table and np.isfinite(table[key]).any():
-            std, note = _believed(table, key, _declared(case, table, key))
+            std, note = _without_zeros(table, key, _declared(case, table, key))
             declared = bool(np.isfinite(std[np.isfinite(table[key])]).all())
             found.append(Channel(name, table[key], std, declared))
             notes += note
     if not found:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
     used = [c for c in found if c.declared] or found
-    left_out = [column(c.name) for c in found if c not in used]
+    excluded = [column(c.name) for c in found if c not in used]
     return Observations(
         at=operating_points(table),
         slip_std=np.nan_to_num(_declared(case, table, "slip")),
         load_std=np.nan_to_num(_declared(case, table, "load_N")),
         channels=tuple(used),
-        left_out=tuple(left_out),
+        excluded_channels=tuple(excluded),
         notes=tuple(notes),
     )
 
 
 def _notes(case: Case, table: Table) -> list[str]:
-    """What a user may have overlooked in the table."""
-    said = []
+    """Several runs, and grousers that the model lacks."""
+    notes = []
     runs = len(np.unique(table["run"])) if "run" in table else 1
     if runs > 1:
-        said.append(f"{runs} runs are taken for one soil")
+        notes.append(f"{runs} runs are fitted as one soil")
     lugs = QUANTITIES["grouser_height"].column
     if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
         height = float(np.nanmax(table[lugs]))
         if not any(effect.name == "grousers" for effect in case.model.effects):
-            said.append(f"{lugs} is {height:g}, but the model has no effect grousers")
-    return said
+            notes.append(f"{lugs} is {height:g}, but the model has no effect grousers")
+    return notes
 
 
 def _declared(case: Case, table: Table, key: str) -> Floats:
@@ -120,23 +142,30 @@ def _declared(case: Case, table: Table, key: str) -> Floats:
     return np.asarray(std)
 
 
-def _believed(table: Table, key: str, std: Floats) -> tuple[Floats, list[str]]:
-    """Standard deviations that may be divided by, and what was said to replace some.
+def _without_zeros(table: Table, key: str, std: Floats) -> tuple[Floats, list[str]]:
+    """Standard deviations with zeros replaced by the median of the others, and a note of that.
 
-    A share of a reading of zero is zero, and one row would decide everything: the median of the
-    column's others is taken there. Raises `FitError` where there are no others.
+    A relative noise is zero at a reading of zero, where the row would have infinite weight. Raises
+    `FitError` where all are zero.
     """
     measured = np.isfinite(table[key])
-    least = LEAST_STD * float(np.abs(table[key][measured]).max())
-    tiny = measured & (std <= least)
-    if not tiny.any():
+    least = LEAST_RELATIVE_STD * float(np.abs(table[key][measured]).max())
+    zero = measured & (std <= least)
+    if not zero.any():
         return std, []
-    row = int(np.argmax(tiny))
-    given = f"{table.place(row)}, column {key}: a standard deviation of {std[row]:.3g}"
+    row = int(np.argmax(zero))
+    where = f"{table.place(row)}, column {key}"
     others = std[measured & (std > least)]
     if others.size == 0:
-        raise FitError(f"{given}, and no row has a larger one; give one such as '2 % + 0.05'")
+        raise FitError(
+            f"{where}: standard deviation {std[row]:.3g}, and no row has a larger one; declare one "
+            "such as '2 % + 0.05'"
+        )
     median = float(np.median(others))
-    more = int(tiny.sum()) - 1
-    said = f"{given} is not believed{f', nor {more} more' if more else ''}: "
-    return np.where(tiny, median, std), [f"{said}{median:.3g}, the median of the others, is taken"]
+    more = int(zero.sum()) - 1
+    note = (
+        f"{where}: standard deviation {std[row]:.3g} replaced by the column's median {median:.3g}"
+    )
+    if more:
+        note += f"; {more} more rows likewise"
+    return np.where(zero, median, std), [note]

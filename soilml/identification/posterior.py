@@ -1,8 +1,9 @@
-"""The posterior of the full model: what rows, noise and prior together allow to be known."""
+"""The exact posterior of the full model, by importance sampling."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,13 @@ from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
-from soilml.identification.predictions import input_noise, predicted, readings, stack_readings
+from soilml.identification.predictions import (
+    noise_at_prediction,
+    predict_channels,
+    propagated_input_noise,
+    stack_channels,
+    stacked_readings,
+)
 from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
@@ -23,144 +30,214 @@ from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Fractions of the posterior below the ends of the interval that is reported.
+#: Fractions of the posterior below the ends of the 90 % interval.
 INTERVAL = np.asarray([0.05, 0.95])
-#: Effective samples below which neither mean nor spread of the samples mean anything.
-FEWEST = 50.0
-#: Standard deviations that a Gaussian exceeds once in a thousand times.
-RARE = 3.09
+#: Effective sample size below which mean and spread of the samples are not reported: their errors
+#: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
+LEAST_USABLE_SIZE = 50.0
+#: Normal quantile of 0.999.
+Z_999 = 3.09
 #: Most model evaluations in one call, which bounds memory.
-CELLS = 200_000
+MOST_EVALUATIONS = 200_000
+
+
+@dataclass(frozen=True)
+class PosteriorSamples:
+    """Weighted samples of the posterior, as fractions of the priors, and the best one's misfit."""
+
+    sample: ImportanceSample
+    #: squared residuals over declared variances, per degree of freedom, at the best sample
+    misfit: float
+    #: factor on the declared noise: above 1 where the residuals exceed it significantly
+    noise_scale: float
+
+    @property
+    def noise_inflated(self) -> bool:
+        """Whether the residuals exceed the declared noise."""
+        return self.noise_scale > 1.0
 
 
 def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
-    r"""Mean, covariance and 90 % interval of the exact posterior, by importance sampling.
+    r"""Mean, covariance and 90 % interval of the exact posterior.
 
     .. math::
         p(\theta | y) \propto p(\theta) \prod_i \frac{1}{\sigma_i(\theta)}
         \exp\left[-\frac{(y_i - f(s_i, W_i; \theta))^2}{2 \sigma_i(\theta)^2}\right]
 
-    Its mean is the estimate with the least expected squared error that any method can have on data
-    that come from this model, prior and noise: the Bayes limit. Noise that is a share is a share
-    of the prediction, and noise of slip and load adds to it as in the nonlinear method, at the
-    best sample. Needs all noise declared. A parameter that the rows do not determine comes out as
-    its prior. References: Tarantola, Inverse Problem Theory, 2005, section 1.5; Cornuet et al.
-    2012 for the sampling. Residuals beyond the declared noise are taken for noise too, as in the
-    nonlinear method: the posterior is drawn again with all noise larger by as much (of sets
-    that the model does hold for, one in a thousand is). That is no cure where it lacks an effect.
+    Its mean has the least expected squared error of all estimators on data from this model, prior
+    and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
+    added in quadrature, linearised at the best of the first samples. A parameter that the rows do
+    not determine has its prior as posterior.
+
+    Where the residuals exceed the declared noise significantly (one data set in a thousand does by
+    chance), all noise is multiplied by the root of the misfit and the posterior is sampled again.
+    This does not correct the bias of a model that lacks an effect.
+
+    Parameters
+    ----------
+    case
+        Model, soil, priors and noise.
+    data
+        Rows; the noise of every channel must be declared.
+    free
+        The p free parameters.
+
+    Returns
+    -------
+    Fit
+        With the ends of the 90 % interval in `low` and `high`.
+
+    Raises
+    ------
+    FitError
+        Where noise is not declared, where the model has no equilibrium at the measured loads for
+        any parameters in the prior, or where the effective sample size is below 50.
+
+    References
+    ----------
+    Tarantola, Inverse Problem Theory, 2005, section 1.5. Cornuet et al., Scandinavian J. Statistics
+    39(4), 2012, for the sampling.
     """
-    found, misfit, surplus = settled_samples(case, data, free)
-    values = np.stack([f.prior.at(found.u[:, i]) for i, f in enumerate(free)], axis=1)
-    mean = found.mean(values)
-    off = values - mean
-    low, high = found.quantiles(values, INTERVAL)
-    middle = np.asarray([f.prior.fraction(float(m)) for f, m in zip(free, mean, strict=True)])
-    covariance = (off.T * found.weights) @ off
+    found = posterior_samples(case, data, free)
+    sample = found.sample
+    values = np.stack([f.prior.at(sample.u[:, i]) for i, f in enumerate(free)], axis=1)
+    mean = sample.mean(values)
+    deviation = values - mean
+    covariance = (deviation.T * sample.weights) @ deviation
+    low, high = sample.quantiles(values, INTERVAL)
+    mean_u = np.asarray([f.prior.fraction(float(m)) for f, m in zip(free, mean, strict=True)])
     fit = Fit(
         method="posterior",
         names=tuple(f.path for f in free),
         units=tuple(f.unit for f in free),
         values=mean,
         covariance=covariance,
-        warnings=_unsettled(found),
+        warnings=_sampling_warnings(sample),
         rows_used=len(data.slip),
-        left={f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)},
-        misfit=misfit,
+        remaining_fraction={
+            f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)
+        },
+        misfit=found.misfit,
         channels=tuple(column(c.name) for c in data.channels),
         low=low,
         high=high,
     )
-    return with_warnings(fit, case, data, free, middle, surplus=surplus, undeclared=False)
-
-
-def settled_samples(
-    case: Case, data: Observations, free: Sequence[FreeParameter]
-) -> tuple[ImportanceSample, float, bool]:
-    """Weighted samples of the posterior, misfit, and whether noise had to be taken for larger."""
-    found, misfit, cells = sampled(case, data, free)
-    surplus = misfit > most_misfit(cells - len(free))
-    if surplus:
-        found, _, _ = sampled(case, data, free, larger=float(np.sqrt(misfit)))
-    return found, misfit, surplus
-
-
-def sampled(
-    case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
-    seed: int = 0,
-    larger: float = 1.0,
-) -> tuple[ImportanceSample, float, int]:
-    """Weighted fractions of the priors, misfit of the best of them, and how many readings.
-
-    `larger` multiplies all noise.
-    """
-    if any(not c.declared for c in data.channels):
-        names = ", ".join(column(c.name) for c in data.channels if not c.declared)
-        raise FitError(f"the posterior method needs the noise of {names}: declare it in [noise]")
-    reading, declared = readings(data)
-    best: dict[str, Floats] = {}
-
-    def log_density(u: Floats) -> Floats:
-        step = max(CELLS // len(data.slip), 1)
-        parts = [_log(u[i : i + step]) for i in range(0, len(u), step)]
-        return np.concatenate(parts) if parts else np.zeros(0)
-
-    def _log(u: Floats) -> Floats:
-        y = stack_readings(data, predicted(case, free, u, data.at))
-        std = _noise(case, data, y, declared)
-        if not best:
-            first = np.nan_to_num(((y - reading) / std) ** 2, nan=np.inf).sum(axis=1)
-            best["extra"] = input_noise(case, data, free, u[int(np.argmin(first))])
-        std = larger * np.hypot(std, best["extra"])
-        logs = -0.5 * (((y - reading) / std) ** 2).sum(axis=1) - np.log(std).sum(axis=1)
-        return np.where(np.isfinite(logs), logs, -np.inf)
-
-    found = importance_sample(log_density, len(free), seed)
-    if not np.isfinite(found.evidence):
-        raise FitError(
-            "the model carries these loads nowhere in the prior: check load_N, kphi, n and [gear]"
-        )
-    if found.effective < FEWEST:
-        raise FitError(
-            f"the samples are worth {found.effective:.0f} only, too few for a mean and a spread: "
-            "the rows allow too narrow a part of the prior; try the nonlinear method, or narrow "
-            "[soil.prior]"
-        )
-    top = found.u[[int(np.argmax(found.weights))]]
-    y = stack_readings(data, predicted(case, free, top, data.at))
-    std = np.hypot(_noise(case, data, y, declared), best["extra"])
-    cost = float((((y - reading) / std) ** 2).sum())
-    return found, cost / max(reading.size - len(free), 1), reading.size
-
-
-def _noise(case: Case, data: Observations, y: Floats, declared: Floats) -> Floats:
-    """Standard deviations (sets, cells): those of [noise] at the predictions, others as given."""
-    std, start = np.broadcast_to(declared, y.shape).copy(), 0
-    for c in data.channels:
-        kept = np.isfinite(c.reading)
-        cells = slice(start, start + int(kept.sum()))
-        start = cells.stop
-        noise = case.noise.get(column(c.name))
-        if noise is not None:
-            own = declared[cells] == noise.std(c.reading[kept])
-            expected = noise.std(y[:, cells])
-            std[:, cells] = np.where(own & (expected > 0), expected, std[:, cells])
-    return std
-
-
-def _unsettled(found: ImportanceSample) -> tuple[str, ...]:
-    if found.effective >= 0.5 * LEAST_EFFECTIVE_SIZE:
-        return ()
-    return (
-        f"the samples are worth {found.effective:.0f} only: the values may stray by "
-        f"{100 / np.sqrt(found.effective):.0f} % of their std",
+    return with_warnings(
+        fit, case, data, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
     )
 
 
-def most_misfit(freedom: int) -> float:
-    """Misfit that one set in a thousand exceeds by noise alone (Wilson and Hilferty 1931)."""
+def posterior_samples(
+    case: Case, data: Observations, free: Sequence[FreeParameter]
+) -> PosteriorSamples:
+    """Weighted samples of the posterior, with noise inflated where the residuals require it.
+
+    Raises `FitError` as `posterior` does.
+    """
+    sample, misfit = sample_posterior(case, data, free)
+    if misfit <= misfit_limit(data.reading_count - len(free)):
+        return PosteriorSamples(sample, misfit, 1.0)
+    noise_scale = float(np.sqrt(misfit))
+    sample, _ = sample_posterior(case, data, free, noise_scale)
+    return PosteriorSamples(sample, misfit, noise_scale)
+
+
+def sample_posterior(
+    case: Case, data: Observations, free: Sequence[FreeParameter], noise_scale: float = 1.0
+) -> tuple[ImportanceSample, float]:
+    """Weighted fractions of the priors with all noise multiplied by `noise_scale`, and the misfit.
+
+    The misfit is the sum of squared residuals over declared variances, per degree of freedom, at
+    the sample of largest weight. Raises `FitError` as `posterior` does.
+    """
+    density = _LogDensity(case, data, free, noise_scale)
+    sample = importance_sample(density, len(free))
+    if not np.isfinite(sample.evidence):
+        raise FitError(
+            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
+        )
+    if sample.effective_size < LEAST_USABLE_SIZE:
+        raise FitError(
+            f"the effective sample size is {sample.effective_size:.0f}, too small for a mean and a "
+            f"spread ({LEAST_USABLE_SIZE:.0f} needed): the posterior is too narrow a part of the "
+            "prior; use --method nonlinear, or narrow [soil.prior]"
+        )
+    cost = density.squared_residuals(sample.u[[int(np.argmax(sample.weights))]])
+    return sample, cost / max(data.reading_count - len(free), 1)
+
+
+class _LogDensity:
+    """Log posterior density (sets,), up to a constant, of fractions of the priors (sets, p)."""
+
+    def __init__(
+        self,
+        case: Case,
+        data: Observations,
+        free: Sequence[FreeParameter],
+        noise_scale: float = 1.0,
+    ) -> None:
+        undeclared = [column(c.name) for c in data.channels if not c.declared]
+        if undeclared:
+            raise FitError(
+                f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
+                "[noise]"
+            )
+        self.case, self.data, self.free, self.noise_scale = case, data, free, noise_scale
+        self.reading = stacked_readings(data)[0]
+        #: noise that slip and load cause, (k,); linearised at the best of the first samples
+        self.input_std: Floats | None = None
+
+    def __call__(self, u: Floats) -> Floats:
+        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
+        blocks = [self._of_block(u[i : i + size]) for i in range(0, len(u), size)]
+        return np.concatenate(blocks) if blocks else np.zeros(0)
+
+    def squared_residuals(self, u: Floats) -> float:
+        """Sum of squared residuals in declared standard deviations, of one parameter set (1, p)."""
+        y, std = self._predict(u)
+        return float((((y - self.reading) / std) ** 2).sum())
+
+    def _of_block(self, u: Floats) -> Floats:
+        y, std = self._predict(u)
+        std = self.noise_scale * std
+        logs = -0.5 * (((y - self.reading) / std) ** 2).sum(axis=1) - np.log(std).sum(axis=1)
+        return np.where(np.isfinite(logs), logs, -np.inf)
+
+    def _predict(self, u: Floats) -> tuple[Floats, Floats]:
+        """Predictions and standard deviations of the readings under each set, (sets, k)."""
+        channels = predict_channels(self.case, self.free, u, self.data.at)
+        y = stack_channels(self.data, channels)
+        std = noise_at_prediction(self.case, self.data, y)
+        if self.input_std is None:
+            squares = np.nan_to_num(((y - self.reading) / std) ** 2, nan=np.inf).sum(axis=1)
+            self.input_std = self._propagated(u[int(np.argmin(squares))])
+        return y, np.hypot(std, self.input_std)
+
+    def _propagated(self, u: Floats) -> Floats:
+        data = self.data
+        noise = propagated_input_noise(
+            self.case, self.free, u, data.at, data.slip_std, data.load_std
+        )
+        return stack_channels(data, noise)[0]
+
+
+def _sampling_warnings(sample: ImportanceSample) -> tuple[str, ...]:
+    size = sample.effective_size
+    if size >= 0.5 * LEAST_EFFECTIVE_SIZE:
+        return ()
+    return (
+        f"the effective sample size is {size:.0f} only: sampling error of the values is about "
+        f"{100 / np.sqrt(size):.0f} % of their std",
+    )
+
+
+def misfit_limit(freedom: int) -> float:
+    """Misfit per degree of freedom that noise alone exceeds with a probability of 0.001.
+
+    The 0.999 quantile of chi-squared over its degrees of freedom, by the approximation of Wilson
+    and Hilferty, Proc. National Academy of Sciences 17, 1931; infinite without a degree of freedom.
+    """
     if freedom < 1:
         return np.inf
-    step = 2.0 / (9.0 * freedom)
-    return float((1.0 - step + RARE * np.sqrt(step)) ** 3)
+    variance = 2.0 / (9.0 * freedom)
+    return float((1.0 - variance + Z_999 * np.sqrt(variance)) ** 3)

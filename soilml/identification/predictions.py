@@ -12,15 +12,16 @@ from soilml.config.case import Case
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
 from soilml.physics.operating_point import Operating
-from soilml.quantities import column
+from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 
-#: Step of central differences, as a share of the prior.
+#: Step of central differences, as a fraction of the prior: rounding errors of the equilibrium
+#: (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
 STEP = 1e-4
 
 
-def predicted(
+def predict_channels(
     case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
 ) -> dict[str, Floats]:
     """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
@@ -35,65 +36,93 @@ def predicted(
     }
 
 
-def stack_readings(data: Observations, channels: dict[str, Floats]) -> Floats:
-    """The predictions (sets, cells) in the order of the readings that there are."""
+def stack_channels(data: Observations, channels: dict[str, Floats]) -> Floats:
+    """Channels (sets, rows) where they were measured, one after another: (sets, k)."""
     parts = [channels[c.name][:, np.isfinite(c.reading)] for c in data.channels]
     return np.concatenate(parts, axis=1)
 
 
-def readings(data: Observations) -> tuple[Floats, Floats]:
-    """All readings that there are and their declared standard deviations, (cells,)."""
+def stacked_readings(data: Observations) -> tuple[Floats, Floats]:
+    """All k readings, one channel after another, and their declared standard deviations, (k,)."""
     kept = [np.isfinite(c.reading) for c in data.channels]
     reading = [c.reading[k] for c, k in zip(data.channels, kept, strict=True)]
     std = [c.std[k] for c, k in zip(data.channels, kept, strict=True)]
     return np.concatenate(reading), np.concatenate(std)
 
 
-def noise_at_prediction(
-    case: Case, data: Observations, free: Sequence[FreeParameter], u: Floats
-) -> Floats:
-    """Declared standard deviations (cells,), those of [noise] taken at the predictions at `u`.
+def noise_at_prediction(case: Case, data: Observations, prediction: Floats) -> Floats:
+    """Standard deviations (sets, k) of the readings, those of [noise] taken at the predictions.
 
-    Those that the table gives stay, and so do those of readings for which nothing is predicted.
+    `prediction` has the shape (sets, k). Standard deviations that the table gives stay as they are,
+    and so do those of readings without a prediction or with a predicted deviation of zero.
     """
-    y = predicted(case, free, u[None, :], data.at)
-    parts = []
-    for c in data.channels:
-        kept, noise = np.isfinite(c.reading), case.noise.get(column(c.name))
-        std = c.std[kept]
-        if noise is not None:
-            expected = noise.std(y[c.name][0, kept])
-            std = np.where((std == noise.std(c.reading[kept])) & (expected > 0), expected, std)
-        parts.append(std)
-    return np.concatenate(parts)
+    declared = stacked_readings(data)[1]
+    std, stop = np.broadcast_to(declared, prediction.shape).copy(), 0
+    for channel in data.channels:
+        measured = np.isfinite(channel.reading)
+        start, stop = stop, stop + int(measured.sum())
+        noise = case.noise.get(column(channel.name))
+        if noise is None:
+            continue
+        own = declared[start:stop]
+        from_case = own == noise.std(channel.reading[measured])
+        expected = noise.std(prediction[:, start:stop])
+        std[:, start:stop] = np.where(from_case & (expected > 0), expected, own)
+    return std
 
 
-def linearised(
+def linearise(
     case: Case, data: Observations, free: Sequence[FreeParameter], u: Floats
 ) -> tuple[Floats, Floats]:
-    """Predictions (cells,) at `u` (p,) and their derivatives (cells, p), in one model call."""
+    """Predictions (k,) at `u` (p,) and their Jacobian (k, p), by central differences.
+
+    All parameter sets go through the model in one call. At a bound the difference is one-sided.
+    """
     p = len(u)
     up, down = np.minimum(u + STEP, 1.0), np.maximum(u - STEP, 0.0)
     sets = np.tile(u, (2 * p + 1, 1))
     sets[np.arange(p), np.arange(p)] = up
     sets[p + np.arange(p), np.arange(p)] = down
-    y = stack_readings(data, predicted(case, free, sets, data.at))
+    y = stack_channels(data, predict_channels(case, free, sets, data.at))
     return y[-1], np.asarray(((y[:p] - y[p:-1]) / (up - down)[:, None]).T)
 
 
-def input_noise(case: Case, data: Observations, free: Sequence[FreeParameter], u: Floats) -> Floats:
-    """Standard deviation (cells,) that noise of slip and load adds to the predictions at `u`."""
-    total = np.zeros(data.cells)
-    for name, std in (("slip", data.slip_std), ("load", data.load_std)):
+def propagated_input_noise(
+    case: Case,
+    free: Sequence[FreeParameter],
+    u: Floats,
+    at: Operating,
+    slip_std: Floats,
+    load_std: Floats,
+) -> dict[str, Floats]:
+    """Standard deviation (1, rows) of each channel that noise of slip and load causes.
+
+    First-order propagation at the parameters `u` (p,): the change over one standard deviation,
+    centred. Zero where a prediction is missing.
+    """
+    slip, load = np.asarray(at.slip), np.asarray(at.load)
+    total = {name: np.zeros((1, slip.size)) for name in CHANNELS}
+    for name, std in (("slip", slip_std), ("load", load_std)):
         if not np.any(std > 0.0):
             continue
-        points = {"slip": data.slip, "load": data.load}
-        y = []
-        for sign in (-1.0, 1.0):
-            moved = points | {name: points[name] + sign * 0.5 * std}
-            moved["slip"] = np.clip(moved["slip"], -0.999, 0.999)
-            moved["load"] = np.clip(moved["load"], 1e-3 * data.load, 2.0 * data.load)
-            at = replace(data.at, slip=moved["slip"], load=moved["load"])
-            y.append(stack_readings(data, predicted(case, free, u[None, :], at))[0])
-        total = np.hypot(total, np.nan_to_num(y[1] - y[0]))
-    return np.asarray(total)
+        below, above = (
+            _with_input_error(at, name, sign * 0.5 * std, slip, load) for sign in (-1.0, 1.0)
+        )
+        low = predict_channels(case, free, u[None, :], below)
+        high = predict_channels(case, free, u[None, :], above)
+        for channel, own in total.items():
+            total[channel] = np.hypot(own, np.nan_to_num(high[channel] - low[channel]))
+    return total
+
+
+def _with_input_error(
+    at: Operating, name: str, error: Floats, slip: Floats, load: Floats
+) -> Operating:
+    """Operating points with an error in slip or load, kept where the model is defined."""
+    values = {"slip": slip, "load": load}
+    values[name] = values[name] + error
+    return replace(
+        at,
+        slip=np.clip(values["slip"], -0.999, 0.999),
+        load=np.clip(values["load"], 1e-3 * load, 2.0 * load),
+    )

@@ -1,4 +1,4 @@
-"""A file for wheels of any size, made to answer for the wheel and soil of a case."""
+"""A model file for wheels of any size, conditioned on the wheel and soil of a case."""
 
 from __future__ import annotations
 
@@ -13,16 +13,21 @@ from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, column
 
-#: What the file takes for given of the place of the maximum stress.
-PLACE = {"a0": 0.4, "a1": 0.15}
+#: Fixed coefficients of the angle of maximum stress in such a file.
+FIXED_ANGLE = {"a0": 0.4, "a1": 0.15}
 
 
 def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list[str]]:
-    """The estimator for a case, and what of the case it cannot follow, in words.
+    """The estimator for a case, and warnings about what it cannot represent of the case.
 
-    Wheel and bearing values are the case's; the prior's upper ends are those of cohesion and shear
-    modulus; a prior of kphi becomes the standard deviation of the bearing curve; declared noise
-    replaces the file's own. Raises `InputError` where gear, effects or ranges are not the file's.
+    Wheel and bearing parameters are the case's, and so are the upper bounds of the priors of
+    cohesion and shear modulus. A prior of kphi becomes the standard deviation of the bearing curve,
+    and declared noise replaces the file's own.
+
+    Raises
+    ------
+    InputError
+        Where gear, effects or ranges are not those of the file.
     """
     gear, soil, prior = case.model.gear, case.soil, case.prior
     if not isinstance(gear, Wheel):
@@ -30,50 +35,50 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
     if case.model.effects:
         names = ", ".join(effect.name for effect in case.model.effects)
         raise InputError(
-            f"{estimator.path} knows no effects, the model has {names}; train a file of its own "
-            "with [set_posterior], or take soilml identify --method posterior"
+            f"{estimator.path} has no effects, the model has {names}; train a file for this model "
+            "with [set_posterior], or use soilml identify --method posterior"
         )
-    for name, value in PLACE.items():
+    for name, value in FIXED_ANGLE.items():
         if abs(float(getattr(soil, name)) - value) > 1e-9:
             raise InputError(
-                f"{estimator.path} takes {name} for {value:g}, the model has "
-                f"{float(getattr(soil, name)):g}; train a file of its own with [set_posterior]"
+                f"{estimator.path} is for {name} = {value:g}, the model has "
+                f"{float(getattr(soil, name)):g}; train a file for this model with [set_posterior]"
             )
-    said, given = [], {}
+    warnings, upper_bounds = [], {}
     for name in ("cohesion", "shear_modulus"):
-        ends = prior.get(name)
-        if ends is None:
+        own = prior.get(name)
+        if own is None:
             raise InputError(f"{name} has no prior; give its range in [soil.prior]")
-        given[f"{name}_max"] = ends.upper
+        upper_bounds[f"{name}_max"] = own.upper
     bearing = float(soil.kc) / float(gear.width) + float(soil.kphi)
-    near = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
+    bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
     widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
-    if near > widest:
-        said.append(
-            f"kphi may stray by a factor of {math.exp(near):.2g}, the file follows "
-            f"{math.exp(widest):.2g}: intervals may be too narrow"
+    if bearing_std > widest:
+        warnings.append(
+            f"the prior of kphi has a standard deviation of a factor {math.exp(bearing_std):.2g}, "
+            f"the file allows {math.exp(widest):.2g}: intervals may be too narrow"
         )
     noise = {
         name: (case.noise[column(name)].constant, case.noise[column(name)].share)
         for name in CHANNELS
         if column(name) in case.noise
     }
-    found = estimator.on(
+    conditioned = estimator.on(
         noise=noise,
         wheel_radius=float(gear.radius),
         wheel_width=float(gear.width),
         bearing_modulus=bearing,
         n=float(soil.n),
-        bearing_std=min(near, widest),
-        **given,
+        bearing_std=min(bearing_std, widest),
+        **upper_bounds,
     )
-    return found, said + _not_followed(found, case)
+    return conditioned, warnings + _prior_differences(conditioned, case)
 
 
 def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
-    """A file for many wheels on the case's; any other as it is.
+    """A file for many wheels conditioned on the case, without torque bias; any other as it is.
 
-    For sets that the case made: the sensor of the torque has no bias.
+    For readings that were simulated with the case, whose torque sensor has no bias.
     """
     if estimator.sets is None or not estimator.sets.missing_context:
         return estimator
@@ -87,9 +92,9 @@ def _log_std(prior: Prior, bearing: float) -> float:
     return prior.std / max(bearing, 1e-12)
 
 
-def _not_followed(estimator: Estimator, case: Case) -> list[str]:
-    """Priors that are not those of the file, in words."""
-    said = []
+def _prior_differences(estimator: Estimator, case: Case) -> list[str]:
+    """Priors that differ from those of the file."""
+    texts = []
     for i, name in enumerate(estimator.names):
         own, ends = case.prior.get(name), (estimator.prior.lower[i], estimator.prior.upper[i])
         width = ends[1] - ends[0]
@@ -99,11 +104,11 @@ def _not_followed(estimator: Estimator, case: Case) -> list[str]:
             or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > (0.02 * width)
         ):
             unit = declared(Soil)[name].unit
-            said.append(
-                f"{name}: the file takes {ends[0]:.4g} to {ends[1]:.4g} {unit} for equally likely, "
-                "whatever the model says"
+            texts.append(
+                f"{name}: the file's prior is uniform from {ends[0]:.4g} to {ends[1]:.4g} {unit}; "
+                "that of the model is ignored"
             )
     others = [path for path in case.prior if path not in (*estimator.names, "kphi")]
     if others:
-        said.append(f"{', '.join(others)}: taken for known, whatever their prior says")
-    return said
+        texts.append(f"{', '.join(others)}: fixed at the model's values; their priors are ignored")
+    return texts

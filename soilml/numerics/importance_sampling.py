@@ -1,4 +1,4 @@
-"""Weighted samples of a density in the unit cube, by importance sampling that learns."""
+"""Adaptive multiple importance sampling of a density in the unit cube."""
 
 from __future__ import annotations
 
@@ -13,15 +13,28 @@ from soilml.numerics.resampling import effective_size, latin_hypercube, weighted
 
 Floats = NDArray[np.float64]
 
-#: Samples of the first round, spread over the cube, and of each round after it.
-FIRST, ROUND = 2048, 2048
+#: Samples of the first round, stratified over the cube, and of each round after it.
+FIRST_ROUND, LATER_ROUND = 2048, 2048
+#: Most adaptive rounds.
 MOST_ROUNDS = 24
-#: Effective samples that are enough: means then stray by 2 % of the standard deviation.
+#: Effective sample size at which sampling ends: sampling error of a mean is then 1 / sqrt(2500),
+#: 2 % of the standard deviation.
 LEAST_EFFECTIVE_SIZE = 2500.0
-#: Effective samples that a mixture is fitted to; fewer, and the density is tempered for it.
-FITTED = 150.0
-#: Components of the mixture, their degrees of freedom, and the share that stays uniform.
+#: Effective sample size that a mixture is fitted to; below it the density is tempered.
+FITTED_SIZE = 150.0
+#: Bisections of the tempering exponent.
+BISECTIONS = 30
+#: Components of the mixture, degrees of freedom of their t distributions (four: tails heavy enough
+#: to cover a density that the fit has missed), and the uniform fraction of every proposal.
 COMPONENTS, FREEDOM, UNIFORM = 6, 4.0, 0.1
+#: Iterations of expectation maximisation.
+EM_STEPS = 12
+#: Fraction of the pooled covariance in that of each component, which keeps it regular.
+SHRINKAGE = 0.05
+#: Relative weight below which a sample, and mixing weight below which a component, is left out.
+LEAST_WEIGHT, LEAST_MIXING_WEIGHT = 1e-12, 1e-6
+#: Smallest divisor.
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -30,11 +43,11 @@ class ImportanceSample:
 
     u: Floats
     weights: Floats
-    #: log of the mean of the density over the cube
+    #: logarithm of the mean of the density over the cube
     evidence: float
 
     @property
-    def effective(self) -> float:
+    def effective_size(self) -> float:
         """Effective sample size."""
         return effective_size(self.weights)
 
@@ -50,133 +63,159 @@ class ImportanceSample:
 def importance_sample(
     log_density: Callable[[Floats], Floats], p: int, seed: int = 0
 ) -> ImportanceSample:
-    r"""Samples of a density over the unit cube, known up to a factor; -inf where it is nil.
+    r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
-    The first round is spread over the cube. Each round after it is drawn from a mixture of t
-    distributions fitted to all samples so far, a tenth of it uniform, and every sample is weighed
+    The first round is a Latin hypercube. Each later round is drawn from a mixture of t
+    distributions fitted to all samples so far, a tenth of it uniform, and every sample is weighted
     by the mean of all rounds' proposals:
 
     .. math:: w_i \propto \pi(u_i) / \sum_k n_k q_k(u_i)
 
-    While few samples carry the weight, the mixture is fitted to a power of the density that more
-    of them share. Exact in the limit of many rounds whatever the density, for every proposal
-    covers the cube. References: Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4),
-    2012 (adaptive multiple importance sampling).
+    While few samples carry the weight, the mixture is fitted to a tempered density, the largest
+    power of it that enough samples share. Consistent for any density, as every proposal covers the
+    cube.
+
+    Parameters
+    ----------
+    log_density
+        Logarithm (n,) of the density at points (n, p); -inf where it vanishes.
+    p
+        Dimension.
+    seed
+        Of the random numbers.
+
+    References
+    ----------
+    Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4), 2012 (adaptive multiple
+    importance sampling).
     """
     rng = np.random.default_rng(seed)
-    u = latin_hypercube(FIRST, p, rng)
+    u = latin_hypercube(FIRST_ROUND, p, rng)
     logs = log_density(u)
     mixtures: list[_Mixture] = []
-    drawn = np.full(len(u), float(FIRST))  # sum over rounds of n_k q_k at each sample
-    found = _weighed(u, logs, drawn)
+    # proposals: sum over rounds of n_k q_k at each sample
+    proposals = np.full(len(u), float(FIRST_ROUND))
+    sample = _weighted(u, logs, proposals)
     for _ in range(MOST_ROUNDS):
-        if found.effective >= LEAST_EFFECTIVE_SIZE or not np.isfinite(logs).any():
+        if sample.effective_size >= LEAST_EFFECTIVE_SIZE or not np.isfinite(logs).any():
             break
-        mixture = _fitted(u, _tempered(logs, drawn), rng)
-        new = mixture.draw(ROUND, rng)
-        inside = np.all((new > 0.0) & (new < 1.0), axis=1)
-        fresh = new[inside]
-        old = float(FIRST) + sum((ROUND * m.density(fresh) for m in mixtures), np.zeros(len(fresh)))
-        drawn = np.append(drawn + ROUND * mixture.density(u), old + ROUND * mixture.density(fresh))
-        u = np.vstack([u, fresh])
-        logs = np.append(logs, log_density(fresh))
+        mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
+        trial = mixture.draw(LATER_ROUND, rng)
+        new = trial[np.all((trial > 0.0) & (trial < 1.0), axis=1)]
+        earlier = sum((LATER_ROUND * m.density(new) for m in mixtures), np.zeros(len(new)))
+        at_new = float(FIRST_ROUND) + earlier + LATER_ROUND * mixture.density(new)
+        proposals = np.append(proposals + LATER_ROUND * mixture.density(u), at_new)
+        u = np.vstack([u, new])
+        logs = np.append(logs, log_density(new))
         mixtures.append(mixture)
-        found = _weighed(u, logs, drawn)
-    return found
+        sample = _weighted(u, logs, proposals)
+    return sample
 
 
-def _weighed(u: Floats, logs: Floats, drawn: Floats) -> ImportanceSample:
+def _weighted(u: Floats, logs: Floats, proposals: Floats) -> ImportanceSample:
+    """Samples with normalised weights; equal ones where the density vanishes at all of them."""
     top = float(np.max(logs, initial=-math.inf))
     if not math.isfinite(top):
         return ImportanceSample(u, np.full(len(u), 1.0 / len(u)), -math.inf)
-    weights = np.exp(logs - top) / drawn
+    weights = np.exp(logs - top) / proposals
     return ImportanceSample(u, weights / weights.sum(), top + math.log(float(weights.sum())))
 
 
-def _tempered(logs: Floats, drawn: Floats) -> Floats:
-    """Weights of the highest power of the density that enough samples share."""
-    live = np.isfinite(logs)
-    kept = np.where(live, logs - np.max(logs), 0.0)
+def _tempered_weights(logs: Floats, proposals: Floats) -> Floats:
+    """Weights of the highest power of the density with an effective size of `FITTED_SIZE`."""
+    positive = np.isfinite(logs)
+    relative = np.where(positive, logs - np.max(logs), 0.0)
 
     def weights(power: float) -> Floats:
-        found = live * np.exp(power * kept) / drawn
-        return np.asarray(found / found.sum())
+        products = positive * np.exp(power * relative) / proposals
+        return np.asarray(products / products.sum())
 
-    if 1.0 / np.sum(weights(1.0) ** 2) >= FITTED:
+    if effective_size(weights(1.0)) >= FITTED_SIZE:
         return weights(1.0)
     low, high = 0.0, 1.0
-    for _ in range(30):
+    for _ in range(BISECTIONS):
         power = 0.5 * (low + high)
-        enough = 1.0 / np.sum(weights(power) ** 2) >= FITTED
+        enough = effective_size(weights(power)) >= FITTED_SIZE
         low, high = (power, high) if enough else (low, power)
     return weights(low)
 
 
 @dataclass(frozen=True)
 class _Mixture:
-    """t distributions with centres (k, p), lower factors of their scales (k, p, p), shares (k,)."""
+    """t distributions: centres (k, p), Cholesky factors (k, p, p) and mixing weights (k,)."""
 
     centres: Floats
     factors: Floats
-    shares: Floats
+    mixing: Floats
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
+        """Points (count, p), a fraction `UNIFORM` of them uniform; some lie outside the cube."""
         p = self.centres.shape[1]
-        which = rng.choice(len(self.shares), count, p=self.shares)
-        normal = np.einsum("nij,nj->ni", self.factors[which], rng.standard_normal((count, p)))
+        component = rng.choice(len(self.mixing), count, p=self.mixing)
+        normal = np.einsum("nij,nj->ni", self.factors[component], rng.standard_normal((count, p)))
         stretch = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, count))
-        found = self.centres[which] + normal * stretch[:, None]
+        from_t = self.centres[component] + normal * stretch[:, None]
         uniform = rng.random(count) < UNIFORM
-        return np.where(uniform[:, None], rng.random((count, p)), found)
+        return np.where(uniform[:, None], rng.random((count, p)), from_t)
 
     def density(self, u: Floats) -> Floats:
-        """Density (n,) at points of the cube, uniform share included."""
+        """Density (n,) at points of the cube, uniform fraction included."""
         p = self.centres.shape[1]
         constant = math.lgamma(0.5 * (FREEDOM + p)) - math.lgamma(0.5 * FREEDOM)
         constant -= 0.5 * p * math.log(FREEDOM * math.pi)
         total = np.full(len(u), UNIFORM)
-        for centre, factor, share in zip(self.centres, self.factors, self.shares, strict=True):
-            off = np.linalg.solve(factor, (u - centre).T)
+        for centre, factor, share in zip(self.centres, self.factors, self.mixing, strict=True):
+            white = np.linalg.solve(factor, (u - centre).T)
             log = constant - np.log(np.diag(factor)).sum()
-            log = log - 0.5 * (FREEDOM + p) * np.log1p((off**2).sum(axis=0) / FREEDOM)
+            log = log - 0.5 * (FREEDOM + p) * np.log1p((white**2).sum(axis=0) / FREEDOM)
             total += (1.0 - UNIFORM) * share * np.exp(log)
         return total
 
 
-def _fitted(u: Floats, weights: Floats, rng: np.random.Generator) -> _Mixture:
-    """A mixture for weighted samples, by expectation and maximisation from scattered centres."""
-    kept = weights > 1e-12 * weights.max()
+def _fit_mixture(u: Floats, weights: Floats, rng: np.random.Generator) -> _Mixture:
+    """A mixture fitted to weighted samples by expectation maximisation, from random centres.
+
+    Scales begin as the pooled covariance over k^(2/p), the volume that one of k components fills.
+    """
+    kept = weights > LEAST_WEIGHT * weights.max()
     u, weights = u[kept], weights[kept] / weights[kept].sum()
     n, p = u.shape
     k = min(COMPONENTS, n)
     mean = weights @ u
-    spread = ((u - mean).T * weights) @ (u - mean) + 1e-10 * np.eye(p)
+    pooled = ((u - mean).T * weights) @ (u - mean) + 1e-10 * np.eye(p)
     centres = u[rng.choice(n, k, replace=False, p=None if k == n else weights)] if k < n else u
-    scales = np.tile(spread / k ** (2.0 / p), (k, 1, 1))
-    shares = np.full(k, 1.0 / k)
-    for _ in range(12):
-        member = np.stack(
-            [
-                share * _bell(u, centre, scale)
-                for centre, scale, share in zip(centres, scales, shares, strict=True)
-            ]
-        )
-        member = member / np.maximum(member.sum(axis=0), 1e-300) * weights
-        mass = member.sum(axis=1)
-        shares = mass / mass.sum()
-        centres = (member @ u) / np.maximum(mass, 1e-300)[:, None]
+    scales = np.tile(pooled / k ** (2.0 / p), (k, 1, 1))
+    mixing = np.full(k, 1.0 / k)
+    for _ in range(EM_STEPS):
+        responsibility = _responsibilities(u, weights, centres, scales, mixing)
+        mass = responsibility.sum(axis=1)
+        mixing = mass / mass.sum()
+        centres = (responsibility @ u) / np.maximum(mass, TINY)[:, None]
         for i in range(k):
-            off = u - centres[i]
-            own = (off.T * member[i]) @ off / max(mass[i], 1e-300)
-            scales[i] = 0.95 * own + 0.05 * spread / k ** (2.0 / p)
-    live = shares > 1e-6
+            deviation = u - centres[i]
+            own = (deviation.T * responsibility[i]) @ deviation / max(mass[i], TINY)
+            scales[i] = (1.0 - SHRINKAGE) * own + SHRINKAGE * pooled / k ** (2.0 / p)
+    live = mixing > LEAST_MIXING_WEIGHT
     return _Mixture(
-        centres[live], np.linalg.cholesky(scales[live]), shares[live] / shares[live].sum()
+        centres[live], np.linalg.cholesky(scales[live]), mixing[live] / mixing[live].sum()
     )
 
 
-def _bell(u: Floats, centre: Floats, scale: Floats) -> Floats:
+def _responsibilities(
+    u: Floats, weights: Floats, centres: Floats, scales: Floats, mixing: Floats
+) -> Floats:
+    """Weight of each sample that belongs to each component, (k, n)."""
+    joint = np.stack(
+        [
+            share * _gaussian(u, centre, scale)
+            for centre, scale, share in zip(centres, scales, mixing, strict=True)
+        ]
+    )
+    return np.asarray(joint / np.maximum(joint.sum(axis=0), TINY) * weights)
+
+
+def _gaussian(u: Floats, centre: Floats, scale: Floats) -> Floats:
     """Gaussian density (n,), up to a factor that all components share."""
     factor = np.linalg.cholesky(scale)
-    off = np.linalg.solve(factor, (u - centre).T)
-    return np.asarray(np.exp(-0.5 * (off**2).sum(axis=0)) / np.prod(np.diag(factor)))
+    white = np.linalg.solve(factor, (u - centre).T)
+    return np.asarray(np.exp(-0.5 * (white**2).sum(axis=0)) / np.prod(np.diag(factor)))

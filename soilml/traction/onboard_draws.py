@@ -1,4 +1,4 @@
-"""Soils drawn from what a trained model file says of rows, instead of from their posterior."""
+"""Draws of soil parameters from the estimate of a trained model file."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from soilml.traction.soil_draws import SoilDraws
 def onboard_draws(
     estimator: Estimator, case: Case, table: Table
 ) -> tuple[list[FreeParameter], SoilDraws, list[str]]:
-    """What the file estimates and its range, draws of its estimate of all rows, and warnings.
+    """Parameters that the file estimates with their priors, draws of its estimate, and warnings.
 
-    Raises `InputError` where the file is of another gear, or estimates what the case lacks, and
-    `FitError` where no row has all its readings.
+    Raises `InputError` where the file is for another gear or estimates a parameter that the case
+    lacks, and `FitError` where no row has all its readings.
     """
     warnings = _check_case(estimator, case)
     known, prior = case.parameters(), estimator.prior
     for name in estimator.names:
         if name not in known:
-            raise InputError(f"{estimator.path} estimates {name}; needed are {', '.join(known)}")
+            raise InputError(f"{estimator.path} estimates {name}; the model has {', '.join(known)}")
     free = [
         FreeParameter(
             name, unit, Prior(float(low), float(high)), float(known[name][1]), assumed=False
@@ -42,15 +42,15 @@ def onboard_draws(
             estimator.names, estimator.units, prior.lower, prior.upper, strict=True
         )
     ]
-    read = {name: table[column(name)] for name in estimator.inputs}
-    whole = np.all([np.isfinite(values) for values in read.values()], axis=0)
-    if not whole.any():
+    inputs = {name: table[column(name)] for name in estimator.inputs}
+    complete = np.all([np.isfinite(values) for values in inputs.values()], axis=0)
+    if not complete.any():
         names = ", ".join(column(name) for name in estimator.inputs)
         raise FitError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
-    estimate = estimator.run(**{name: values[whole] for name, values in read.items()})
+    estimate = estimator.run(**{name: values[complete] for name, values in inputs.items()})
     if not estimate.in_range:
         warnings.append(
-            f"the rows are out of the range of {estimator.path}: its answer is the prior"
+            f"the rows are outside the training domain of {estimator.path}: it returns the prior"
         )
     return free, estimated_draws(free, estimate.mean, estimate.covariance), warnings
 

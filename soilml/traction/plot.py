@@ -17,42 +17,42 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-PRIOR, KNOWN, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
+PRIOR, POSTERIOR, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
 
 
-def draw(report: PullReport, path: Path) -> None:
+def save_figure(report: PullReport, path: Path) -> None:
     """Write a PNG file: a column for each load, pull (N) above and slope (degrees) below."""
     from matplotlib.figure import Figure
 
     count = len(report.by_load)
     figure = Figure(figsize=(1.6 + 3.6 * count, 6.0), layout="constrained")
     panels = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
-    slips, loads, pulls = report.measured
-    for i, ahead in enumerate(report.by_load):
-        known, prior = ahead.known, ahead.prior
+    slips, loads, pulls = report.measured_pull
+    for i, prediction in enumerate(report.by_load):
+        posterior, prior = prediction.posterior, prediction.prior
         top, low = panels[:, i]
-        _bands(top, known.slip, quantile_band(prior.pull), quantile_band(known.pull))
-        near = np.abs(loads / known.load - 1.0) < SAME_LOAD
+        _bands(top, posterior.slip, quantile_band(prior.pull), quantile_band(posterior.pull))
+        near = np.abs(loads / posterior.load - 1.0) < SAME_LOAD
         if near.any():
             top.plot(slips[near], pulls[near], "o", color=MEASURED, ms=5, label="measured pull")
         degrees = [
             QuantileBand(*np.rad2deg((b.lower, b.middle, b.upper)))
-            for b in map(quantile_band, (prior.slope, known.slope))
+            for b in map(quantile_band, (prior.slope, posterior.slope))
         ]
-        _bands(low, known.slip, *degrees)
-        best = quantile_band(np.rad2deg(known.steepest))
+        _bands(low, posterior.slip, *degrees)
+        best = quantile_band(np.rad2deg(posterior.steepest_slope))
         low.set_title(
             f"steepest {best.middle:.1f}° ({best.lower:.1f} to {best.upper:.1f})", fontsize=10
         )
-        top.set_title(f"{known.load:.3g} N on the wheel", fontsize=11)
+        top.set_title(f"{posterior.load:.3g} N on the wheel", fontsize=11)
         low.set_xlabel("slip")
     panels[0, 0].set_ylabel("drawbar pull, N")
     panels[1, 0].set_ylabel("slope climbed, degrees")
     parts: dict[str, Any] = {}
     for axes in panels.flat:
         axes.plot(
-            report.driven.slip, [0.0, 0.0], color=MEASURED, lw=5, alpha=0.6, label="slips driven",
-            transform=axes.get_xaxis_transform(), solid_capstyle="butt",
+            report.measured_range.slip, [0.0, 0.0], color=MEASURED, lw=5, alpha=0.6,
+            label="measured slips", transform=axes.get_xaxis_transform(), solid_capstyle="butt",
         )  # fmt: skip
         handles, labels = axes.get_legend_handles_labels()
         parts |= dict(zip(labels, handles, strict=True))
@@ -63,12 +63,18 @@ def draw(report: PullReport, path: Path) -> None:
     figure.savefig(path, format="png", dpi=130)
 
 
-def _bands(axes: Axes, slip: Floats, prior: QuantileBand, known: QuantileBand) -> None:
-    axes.fill_between(slip, prior.lower, prior.upper, color=PRIOR, lw=0, label="90 %, prior alone")
+def _bands(axes: Axes, slip: Floats, prior: QuantileBand, posterior: QuantileBand) -> None:
+    axes.fill_between(slip, prior.lower, prior.upper, color=PRIOR, lw=0, label="90 %, prior")
     axes.fill_between(
-        slip, known.lower, known.upper, color=KNOWN, alpha=0.55, lw=0, label="90 %, with the rows"
+        slip,
+        posterior.lower,
+        posterior.upper,
+        color=POSTERIOR,
+        alpha=0.55,
+        lw=0,
+        label="90 %, posterior",
     )
-    axes.plot(slip, known.middle, color=KNOWN, lw=1.2)
+    axes.plot(slip, posterior.middle, color=POSTERIOR, lw=1.2)
     axes.axhline(0.0, color="black", lw=0.6)
     axes.grid(color="#eeeeee", lw=0.7)
     axes.set_axisbelow(True)

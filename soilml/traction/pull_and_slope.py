@@ -1,4 +1,4 @@
-"""Drawbar pull and climbable slope against slip, for every soil that may be there."""
+"""Drawbar pull and climbable slope against slip, for draws of the soil parameters."""
 
 from __future__ import annotations
 
@@ -16,23 +16,32 @@ from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]
 
-#: Steepest slope that is searched, rad (86 degrees); a wheel that sticks to more is held there.
-STEEPEST = 1.5
-#: Kinds of effects that belong to the rig and the sensors that the rows came from.
-LEFT_BEHIND = ("rig", "sensor")
+#: Upper end of the slopes searched, rad (86 degrees); steeper ones are clipped to it.
+LARGEST_SLOPE = 1.5
+#: Kinds of effects of the test rig and its sensors, which do not act on a vehicle.
+EXCLUDED_KINDS = ("rig", "sensor")
 
 
 @dataclass(frozen=True)
 class Traction:
-    """What a running gear under one load does on each of many soils; NaN where it sinks in.
+    """Pull and slope of a running gear under one load, for n draws of the soil and m slips.
 
-    `slope` is what a vehicle climbs steadily at that slip, below zero where it only goes downhill.
+    Attributes
+    ----------
+    load
+        Vertical load, N.
+    slip
+        Slips (m,).
+    pull
+        Drawbar pull on level ground, N (n, m); NaN where the soil does not carry the load.
+    slope
+        Slope that a vehicle climbs steadily, rad (n, m); negative where it only descends.
     """
 
-    load: float  # N
-    slip: Floats  # (m,)
-    pull: Floats  # (n, m), N, on the flat
-    slope: Floats  # (n, m), rad
+    load: float
+    slip: Floats
+    pull: Floats
+    slope: Floats
 
     @property
     def largest_pull(self) -> Floats:
@@ -41,80 +50,96 @@ class Traction:
 
     @property
     def best_slip(self) -> Floats:
-        """The slip of it, (n,)."""
+        """The slip at the largest drawbar pull, (n,)."""
         return self._slip_of(self.pull)
 
     @property
-    def steepest(self) -> Floats:
+    def steepest_slope(self) -> Floats:
         """The steepest slope of each draw, rad (n,)."""
         return _largest(self.slope)
 
     @property
     def steepest_slip(self) -> Floats:
-        """The slip of it, (n,)."""
+        """The slip at the steepest slope, (n,)."""
         return self._slip_of(self.slope)
 
     @property
-    def sunk(self) -> float:
-        """Share of draws and slips without an answer."""
+    def failed_fraction(self) -> float:
+        """Fraction of draws and slips without equilibrium."""
         return float(np.mean(~np.isfinite(self.pull)))
 
     @property
-    def rising(self) -> float:
-        """Share of draws whose pull still rises at the highest slip: they might do more."""
+    def rising_fraction(self) -> float:
+        """Fraction of draws whose pull still increases at the highest slip."""
         return float(np.mean(self.best_slip == self.slip[-1]))
 
     def _slip_of(self, values: Floats) -> Floats:
-        found = self.slip[np.argmax(np.nan_to_num(values, nan=-np.inf), axis=1)]
-        return np.where(np.isfinite(values).any(axis=1), found, np.nan)
+        slip = self.slip[np.argmax(np.nan_to_num(values, nan=-np.inf), axis=1)]
+        return np.where(np.isfinite(values).any(axis=1), slip, np.nan)
 
 
-def traction(
+def predict_traction(
     case: Case,
     draws: SoilDraws,
     load: float,
     slip: Floats,
-    given: Mapping[str, float] | None = None,
+    covariates: Mapping[str, float] | None = None,
 ) -> Traction:
-    r"""Pull (n, m) and slope (n, m) of n draws of the soil at m slips (m,) under a load (N).
+    r"""Pull and slope for n draws of the soil at m slips under a load.
 
-    The slope :math:`\alpha` is the one on which a wheel that carries its share across the slope
-    pulls its share along it,
+    The slope :math:`\alpha` is the one on which the drawbar pull under the normal component of the
+    load equals the component along the slope,
 
     .. math:: W \sin\alpha = DP(s, W \cos\alpha)
 
-    with all wheels alike. `given` are speed, pass number and slip angle, where an effect needs
-    them. Effects of rig and sensors stay behind: what a cell reads is not what the wheel pulls.
-    References: Wong, Theory of Ground Vehicles, chapter 3. Does not hold for load transfer to the
-    wheels behind, across the slope, in turns, nor where the slope itself is about to slide.
+    with all wheels equal. Effects of the rig and the sensors are removed from the model. Does not
+    hold with load transfer between axles, across the slope, in turns, nor where the slope itself is
+    close to sliding.
+
+    Parameters
+    ----------
+    case
+        Model and soil.
+    draws
+        Draws (n, p) of soil parameters.
+    load
+        Vertical load on level ground, N.
+    slip
+        Slips (m,).
+    covariates
+        Speed, pass number and slip angle, where an effect needs them.
+
+    References
+    ----------
+    Wong, Theory of Ground Vehicles, chapter 3.
     """
-    own = [e for e in case.model.effects if e.about.kind not in LEFT_BEHIND]
+    own = [e for e in case.model.effects if e.about.kind not in EXCLUDED_KINDS]
     case = replace(case, model=Model(case.model.gear, tuple(own)))
-    known = dict(given or {})
     count = len(draws.values)
     rows, columns = (grid.ravel() for grid in np.indices((count, len(slip))))
 
-    def pulled(place: NDArray[np.int64], load: Floats) -> Floats:
-        changed = draws.of(case, rows[place])
-        at = Operating(slip=slip[columns[place]], load=load, **known)
-        return np.asarray(changed.model(changed.soil, at).drawbar_pull)
+    def drawbar_pull(index: NDArray[np.int64], normal_load: Floats) -> Floats:
+        soils = draws.of(case, rows[index])
+        at = Operating(slip=slip[columns[index]], load=normal_load, **dict(covariates or {}))
+        return np.asarray(soils.model(soils.soil, at).drawbar_pull)
 
-    flat = pulled(np.arange(rows.size), np.full(rows.size, load))
-    carried = np.flatnonzero(np.isfinite(flat))
+    level = drawbar_pull(np.arange(rows.size), np.full(rows.size, load))
+    carried = np.flatnonzero(np.isfinite(level))
 
-    def too_steep(angle: Floats) -> Floats:
-        across = load * np.cos(angle)
-        return np.asarray(angle - np.arctan(pulled(carried, across) / across))
+    def excess_angle(angle: Floats) -> Floats:
+        """Slope less the one that the pull on it balances."""
+        normal_load = load * np.cos(angle)
+        return np.asarray(angle - np.arctan(drawbar_pull(carried, normal_load) / normal_load))
 
-    ends = np.full(carried.size, STEEPEST)
-    guess = np.arctan(flat[carried] / load)
-    root = rising_root(too_steep, -ends, ends, guess, np.ones(carried.size))
+    bound = np.full(carried.size, LARGEST_SLOPE)
+    guess = np.arctan(level[carried] / load)
+    root = rising_root(excess_angle, -bound, bound, guess, np.ones(carried.size))
     slope = np.full(rows.size, np.nan)
-    slope[carried] = np.where(root.converged | (root.x >= STEEPEST), root.x, np.nan)
+    slope[carried] = np.where(root.converged | (root.x >= LARGEST_SLOPE), root.x, np.nan)
     shape = (count, len(slip))
-    return Traction(float(load), slip, flat.reshape(shape), slope.reshape(shape))
+    return Traction(float(load), slip, level.reshape(shape), slope.reshape(shape))
 
 
 def _largest(values: Floats) -> Floats:
-    found = np.nan_to_num(values, nan=-np.inf).max(axis=1)
-    return np.where(np.isfinite(found), found, np.nan)
+    largest = np.nan_to_num(values, nan=-np.inf).max(axis=1)
+    return np.where(np.isfinite(largest), largest, np.nan)

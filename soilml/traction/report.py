@@ -1,4 +1,4 @@
-"""Pull and slope from a case and a table of rows, with everything that must be said beside them."""
+"""Pull and slope from a case and a table of rows, with warnings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.identification.compatibility import check_wheel_size
+from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.free_parameters import select_free
 from soilml.identification.observations import read_observations
 from soilml.identification.operating_points import operating_points
@@ -17,10 +18,10 @@ from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
-from soilml.traction.by_load import LoadPrediction, asked_slips, driven_loads, predictions_by_load
-from soilml.traction.messages import NEVER, DrivenRange
+from soilml.traction.by_load import LoadPrediction, measured_loads, predictions_by_load, slip_grid
+from soilml.traction.messages import LIMITATIONS, MeasuredRange
 from soilml.traction.onboard_draws import onboard_draws
-from soilml.traction.pull_and_slope import LEFT_BEHIND
+from soilml.traction.pull_and_slope import EXCLUDED_KINDS
 from soilml.traction.soil_draws import posterior_draws, prior_draws
 
 Floats = NDArray[np.float64]
@@ -28,12 +29,26 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PullReport:
-    """Prospects under each load; slip, load (N) and pull (N) of rows that measured it, (k,)."""
+    """Predictions under each load.
+
+    Attributes
+    ----------
+    rows
+        Number of rows.
+    measured_range
+        Slips and loads of the rows.
+    by_load
+        Prediction under each load.
+    measured_pull
+        Slip, load (N) and drawbar pull (N) of the k rows that measured it, (k,) each.
+    warnings
+        Those that hold for all loads.
+    """
 
     rows: int
-    driven: DrivenRange
+    measured_range: MeasuredRange
     by_load: list[LoadPrediction]
-    measured: tuple[Floats, Floats, Floats]
+    measured_pull: tuple[Floats, Floats, Floats]
     warnings: tuple[str, ...]
 
 
@@ -46,54 +61,81 @@ def pull_report(
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
 ) -> PullReport:
-    """Pull and slope of a gear on the soil that the rows were driven on.
+    """Pull and slope of a gear on the soil that the rows were measured on.
 
-    The soil is known by the posterior of the rows, or as far as `estimator` knows it. Speed, pass
-    and slip angle are those of the rows, their median. Raises as `identify` does, and `InputError`
-    for a load that the soil does not carry.
+    Parameters
+    ----------
+    case
+        Model, soil, priors and noise.
+    table
+        Measured rows of one soil, as for `identify`. Speed, pass number and slip angle of the
+        prediction are their medians.
+    free
+        Paths of the unknown parameters; by default those with a prior.
+    loads
+        Vertical loads, N; by default those of the rows.
+    slip_limit
+        Highest slip, in (0, 1); by default the highest measured one, at least 0.6.
+    estimator
+        Trained estimator whose estimate replaces the posterior.
+
+    Returns
+    -------
+    PullReport
+        Draws of pull (N) and slope (rad) under each load, for the posterior and the prior.
+
+    Raises
+    ------
+    InputError
+        For a load that the soil does not carry, a slip limit outside (0, 1), or an estimator for
+        another gear.
+    FitError, TableError
+        As `identify` with the posterior method.
     """
     warnings: list[str] = []
     if estimator is None:
-        wanted = select_free(case, free)
+        unknown = select_free(case, free)
         data = read_observations(case, table)
-        found = posterior_draws(case, data, wanted)
-        draws = found.draws
+        posterior = posterior_draws(case, data, unknown)
+        draws = posterior.draws
         warnings += data.notes
         if [c.name for c in data.channels] == ["torque"]:
             warnings.append(
-                "torque alone hardly shows what a model lacks: measure drawbar pull or sinkage too"
+                "torque alone hardly reveals errors of the model: measure pull or sinkage too"
             )
-        if found.surplus:
+        if posterior.samples.noise_inflated:
             warnings.append(
-                f"residuals are {np.sqrt(found.misfit):.1f} times the declared noise: the model "
-                "lacks something or the noise is understated; bands are wider, and may miss"
+                f"residuals are {posterior.samples.noise_scale:.1f} {EXCESS_RESIDUALS}: the model "
+                "lacks an effect or the noise is understated; bands are widened and may be biased"
             )
     else:
         check_wheel_size(case, table)
-        wanted, draws, said = onboard_draws(estimator, case, table.rows(table.answered))
-        warnings += said
-    left = [e.name for e in case.model.effects if e.about.kind in LEFT_BEHIND]
-    if left:
-        warnings.append(f"effects of rig and sensors stay behind: {', '.join(left)}")
+        unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
+        warnings += notes
+    excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
+    if excluded:
+        warnings.append(f"effects of rig and sensors are excluded: {', '.join(excluded)}")
     table = table.rows(table.answered)
     at = operating_points(table)
-    driven = DrivenRange.of(table["slip"], table["load_N"])
-    given = {
+    measured_range = MeasuredRange.of(table["slip"], table["load_N"])
+    covariates = {
         field: float(np.median(values))
         for field in COVARIATES
         if (values := getattr(at, field)) is not None
     }
-    ahead = predictions_by_load(
+    predictions = predictions_by_load(
         case,
         draws,
-        prior_draws(wanted),
-        driven_loads(table["load_N"]) if loads is None else loads,
-        asked_slips(slip_limit, driven),
-        driven,
-        given,
+        prior_draws(unknown),
+        measured_loads(table["load_N"]) if loads is None else loads,
+        slip_grid(slip_limit, measured_range),
+        measured_range,
+        covariates,
     )
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)
-    dots = np.isfinite(pull)
-    measured = table["slip"][dots], table["load_N"][dots], pull[dots]
-    return PullReport(len(table), driven, ahead, measured, (*warnings, NEVER))
+    known = np.isfinite(pull)
+    measured_pull = table["slip"][known], table["load_N"][known], pull[known]
+    return PullReport(
+        len(table), measured_range, predictions, measured_pull, (*warnings, LIMITATIONS)
+    )

@@ -1,4 +1,4 @@
-"""Soils that may be there, each as likely as the next."""
+"""Equally weighted draws of soil parameters, from the prior or the posterior."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
-from soilml.identification.posterior import settled_samples
+from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 
 Floats = NDArray[np.float64]
 
-#: Soils that are carried through the model: a 5 % quantile of as many strays by 1.1 %.
-COUNT = 400
+#: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
+DRAWS = 400
 
 
 @dataclass(frozen=True)
 class SoilDraws:
-    """Values (n, p) of the parameters `names`, in SI units; each row is as likely as the next."""
+    """Equally weighted draws (n, p) of the parameters `names`, in SI units."""
 
     names: tuple[str, ...]
     values: Floats
@@ -36,35 +36,28 @@ class SoilDraws:
 
 @dataclass(frozen=True)
 class PosteriorDraws:
-    """Draws, how many equally weighted samples stand behind them, and the rows' misfit."""
+    """Equally weighted draws of the posterior, and the weighted samples that they come from."""
 
     draws: SoilDraws
-    effective: float
-    #: mean squared residual over that of the declared noise
-    misfit: float
-    #: whether that is more than noise leaves, and noise was taken to be so much larger
-    surplus: bool
+    samples: PosteriorSamples
 
 
 def posterior_draws(
-    case: Case, data: Observations, free: Sequence[FreeParameter], count: int = COUNT, seed: int = 0
+    case: Case, data: Observations, free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0
 ) -> PosteriorDraws:
-    """Soils drawn from what rows, noise and prior together allow.
-
-    Raises `FitError` as the posterior method does: noise must be declared, and the model must
-    carry the loads somewhere in the prior.
-    """
-    found, misfit, surplus = settled_samples(case, data, free)
-    rows = systematic_resampling(found.weights, count, np.random.default_rng(seed).random())
-    return PosteriorDraws(_valued(free, found.u[rows]), found.effective, misfit, surplus)
+    """Draws of the posterior of the rows; raises `FitError` as the posterior method does."""
+    found = posterior_samples(case, data, free)
+    offset = np.random.default_rng(seed).random()
+    rows = systematic_resampling(found.sample.weights, count, offset)
+    return PosteriorDraws(_soil_draws(free, found.sample.u[rows]), found)
 
 
-def prior_draws(free: Sequence[FreeParameter], count: int = COUNT, seed: int = 0) -> SoilDraws:
-    """Soils drawn from the priors, one in each slice of every prior."""
+def prior_draws(free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0) -> SoilDraws:
+    """Draws of the priors by Latin hypercube."""
     rng = np.random.default_rng(seed)
-    return _valued(free, latin_hypercube(count, len(free), rng))
+    return _soil_draws(free, latin_hypercube(count, len(free), rng))
 
 
-def _valued(free: Sequence[FreeParameter], u: Floats) -> SoilDraws:
+def _soil_draws(free: Sequence[FreeParameter], u: Floats) -> SoilDraws:
     values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
     return SoilDraws(tuple(f.path for f in free), values)

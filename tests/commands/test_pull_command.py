@@ -59,7 +59,7 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     best = f"{column['largest_drawbar_pull_N'][0]:.1f}"
     steep = f"{np.rad2deg(column['steepest_slope_rad'][0]):.1f}"
     assert f"largest pull    {best} (" in said and f"steepest slope  {steep} (" in said
-    assert "no load transfer" in said and "torque alone hardly shows" in said
+    assert "no load transfer" in said and "torque alone hardly reveals" in said
 
 
 def test_each_run_has_its_own_answer_and_one_that_cannot_be_had_is_said(folder, capsys):
@@ -99,7 +99,7 @@ FAULTS = {
     "load of nothing": ({}, ["--load", "0"], "needed is a load above zero"),
     "no load": ({}, ["--load", "much"], "start:stop:count"),
     "many loads": ({}, ["--load", "10:90:9"], "at most 8"),
-    "unknown parameter": ({}, ["--free", "stickiness"], "is no parameter"),
+    "unknown parameter": ({}, ["--free", "stickiness"], "no such parameter"),
     "two unknowns": ({}, ["--free", "cohesion", "--from", "x.onnx"], "--free is for the posterior"),
     "no such file": ({}, ["--from", "none.onnx"], "no such file"),
     "picture of runs": ({}, ["--by", "run", "--picture", "p.png"], "shows one soil"),

@@ -15,8 +15,8 @@ from datagen.recipe import Recipe
 from soilml.config.case import Case
 from soilml.identification.free_parameters import select_free
 from soilml.identification.observations import read_observations
-from soilml.identification.posterior import most_misfit
-from soilml.identification.predictions import readings
+from soilml.identification.posterior import misfit_limit
+from soilml.identification.predictions import stacked_readings
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling
@@ -76,7 +76,7 @@ def exact_posterior(
         select_free(case, names),
     )
     surrogate = fit_chebyshev_surrogate(case, data, free)
-    reading, noise = readings(data)[0], case.noise[TORQUE]
+    reading, noise = stacked_readings(data)[0], case.noise[TORQUE]
 
     def misfit_terms(u: Floats, noise_factor: float) -> tuple[Floats, Floats]:
         """Chi-square (n,), and the sum (n,) over rows of the logarithm of the noise."""
@@ -93,7 +93,7 @@ def exact_posterior(
     best = sample.u[[int(np.argmax(sample.weights))]]
     freedom = len(reading) - len(free)
     reduced_chi_square = float(misfit_terms(best, 1.0)[0][0]) / max(freedom, 1)
-    flagged = reduced_chi_square > most_misfit(freedom)
+    flagged = reduced_chi_square > misfit_limit(freedom)
     if inflate_noise and flagged:
         factor = float(np.sqrt(reduced_chi_square))
         sample = importance_sample(partial(log_likelihood, noise_factor=factor), len(free))

@@ -13,7 +13,7 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
-from soilml.identification.predictions import predicted
+from soilml.identification.predictions import predict_channels
 
 Floats = NDArray[np.float64]
 
@@ -57,14 +57,14 @@ def fit_chebyshev_surrogate(
     node = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     fraction = 0.5 * (1.0 + node)
     grid = np.stack(np.meshgrid(*[fraction] * p, indexing="ij"), axis=-1).reshape(-1, p)
-    values = predicted(case, free, grid, data.at)["torque"]
+    values = predict_channels(case, free, grid, data.at)["torque"]
     inverse = np.linalg.inv(chebvander(node, NODES - 1))
     cube = values.reshape(*[NODES] * p, -1)
     for axis in range(p):
         cube = np.moveaxis(np.tensordot(inverse, cube, axes=(1, axis)), 0, axis)
     surrogate = ChebyshevSurrogate(cube.reshape(NODES**p, -1))
     u = np.random.default_rng(0).random((CHECK_POINTS, p))
-    true = predicted(case, free, u, data.at)["torque"]
+    true = predict_channels(case, free, u, data.at)["torque"]
     error = float(np.max(np.abs(surrogate.torque(u) / true - 1.0)))
     if not error < TOLERANCE:
         raise FitError(

@@ -8,7 +8,7 @@ from lunar.sweep import Floats, table
 from soilml import Case
 from soilml.identification import read_observations
 from soilml.identification.free_parameters import select_free
-from soilml.identification.posterior import sampled
+from soilml.identification.posterior import sample_posterior
 
 
 def posterior(
@@ -19,6 +19,6 @@ def posterior(
     From the weighted samples of `soilml identify --method posterior`.
     """
     free = select_free(case, None)
-    found, _, _ = sampled(case, read_observations(case, table(slip, torque, load)), free)
+    found, _ = sample_posterior(case, read_observations(case, table(slip, torque, load)), free)
     drawn = found.u[rng.choice(len(found.u), count, p=found.weights)]
     return np.stack([f.prior.at(drawn[:, k]) for k, f in enumerate(free)], axis=1)

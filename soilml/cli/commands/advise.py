@@ -31,7 +31,7 @@ from soilml.experiment_design import (
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.candidate_rows import channel_words
+from soilml.experiment_design.candidate_rows import channel_label
 from soilml.experiment_design.messages import next_row_messages
 from soilml.identification.free_parameters import select_free
 from soilml.identification.observations import read_observations
@@ -133,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
         )
     samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
     known = {} if at is None else mean_covariates(at)
-    advice = advise(case, samples, ranges, driven=at, count=args.count, covariates=known)
+    advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:
         from soilml.experiment_design.plot import save_maps
 
@@ -144,10 +144,10 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
     notes = [] if at is None else [*next_row_messages(advice), *data.notes]
-    if advice.stuck:
+    if advice.excluded_points:
         notes.append(
-            f"{advice.stuck} of {len(ranges.slips) * len(ranges.loads)} operating points are "
-            "excluded: a twentieth or more of the posterior samples does not carry the wheel there"
+            f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "
+            "are excluded: a twentieth or more of the posterior samples does not carry the wheel there"
         )
     print("\n".join(notes), file=sys.stderr)
     return 0
@@ -156,9 +156,11 @@ def run(args: argparse.Namespace) -> int:
 def _best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
     """The rows of the table: reason and candidate."""
     rows = [("best in all", advice.best())]
-    rows += [(f"best in all with {own[1]}", advice.best(None, own)) for own in advice.sets[1:]]
+    rows += [
+        (f"best in all with {own[1]}", advice.best(None, own)) for own in advice.channel_sets[1:]
+    ]
     rows += [(f"best for {name}", advice.best(name)) for name in advice.names]
-    repeat = advice.repeat()
+    repeat = advice.best_repetition()
     if repeat is not None:
         rows.append(("best repeat", repeat))
     if len(advice.sequence) > 1:
@@ -173,11 +175,11 @@ def _columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, 
     choices = [choice for _, choice in rows]
     columns: dict[str, Any] = {
         "row": [why.replace("_", " ") for why, _ in rows],
-        "channels": [channel_words(c.candidate.channels) for c in choices],
+        "channels": [channel_label(c.candidate.channels) for c in choices],
         "slip": np.asarray([c.candidate.slip for c in choices]),
         "load_N": np.asarray([c.candidate.load for c in choices]),
     }
     for i, name in enumerate(advice.names):
-        columns[f"{name}_left"] = np.asarray([c.left[i] for c in choices])
+        columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
     columns["all_left"] = np.asarray([c.overall for c in choices])
     return columns

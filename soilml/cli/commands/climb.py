@@ -192,7 +192,7 @@ def _parameters(report: ClimbingReport) -> list[tuple[str, ...]]:
         factor, shown = _UNITS.get(unit, (1.0, unit))
         if name in fit.names:
             std = f"{factor * fit.std[fit.names.index(name)]:.2g}"
-            left = fit.left[name]
+            left = fit.remaining_fraction[name]
             said = "not identified" if left > NOT_IDENTIFIED_ABOVE else f"{factor * value:.4g}"
             rows.append((name, said, std, shown, f"{left:.0%}"))
         else:

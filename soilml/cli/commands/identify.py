@@ -139,7 +139,7 @@ class Identification:
         """The content of the file, for one fit."""
         content = self.fit.as_json()
         if self.advice is not None:
-            identified = is_identified(self.advice.now).tolist()
+            identified = is_identified(self.advice.current_fraction).tolist()
             flags = dict(zip(self.advice.names, identified, strict=True))
             content |= {"told": flags, "advice": summary(self.advice)}
         return content
@@ -164,6 +164,7 @@ def _solve_groups(
 
 
 def _fit_text(found: Fit) -> str:
+    remaining = found.remaining_fraction
     rows = [
         (name, f"{value:.5g}", f"{std:.3g}", f"{low:.4g} .. {high:.4g}", unit, left)
         for name, value, std, low, high, unit, left in zip(
@@ -172,7 +173,7 @@ def _fit_text(found: Fit) -> str:
             found.std,
             *found.interval,
             found.units,
-            [f"{found.left[n]:.0%}" if n in found.left else "" for n in found.names],
+            [f"{remaining[n]:.0%}" if n in remaining else "" for n in found.names],
             strict=True,
         )
     ]

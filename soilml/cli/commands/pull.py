@@ -154,9 +154,9 @@ def _write(args: argparse.Namespace, found: dict[str, PullReport]) -> None:
     with atomic_outputs(outputs(args)) as parts:
         for part in parts:
             if args.picture is not None and part == parts[-1]:
-                from soilml.traction.plot import draw
+                from soilml.traction.plot import save_figure
 
-                draw(found[""], part)
+                save_figure(found[""], part)
             else:
                 part.write_text(text, encoding="utf-8")
     heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
@@ -172,7 +172,7 @@ def _write(args: argparse.Namespace, found: dict[str, PullReport]) -> None:
 def _curves(by: str | None, found: dict[str, PullReport]) -> dict[str, Any]:
     """A row for each group, load and slip; what holds for a load stands in all its rows."""
     parts = [
-        ({by: np.full(len(one.known.slip), name)} if by else {}) | _columns(one)
+        ({by: np.full(len(one.posterior.slip), name)} if by else {}) | _columns(one)
         for name, report in found.items()
         for one in report.by_load
     ]
@@ -182,7 +182,7 @@ def _curves(by: str | None, found: dict[str, PullReport]) -> dict[str, Any]:
 def _columns(one: LoadPrediction) -> dict[str, Any]:
     from soilml.numerics.quantile_band import quantile_band
 
-    known, prior = one.known, one.prior
+    known, prior = one.posterior, one.prior
     count = len(known.slip)
     columns = {"load_N": np.full(count, known.load), "slip": known.slip}
     for name, values in (
@@ -190,7 +190,7 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
         ("slope_rad", known.slope),
         ("largest_drawbar_pull_N", known.largest_pull),
         ("best_slip", known.best_slip),
-        ("steepest_slope_rad", known.steepest),
+        ("steepest_slope_rad", known.steepest_slope),
     ):
         found = quantile_band(values)
         for ending, part in zip(("", "_p05", "_p95"), _ends(found), strict=True):
@@ -198,7 +198,9 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
     before = quantile_band(prior.pull), quantile_band(prior.slope)
     for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
         columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
-    for name, share in zip(("largest_drawbar_pull", "steepest_slope"), one.left, strict=True):
+    for name, share in zip(
+        ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
+    ):
         columns[f"{name}_left_of_prior"] = np.full(count, share)
     return columns
 
@@ -209,12 +211,12 @@ def _ends(found: QuantileBand) -> tuple[Any, Any, Any]:
 
 def _warnings(report: PullReport) -> list[str]:
     """Warnings of each load, then those of the whole result."""
-    own = [f"{one.known.load:.4g} N: {text}" for one in report.by_load for text in one.warnings]
+    own = [f"{one.posterior.load:.4g} N: {text}" for one in report.by_load for text in one.warnings]
     return [*own, *report.warnings]
 
 
 def _text(report: PullReport) -> str:
-    slips, loads = report.driven.slip, report.driven.load
+    slips, loads = report.measured_range.slip, report.measured_range.load
     head = (
         f"{report.rows} row{'s'[: report.rows > 1]} at slips {slips[0]:.2g} to {slips[1]:.2g}, "
         f"loads {loads[0]:.4g} to {loads[1]:.4g} N"
@@ -227,7 +229,7 @@ def _load_text(one: LoadPrediction) -> str:
     from soilml.numerics.quantile_band import quantile_band
     from soilml.quantities import NOT_IDENTIFIED_ABOVE
 
-    known, prior = one.known, one.prior
+    known, prior = one.posterior, one.prior
     pull, slope, before = (
         quantile_band(known.pull),
         quantile_band(known.slope),
@@ -244,15 +246,19 @@ def _load_text(one: LoadPrediction) -> str:
         cells += [f"{DEGREES * v[i]:.1f}" for v in _ends(slope)]
         lines.append((*cells, f"{before.lower[i]:.1f}", f"{before.upper[i]:.1f}"))
     ends = quantile_band(known.best_slip), quantile_band(known.steepest_slip)
-    pulled = _value_text(quantile_band(known.largest_pull), 1.0, one.left[0] > NOT_IDENTIFIED_ABOVE)
+    pulled = _value_text(
+        quantile_band(known.largest_pull), 1.0, one.remaining_fraction[0] > NOT_IDENTIFIED_ABOVE
+    )
     climbed = _value_text(
-        quantile_band(known.steepest), DEGREES, one.left[1] > NOT_IDENTIFIED_ABOVE
+        quantile_band(known.steepest_slope),
+        DEGREES,
+        one.remaining_fraction[1] > NOT_IDENTIFIED_ABOVE,
     )
     best = [
         f"largest pull    {pulled} N, at slip {_slips(ends[0])}; "
         f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",
         f"steepest slope  {climbed} deg, at slip {_slips(ends[1])}; "
-        f"before the rows {_range(quantile_band(prior.steepest), DEGREES)} deg",
+        f"before the rows {_range(quantile_band(prior.steepest_slope), DEGREES)} deg",
     ]
     doubts = [f"! {text}" for text in one.warnings]
     table = format_table(header, lines, text_columns=0)

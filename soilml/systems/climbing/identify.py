@@ -171,12 +171,14 @@ def _fit(
         covariance=covariance,
         warnings=(),
         rows_used=climbs,
-        left={n: float(np.std(posterior.u[:, i]) * np.sqrt(12.0)) for i, n in enumerate(free)},
+        remaining_fraction={
+            n: float(np.std(posterior.u[:, i]) * np.sqrt(12.0)) for i, n in enumerate(free)
+        },
         misfit=posterior.misfit,
         channels=("slope_rad",),
     )
     warnings = []
-    for name, left in fit.left.items():
+    for name, left in fit.remaining_fraction.items():
         if left > NOT_IDENTIFIED_ABOVE:
             warnings.append(f"{name} is not identified: {left:.0%} of its prior width remains")
         elif left > WEAKLY_IDENTIFIED_ABOVE:

@@ -60,7 +60,9 @@ class GroupFits:
     @property
     def remaining_fraction(self) -> dict[str, float]:
         """Remaining fraction of each prior's width, averaged over the groups."""
-        return {n: float(np.mean([fit.left[n] for fit in self.fits])) for n in self.names}
+        return {
+            n: float(np.mean([fit.remaining_fraction[n] for fit in self.fits])) for n in self.names
+        }
 
     @property
     def unidentified(self) -> tuple[str, ...]:

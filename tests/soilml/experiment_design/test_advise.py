@@ -39,21 +39,21 @@ def after(case, slip, load, **options):
     run = np.full(len(slip), "a")
     table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
     data = read_observations(case, table)
-    belief = samples_of_rows(case, data, select_free(case, None), 1024)
-    return advise(case, belief, GRID, driven=data.at, outcome_count=200, **options)
+    samples = samples_of_rows(case, data, select_free(case, None), 1024)
+    return advise(case, samples, GRID, measured=data.at, outcome_count=200, **options)
 
 
-def test_a_second_load_tells_cohesion_and_another_row_at_the_first_does_not(case):
+def test_a_second_load_identifies_cohesion_and_a_repetition_does_not(case):
     found = after(case, [0.6] * 3, [60.0] * 3)
-    assert not is_identified(found.now)[0]
-    best, repeat = found.best("cohesion"), found.repeat("cohesion")
+    assert not is_identified(found.current_fraction)[0]
+    best, repeat = found.best("cohesion"), found.best_repetition("cohesion")
     assert best.candidate.load != 60.0 and repeat.candidate.load == 60.0
-    assert best.left[0] < 0.65 * repeat.left[0]
+    assert best.remaining_fraction[0] < 0.65 * repeat.remaining_fraction[0]
 
 
-def test_cohesion_tells_at_light_load_friction_at_heavy_and_shear_modulus_at_small_slip(case):
-    belief = samples_of_prior(select_free(case, None), 1024)
-    found = advise(case, belief, GRID)
+def test_the_best_rows_are_where_each_parameter_dominates_the_torque(case):
+    samples = samples_of_prior(select_free(case, None), 1024)
+    found = advise(case, samples, GRID)
     assert found.best("cohesion").candidate.load == 30.0
     assert found.best("friction_angle").candidate.load == 120.0
     assert found.best("shear_modulus").candidate.slip == 0.05
@@ -63,8 +63,10 @@ def test_cohesion_tells_at_light_load_friction_at_heavy_and_shear_modulus_at_sma
 def test_drawbar_pull_helps_and_sinkage_does_not_where_bearing_is_known(case):
     noise = {"drawbar_pull_N": Noise(constant=0.5), "sinkage_m": Noise(constant=0.0005)}
     found = after(replace(case, noise=case.noise | noise), [0.2] * 3, [60.0] * 3)
-    torque, pull, sinkage = (found.best("friction_angle", own).left[1] for own in found.sets)
-    assert [own[1:] for own in found.sets] == [(), ("drawbar_pull",), ("sinkage",)]
+    torque, pull, sinkage = (
+        found.best("friction_angle", own).remaining_fraction[1] for own in found.channel_sets
+    )
+    assert [own[1:] for own in found.channel_sets] == [(), ("drawbar_pull",), ("sinkage",)]
     assert pull < torque - 0.03 and abs(sinkage - torque) < 0.02
 
 
@@ -72,11 +74,11 @@ def test_sinkage_helps_where_bearing_is_not_known(case):
     noise = case.noise | {"sinkage_m": Noise(constant=0.0005)}
     unknown = replace(case, noise=noise, prior=case.prior | {"n": Prior(0.6, 1.6)})
     found = advise(unknown, samples_of_prior(select_free(unknown, None), 1024), GRID)
-    torque, sinkage = (found.best("n", own).left[3] for own in found.sets)
+    torque, sinkage = (found.best("n", own).remaining_fraction[3] for own in found.channel_sets)
     assert sinkage < 0.6 * torque
 
 
-def test_rows_after_one_another_leave_less_and_less_and_go_elsewhere(case):
+def test_each_row_of_a_sequence_reduces_the_variance_at_a_new_point(case):
     found = advise(case, samples_of_prior(select_free(case, None), 1500), GRID, count=3)
     overall = [c.overall for c in found.sequence]
     assert overall[0] == found.best().overall < 1.0
@@ -84,7 +86,7 @@ def test_rows_after_one_another_leave_less_and_less_and_go_elsewhere(case):
     assert len({c.candidate for c in found.sequence}) == 3
 
 
-def test_following_the_plan_leaves_what_it_said(case):
+def test_the_realised_width_after_a_plan_is_the_expected_one(case):
     planned = advise(case, samples_of_prior(select_free(case, None), 1500), GRID, count=2).sequence
     points = [(c.candidate.slip, c.candidate.load) for c in planned]
     rng, free, left = np.random.default_rng(4), select_free(case, None), []
@@ -95,15 +97,17 @@ def test_following_the_plan_leaves_what_it_said(case):
         torque = torque * (1.0 + 0.02 * rng.standard_normal(2))
         run = np.asarray(["a", "a"])
         table = Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
-        left.append(samples_of_rows(case, read_observations(case, table), free).left)
+        left.append(samples_of_rows(case, read_observations(case, table), free).remaining_fraction)
     realised = np.sqrt(np.mean(np.square(left), axis=0))
-    np.testing.assert_allclose(planned[-1].left, realised, atol=0.15)  # 16 soils: 3 sigma
+    np.testing.assert_allclose(
+        planned[-1].remaining_fraction, realised, atol=0.15
+    )  # 16 soils: 3 sigma
 
 
-def test_loads_that_possible_soils_do_not_carry_are_left_out_and_counted(case):
+def test_points_without_equilibrium_on_possible_soils_are_excluded_and_counted(case):
     heavy = candidate_grid([0.2], [60.0, 1e6])
     found = advise(case, samples_of_prior(select_free(case, None), 64), heavy)
-    assert found.stuck == 1 and {c.candidate.load for c in found.choices} == {60.0}
+    assert found.excluded_points == 1 and {c.candidate.load for c in found.choices} == {60.0}
     with pytest.raises(FitError, match="smaller loads"):
         advise(case, samples_of_prior(select_free(case, None), 64), candidate_grid([0.2], [1e6]))
 
@@ -117,31 +121,33 @@ def test_impossible_slips_and_loads_are_refused():
     assert candidate_grid(None, None, [30.0, 60.0]).loads == (15.0, 25.0, 42.0, 71.0, 120.0)
 
 
-def test_without_noise_nothing_can_be_said(case):
+def test_undeclared_noise_is_refused(case):
     silent = replace(case, noise={})
     with pytest.raises(InputError, match="declare it in"):
         advise(silent, samples_of_prior(select_free(case, None), 64), GRID)
-    with pytest.raises(InputError, match="channels that are read"):
-        advise(case, samples_of_prior(select_free(case, None), 64), GRID, reads=("sinkage",))
+    with pytest.raises(InputError, match="measured channels"):
+        advise(case, samples_of_prior(select_free(case, None), 64), GRID, channels=("sinkage",))
 
 
-def test_the_words_abstain_where_the_width_is_that_of_the_prior(case):
+def test_messages_name_parameters_that_are_not_identified(case):
     assert is_identified(np.asarray([0.3, 0.8, 0.81])).tolist() == [True, True, False]
     text = abstention_message("friction_angle", 0.92)
-    assert text == "friction angle: 92% of the prior's width remains: these rows do not tell it"
+    assert text == "friction angle: not identified by these rows, 92% of the prior's width remains"
     found = after(case, [0.6] * 3, [60.0] * 3, count=2)
     said = " | ".join(next_row_messages(found))
-    assert "cohesion: " in said and "do not tell it" in said and "repeating what was driven" in said
-    assert "Most helpful next: slip" in said and "helps most in all: slip" in said
+    assert "cohesion: not identified by these rows" in said and "a repetition leaves" in said
+    assert (
+        "Most informative next: slip" in said and "best next row for all parameters: slip" in said
+    )
 
 
-def test_where_no_single_row_tells_the_words_name_several(case):
+def test_messages_name_several_rows_where_one_does_not_suffice(case):
     loud = replace(case, noise={"torque_Nm": Noise(share=0.4)})
     found = advise(loud, samples_of_prior(select_free(loud, None), 400), GRID, count=3)
-    assert "3 rows together leave" in " ".join(next_row_messages(found))
+    assert "3 rows leave" in " ".join(next_row_messages(found))
 
 
-def test_the_summary_names_slip_load_channels_and_every_width(case):
+def test_the_summary_has_slip_load_channels_and_every_fraction(case):
     content = summary(after(case, [0.2], [60.0]))
     assert set(content) == {"next", "next_for", "repeat"}
     assert content["repeat"]["slip"] == 0.2 and content["next"]["channels"] == ["torque"]

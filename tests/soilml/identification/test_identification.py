@@ -63,7 +63,7 @@ def test_one_load_does_not_identify_cohesion_and_says_so(case):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
         assert "one load only: cohesion is not identified" in fit.warnings
-        assert fit.left["cohesion"] > 0.5
+        assert fit.remaining_fraction["cohesion"] > 0.5
         inside.append(np.abs(fit.values - list(truth.values())) <= 1.645 * fit.std)
     assert (np.mean(inside, axis=0) > 0.78).all()
 
@@ -108,7 +108,7 @@ def test_a_std_given_in_the_table_stands(case):
 def test_a_single_row_leaves_the_prior_and_says_so(case):
     fit = identify(case, measured(case, TRUTH, SLIPS[:1], LOADS[:1], noise=0.02))
     assert "1 reading for 3 parameters: the prior decides the rest" in fit.warnings
-    assert fit.left["cohesion"] > 0.8
+    assert fit.remaining_fraction["cohesion"] > 0.8
     assert fit.std[0] > 500.0
 
 

@@ -43,28 +43,31 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
     huge = changed(table, load_N_std=np.full(12, 1e300), slip_std=np.full(12, 1e300))
     assert np.isfinite(identify(case, huge, SHEAR).std).all()
     said = " ".join(identify(case, shaky, SHEAR, "newton").warnings)
-    assert "newton method does not carry noise of slip and load" in said
+    assert "newton method does not propagate noise of slip and load" in said
 
 
 @pytest.mark.parametrize("method", ["nonlinear", "newton"])
-def test_a_reading_of_zero_under_a_share_of_noise_does_not_decide_alone(case, table, method):
+def test_a_reading_of_zero_with_relative_noise_has_finite_weight(case, table, method):
     truth = identify(case, table, SHEAR, method)
     torque = table["torque_Nm"].copy()
     torque[4] = 0.0
     fit = identify(case, changed(table, torque_Nm=torque), SHEAR, method)
     said = " ".join(fit.warnings)
-    assert "log.csv line 6, column torque_Nm: a standard deviation of 0 is not believed" in said
+    assert (
+        "log.csv line 6, column torque_Nm: standard deviation 0 replaced by the column's median"
+        in said
+    )
     assert "not declared" not in said
     assert np.isfinite(fit.std).all() and (fit.std > truth.std).all()
 
 
-def test_a_standard_deviation_next_to_nothing_is_not_believed(case, table):
+def test_a_standard_deviation_of_almost_zero_is_replaced(case, table):
     std = np.full(12, 0.05)
     std[[2, 5]] = 1e-300
     fit = identify(case, changed(table, torque_Nm_std=std), SHEAR)
     assert (
-        "line 4, column torque_Nm: a standard deviation of 1e-300 is not believed, nor 1 more"
-        in (" ".join(fit.warnings))
+        "line 4, column torque_Nm: standard deviation 1e-300 replaced by the column's median 0.05; "
+        "1 more rows likewise" in (" ".join(fit.warnings))
     )
     np.testing.assert_allclose(
         fit.std, identify(case, changed(table, torque_Nm_std=np.full(12, 0.05)), SHEAR).std
@@ -73,25 +76,25 @@ def test_a_standard_deviation_next_to_nothing_is_not_believed(case, table):
         changed(table, torque_Nm_std=np.full(12, 1e-300)),
         changed(table, torque_Nm=np.zeros(12)),
     ):
-        with pytest.raises(FitError, match="line 2, column torque_Nm: a standard deviation of"):
+        with pytest.raises(FitError, match="line 2, column torque_Nm: standard deviation"):
             identify(case, bad, SHEAR)
 
 
-def test_rows_without_an_answer_are_left_out_and_counted(case, table):
+def test_rows_whose_status_is_not_ok_are_excluded_and_counted(case, table):
     torque, status = table["torque_Nm"].copy(), np.full(12, "ok", dtype="<U20")
     torque[[3, 7]], status[[3, 7]], status[0] = 99.0, "no equilibrium", ""
     fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR)
     assert fit.rows_used == 10
     assert fit["friction_angle"] == pytest.approx(float(case.soil.friction_angle), rel=1e-4)
-    assert "2 rows are left out: their status is not ok" in fit.warnings
+    assert "2 rows are excluded: their status is not ok" in fit.warnings
     with pytest.raises(FitError, match=r"log\.csv: no row has the status ok"):
         identify(case, changed(table, status=np.full(12, "no peak")), SHEAR)
 
 
-def test_a_method_of_fixed_unknowns_says_what_was_not_asked_for(case, table):
+def test_a_method_of_fixed_unknowns_reports_parameters_not_requested(case, table):
     said = " ".join(identify(case, table, ["friction_angle"], "newton").warnings)
-    assert "shear_modulus, kphi found too, though not asked for" in said
-    assert "not asked for" not in " ".join(identify(case, table, None, "nonlinear").warnings)
+    assert "shear_modulus, kphi identified too, although not requested" in said
+    assert "not requested" not in " ".join(identify(case, table, None, "nonlinear").warnings)
 
 
 def test_rows_cannot_be_grouped_by_blank_cells(table):

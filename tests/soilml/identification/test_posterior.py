@@ -41,7 +41,7 @@ def test_sampling_finds_the_moments_and_the_evidence_of_a_bent_ridge():
         return -0.5 * bend - 0.5 * ((z - 0.5 * x - 0.2) / 0.02) ** 2
 
     found = importance_sample(ridge, 3, seed=4)
-    assert found.effective > 2000
+    assert found.effective_size > 2000
     assert found.evidence == pytest.approx(np.log(2 * np.pi * 0.01 * 0.02), abs=0.05)
     mean = found.mean(found.u)
     np.testing.assert_allclose(mean, [0.5, 0.4, 0.45], atol=0.03)  # 5 of its standard errors
@@ -93,7 +93,7 @@ def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, np.asarray([0.2]), np.asarray([60.0]), seed=1)
     fit = identify(case, table, None, "posterior")
-    assert fit.left["cohesion"] > 0.8
+    assert fit.remaining_fraction["cohesion"] > 0.8
     assert any("cohesion is not identified" in text for text in fit.warnings)
     low, high = fit.interval
     prior = [case.prior[name] for name in fit.names]
@@ -125,7 +125,7 @@ def test_a_posterior_too_narrow_to_sample_is_refused_and_never_given_as_certain(
     case = replace(case, noise={"torque_Nm": Noise(share=1e-4)})
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, SLIPS, LOADS, seed=1)
-    with pytest.raises(FitError, match="too narrow a part of the prior; try the nonlinear"):
+    with pytest.raises(FitError, match="too narrow a part of the prior; use --method nonlinear"):
         identify(case, table, None, "posterior")
 
 
@@ -134,5 +134,5 @@ def test_dead_corners_of_the_prior_are_passed_over_in_silence(recwarn):
         near = -0.5 * (((u - 0.7) / 1e-4) ** 2).sum(axis=1)
         return np.where(u[:, 0] < 0.4, -np.inf, near)
 
-    assert importance_sample(cornered, 3).effective > 1000
+    assert importance_sample(cornered, 3).effective_size > 1000
     assert not recwarn.list

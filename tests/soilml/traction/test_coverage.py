@@ -22,7 +22,7 @@ def test_bands_hold_the_truth_as_often_as_they_say(case):
     noisy = replace(case, noise={"torque_Nm": Noise(share=0.2)})  # wide posteriors are quick
     found = coverage(noisy, range(500, 500 + SOILS), (200.0,), count=120)
     for one in found.values():
-        for part in (one.pull.below[:, 2], one.pull.below[:, 5], one.steepest.below):
+        for part in (one.pull.rank[:, 2], one.pull.rank[:, 5], one.steepest_slope.rank):
             for low, high in ((0.05, 0.95), (0.25, 0.75)):
                 held = int(np.sum((part > low) & (part < high)))
                 ends = binom.interval(0.998, SOILS, high - low)
@@ -32,4 +32,4 @@ def test_bands_hold_the_truth_as_often_as_they_say(case):
 def test_a_model_without_the_digging_of_the_soil_promises_too_much(case):
     digging = replace(case, model=case.model + SlipSinkage(n1=0.4))
     one = coverage(case, range(2), (60.0,), world=digging, count=120)[60.0]
-    assert (one.steepest.off < 0.0).all() and (one.steepest.below == 0.0).all()
+    assert (one.steepest_slope.error < 0.0).all() and (one.steepest_slope.rank == 0.0).all()

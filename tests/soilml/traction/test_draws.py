@@ -6,9 +6,7 @@ import pytest
 from soilml import read_case
 from soilml.errors import InputError
 from soilml.identification.free_parameters import select_free
-from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.traction import estimated_draws, prior_draws
-from soilml.traction.soil_draws import systematic_resampling
 
 
 @pytest.fixture
@@ -19,18 +17,6 @@ def free(model_file):
 def fractions(free, values):
     low, high = (np.asarray([getattr(f.prior, end) for f in free]) for end in ("lower", "upper"))
     return (values - low) / (high - low)
-
-
-def test_a_sample_is_drawn_as_often_as_its_weight_says():
-    rng = np.random.default_rng(1)
-    weights = rng.random(500) ** 4
-    weights /= weights.sum()
-    times = np.bincount(
-        systematic_resampling(ImportanceSample(np.zeros((500, 1)), weights, 0.0), 900, rng)
-    )
-    times = np.pad(times, (0, 500 - len(times)))
-    assert times.sum() == 900
-    assert (np.abs(times - 900 * weights) < 1.0).all()
 
 
 def test_the_prior_is_drawn_evenly(free):

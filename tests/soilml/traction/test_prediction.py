@@ -6,12 +6,12 @@ import pytest
 from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_case
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.traction import SoilDraws, prior_draws, quantile_band, traction
-from soilml.traction.by_load import asked_slips, driven_loads, predictions_by_load
-from soilml.traction.messages import DrivenRange
+from soilml.traction import SoilDraws, predict_traction, prior_draws, quantile_band
+from soilml.traction.by_load import measured_loads, predictions_by_load, slip_grid
+from soilml.traction.messages import MeasuredRange
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
-EVERYWHERE = DrivenRange((0.0, 0.99), (1.0, 1e4))
+EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 
 
@@ -28,10 +28,10 @@ def with_effect(case, effect):
     return Case(case.model + effect, case.soil, case.prior, case.noise)
 
 
-def test_on_the_slope_found_the_wheel_pulls_its_part_of_the_load(case):
+def test_on_the_climbed_slope_the_pull_equals_the_component_of_the_load(case):
     rng = np.random.default_rng(3)
     draws = soils(*zip(*[p.at(rng.random(50)) for p in case.prior.values()], strict=True))
-    found = traction(case, draws, 80.0, SLIPS)
+    found = predict_traction(case, draws, 80.0, SLIPS)
     soil = draws.of(case, np.arange(50)[:, None])
     at = Operating(slip=SLIPS, load=80.0 * np.cos(found.slope))
     pull = soil.model(soil.soil, at).drawbar_pull
@@ -40,27 +40,29 @@ def test_on_the_slope_found_the_wheel_pulls_its_part_of_the_load(case):
 
 
 def test_on_sand_without_cohesion_no_slope_is_steeper_than_its_friction_angle(case):
-    found = traction(case, soils((0.0, 0.5, 0.01), (0.0, 0.7, 0.01)), 20.0, SLIPS)
-    assert (found.steepest < [0.5, 0.7]).all()
-    assert found.steepest[1] > found.steepest[0]
+    found = predict_traction(case, soils((0.0, 0.5, 0.01), (0.0, 0.7, 0.01)), 20.0, SLIPS)
+    assert (found.steepest_slope < [0.5, 0.7]).all()
+    assert found.steepest_slope[1] > found.steepest_slope[0]
 
 
 def test_a_heavier_wheel_pulls_more_and_climbs_less(case):
-    light, heavy = (traction(case, soils((900.0, 0.6, 0.012)), w, SLIPS) for w in (40.0, 120.0))
+    light, heavy = (
+        predict_traction(case, soils((900.0, 0.6, 0.012)), w, SLIPS) for w in (40.0, 120.0)
+    )
     assert heavy.largest_pull > light.largest_pull
-    assert heavy.steepest < light.steepest
+    assert heavy.steepest_slope < light.steepest_slope
 
 
-def test_a_light_wheel_on_sticky_soil_climbs_walls_which_is_doubted(case):
+def test_a_light_wheel_on_sticky_soil_climbs_walls_with_a_warning(case):
     sticky = soils((2e4, 0.7, 0.002))
     (one,) = predictions_by_load(case, sticky, sticky, [5.0], SLIPS, EVERYWHERE)
-    assert one.known.steepest[0] == pytest.approx(1.5)
-    assert any("vehicles tip before" in text for text in one.warnings)
+    assert one.posterior.steepest_slope[0] == pytest.approx(1.5)
+    assert any("vehicles overturn" in text for text in one.warnings)
 
 
 def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
     one = (900.0, 0.6, 0.012)
-    found = quantile_band(traction(case, soils(one, one, one), 60.0, SLIPS).pull)
+    found = quantile_band(predict_traction(case, soils(one, one, one), 60.0, SLIPS).pull)
     true = case.with_values(dict(zip(NAMES, one, strict=True)))
     pull = true.model(true.soil, Operating(slip=SLIPS, load=60.0)).drawbar_pull
     for part in (found.lower, found.middle, found.upper):
@@ -69,33 +71,33 @@ def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
 
 def test_effects_of_the_soil_count_and_those_of_rig_and_sensors_do_not(case):
     one = soils((900.0, 0.6, 0.012))
-    plain = traction(case, one, 60.0, SLIPS)
+    plain = predict_traction(case, one, 60.0, SLIPS)
     for effect in (DrawbarOffset(offset=3.0), LoadTransfer(offset=20.0)):
         seen = with_effect(case, effect)
-        np.testing.assert_array_equal(traction(seen, one, 60.0, SLIPS).pull, plain.pull)
-    digging = traction(with_effect(case, SlipSinkage(n1=0.4)), one, 60.0, SLIPS)
+        np.testing.assert_array_equal(predict_traction(seen, one, 60.0, SLIPS).pull, plain.pull)
+    digging = predict_traction(with_effect(case, SlipSinkage(n1=0.4)), one, 60.0, SLIPS)
     assert (np.abs(digging.pull - plain.pull) > 0.1).all()
 
 
 def test_the_best_slip_is_inside_where_digging_costs_more_than_slip_brings(case):
     digging = with_effect(case, SlipSinkage(n1=1.5))
     slips = np.linspace(0.05, 0.9, 18)
-    found = traction(digging, soils((900.0, 0.6, 0.012)), 60.0, slips)
+    found = predict_traction(digging, soils((900.0, 0.6, 0.012)), 60.0, slips)
     i = int(np.argmax(found.pull[0]))
-    assert 0 < i < 17 and found.best_slip[0] == slips[i] and found.rising == 0.0
+    assert 0 < i < 17 and found.best_slip[0] == slips[i] and found.rising_fraction == 0.0
     assert found.largest_pull[0] == found.pull[0, i]
 
 
-def test_the_prior_alone_is_said_to_tell_nothing(case):
+def test_draws_of_the_prior_are_reported_as_not_identified(case):
     before = prior_draws([free_of(case, name) for name in NAMES], 60)
     (one,) = predictions_by_load(case, before, before, [60.0], SLIPS, EVERYWHERE)
-    assert one.left == (1.0, 1.0)
-    assert sum("is not known" in text for text in one.warnings) == 2
+    assert one.remaining_fraction == (1.0, 1.0)
+    assert sum("is not identified" in text for text in one.warnings) == 2
     (sure,) = predictions_by_load(
         case, soils((900.0, 0.6, 0.012)), before, [60.0], SLIPS, EVERYWHERE
     )
-    assert sure.left == (0.0, 0.0)
-    assert not any("known" in text for text in sure.warnings)
+    assert sure.remaining_fraction == (0.0, 0.0)
+    assert not any("identified" in text for text in sure.warnings)
 
 
 def free_of(case, name):
@@ -104,15 +106,20 @@ def free_of(case, name):
     return select_free(case, [name])[0]
 
 
-def test_what_was_not_driven_is_said(case):
+def test_extrapolation_is_reported(case):
     one = soils((900.0, 0.6, 0.012))
-    driven = DrivenRange((0.3, 0.35), (50.0, 60.0))
-    (far,) = predictions_by_load(case, one, one, [120.0], SLIPS, driven)
+    measured = MeasuredRange((0.3, 0.35), (50.0, 60.0))
+    (far,) = predictions_by_load(case, one, one, [120.0], SLIPS, measured)
     text = " ".join(far.warnings)
-    for said in ("no slip above 0.35", "no slip below 0.3", "no load above 60 N", "asked is 120 N"):
+    for said in (
+        "no slip above 0.35",
+        "no slip below 0.3",
+        "no load above 60 N",
+        "predicted is 120 N",
+    ):
         assert said in text
-    (near,) = predictions_by_load(case, one, one, [55.0], np.asarray([0.3, 0.4]), driven)
-    assert not any("was driven" in said for said in near.warnings)
+    (near,) = predictions_by_load(case, one, one, [55.0], np.asarray([0.3, 0.4]), measured)
+    assert not any("was measured" in said for said in near.warnings)
 
 
 def test_a_load_that_the_soil_does_not_carry_is_refused_with_what_it_carries(case):
@@ -126,21 +133,21 @@ def test_a_load_that_the_soil_does_not_carry_is_refused_with_what_it_carries(cas
 def test_soils_that_do_not_carry_the_load_are_left_out_and_counted(case):
     draws = SoilDraws(("kphi",), np.asarray([[1.5e6], [1.5e6], [1e4]]))
     (one,) = predictions_by_load(case, draws, draws, [60.0], SLIPS, EVERYWHERE)
-    assert one.known.sunk == pytest.approx(1 / 3)
+    assert one.posterior.failed_fraction == pytest.approx(1 / 3)
     assert any("do not carry 60 N" in text for text in one.warnings)
-    assert np.isfinite(quantile_band(one.known.pull).lower).all()
-    assert np.isnan(one.known.steepest[2]) and np.isnan(one.known.best_slip[2])
+    assert np.isfinite(quantile_band(one.posterior.pull).lower).all()
+    assert np.isnan(one.posterior.steepest_slope[2]) and np.isnan(one.posterior.best_slip[2])
 
 
-def test_loads_of_rows_that_are_alike_are_one():
-    found = driven_loads(np.asarray([61.0, 30.0, 59.0, 31.0]))
+def test_almost_equal_loads_count_as_one():
+    found = measured_loads(np.asarray([61.0, 30.0, 59.0, 31.0]))
     assert found == pytest.approx([30.5, 60.0])
-    assert driven_loads(np.asarray([10.0, 20.0, 40.0, 80.0, 160.0])) == [10.0, 40.0, 160.0]
+    assert measured_loads(np.asarray([10.0, 20.0, 40.0, 80.0, 160.0])) == [10.0, 40.0, 160.0]
 
 
-def test_slips_end_where_asked():
-    assert asked_slips(0.3, EVERYWHERE)[-1] == 0.3
-    assert asked_slips(None, DrivenRange((0.1, 0.2), (1.0, 2.0)))[-1] == 0.6
+def test_slips_end_at_the_limit():
+    assert slip_grid(0.3, EVERYWHERE)[-1] == 0.3
+    assert slip_grid(None, MeasuredRange((0.1, 0.2), (1.0, 2.0)))[-1] == 0.6
     for limit in (0.0, 1.0, -0.2, float("nan")):
         with pytest.raises(InputError, match="between 0 and 1"):
-            asked_slips(limit, EVERYWHERE)
+            slip_grid(limit, EVERYWHERE)

@@ -26,6 +26,6 @@ def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(cas
         columns |= {"torque_Nm": force.torque, "sinkage_m": force.sinkage}
         found[name] = pull_report(case, Table(columns), loads=[60.0], slip_limit=0.5)
     same, digging = found["same"], found["digging"]
-    assert not any("lacks something" in text for text in same.warnings)
-    assert any("lacks something" in text for text in digging.warnings)
-    assert digging.by_load[0].left[0] > 2.0 * same.by_load[0].left[0]
+    assert not any("lacks an effect" in text for text in same.warnings)
+    assert any("lacks an effect" in text for text in digging.warnings)
+    assert digging.by_load[0].remaining_fraction[0] > 2.0 * same.by_load[0].remaining_fraction[0]

@@ -117,7 +117,7 @@ def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
     """One row: likelihood at the truth over its mean on a lattice of the whole prior."""
     from soilml.identification.free_parameters import select_free
     from soilml.identification.observations import read_observations
-    from soilml.identification.predictions import predicted
+    from soilml.identification.predictions import predict_channels
 
     job = benchmark_sets(recipe, SHEAR, 1)[0]
     data = read_observations(recipe.case, select_channels(job.table, ["torque"]))
@@ -125,7 +125,7 @@ def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
     side = (np.arange(24) + 0.5) / 24
     u = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
     truth = [f.prior.fraction(t) for f, t in zip(free, job.truth, strict=True)]
-    y = predicted(recipe.case, free, np.vstack([truth, u]), data.at)["torque"][:, 0]
+    y = predict_channels(recipe.case, free, np.vstack([truth, u]), data.at)["torque"][:, 0]
     std = 0.02 * y
     density = np.exp(-0.5 * ((job.table["torque_Nm"][0] - y) / std) ** 2) / std
     found = exact_posterior(recipe.case, job.table, job.truth, SHEAR).log_density

@@ -95,9 +95,9 @@ def sample_posterior(
         quantiles=sample.quantiles(values, np.asarray(FRACTIONS)),
         log_density=float(log_density[0]) - sample.evidence,
         hpd_level=float(np.mean(log_density[1:] > log_density[0])),
-        flagged=sample.effective < MIN_EFFECTIVE_SAMPLES,
+        flagged=sample.effective_size < MIN_EFFECTIVE_SAMPLES,
         rank=sample.weights @ (values < true_values),
-        effective_samples=sample.effective,
+        effective_samples=sample.effective_size,
         log_evidence=sample.evidence,
     )
     return summary, sample

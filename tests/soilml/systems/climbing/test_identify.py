@@ -36,7 +36,7 @@ def test_the_shear_modulus_of_given_sand_is_found(true, climbs):
     assert ground.fit.names == ("shear_modulus",)
     error = ground.fit["shear_modulus"] - true.shear[2]
     assert abs(error) < 3.0 * ground.fit.std[0] < 0.003
-    assert ground.fit.left["shear_modulus"] < 0.1
+    assert ground.fit.remaining_fraction["shear_modulus"] < 0.1
     assert np.all(ground.samples[:, 0] == 0.0)
 
 
@@ -50,7 +50,7 @@ def test_friction_and_shear_modulus_trade_for_one_another(true, climbs):
 
 def test_cohesion_that_slopes_do_not_show_is_said_not_to_be_identified(true, climbs):
     ground = identify_ground(true.rover, climbs)
-    assert ground.fit.left["cohesion"] > 0.8
+    assert ground.fit.remaining_fraction["cohesion"] > 0.8
     assert any("cohesion is not identified" in text for text in ground.fit.warnings)
 
 

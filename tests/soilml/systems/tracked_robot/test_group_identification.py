@@ -50,7 +50,7 @@ def test_pull_at_one_load_finds_friction_and_modulus_and_not_cohesion(groups):
         and groups.remaining_fraction["shear_modulus"] < 0.5
     )
     cohesion = groups.names.index("cohesion")
-    assert groups.pooled.left["cohesion"] > 0.9
+    assert groups.pooled.remaining_fraction["cohesion"] > 0.9
     # the average of what is not told is as wide as the prior
     assert groups.std[cohesion] > 0.7 * PRIOR["cohesion"].std
 

@@ -15,11 +15,11 @@ from soilml.numerics.prior import Prior
 
 
 def line(count, seed=0):
-    """A belief of one parameter, uniform from 0 to 1."""
+    """Samples of one parameter, uniform from 0 to 1."""
     return samples_of_prior([FreeParameter("a", "1", Prior(0.0, 1.0), 0.5, False)], count, seed)
 
 
-def read(belief, y, std):
+def read(samples, y, std):
     """One channel at one point that reads y (n,) with a noise of std."""
     at = Operating(slip=np.zeros(1), load=np.ones(1))
     shape = (1, 1, len(y))
@@ -27,19 +27,21 @@ def read(belief, y, std):
     return PredictedReadings(at, ("torque",), y.reshape(shape), noise, np.ones(1, dtype=bool))
 
 
-def left(belief, y, std, count=256, seed=1):
-    soils = expected_variance(belief, 1, count, seed)
-    return np.sqrt(soils.remaining(soils.logs(read(belief, y, std), ("torque",), 0)))[0]
+def remaining_fraction(samples, y, std, count=256, seed=1):
+    outcomes = expected_variance(samples, 1, count, seed)
+    return np.sqrt(
+        outcomes.remaining_variance(outcomes.log_likelihood(read(samples, y, std), ("torque",), 0))
+    )[0]
 
 
-def integrated(f, std, places=800):
+def integrated(f, std, points=800):
     """Root expected posterior variance over the prior's of a uniform parameter, by quadrature."""
-    x = (np.arange(places) + 0.5) / places
+    x = (np.arange(points) + 0.5) / points
     y = np.linspace(f(x).min() - 6 * std, f(x).max() + 6 * std, 1500)
     likelihood = np.exp(-0.5 * ((y[:, None] - f(x)) / std) ** 2)
     evidence = likelihood.mean(axis=1)
-    mean = likelihood @ x / places / evidence
-    variance = likelihood @ x**2 / places / evidence - mean**2
+    mean = likelihood @ x / points / evidence
+    variance = likelihood @ x**2 / points / evidence - mean**2
     return np.sqrt(np.sum(evidence * variance) / np.sum(evidence) * 12.0)
 
 
@@ -48,26 +50,30 @@ def test_one_parameter_is_left_as_wide_as_quadrature_says(std):
     def bent(x):
         return (2.0 * x - 0.6) ** 2  # two values of x give one reading
 
-    belief = line(1500)
-    found = np.mean([left(belief, bent(belief.u[:, 0]), std, seed=k) for k in range(8)])
+    samples = line(1500)
+    found = np.mean(
+        [remaining_fraction(samples, bent(samples.u[:, 0]), std, seed=k) for k in range(8)]
+    )
     assert found == pytest.approx(integrated(bent, std), rel=0.04)
 
 
 def test_noise_far_below_the_distance_of_samples_does_not_claim_certainty():
-    belief = line(60)
-    found = np.mean([left(line(60, k), line(60, k).u[:, 0], 1e-4, seed=k) for k in range(8)])
+    samples = line(60)
+    found = np.mean(
+        [remaining_fraction(line(60, k), line(60, k).u[:, 0], 1e-4, seed=k) for k in range(8)]
+    )
     assert 0.5 / 60 < found < 5.0 / 60  # the distance of samples; far above the noise, 3.5e-4
-    assert belief.left[0] == pytest.approx(1.0, abs=0.01)
+    assert samples.remaining_fraction[0] == pytest.approx(1.0, abs=0.01)
 
 
-def test_a_wheel_that_is_stuck_tells_on_which_soils_it_is():
-    belief = line(1000)
-    u = belief.u[:, 0]
+def test_a_wheel_that_is_stuck_tells_on_which_outcomes_it_is():
+    samples = line(1000)
+    u = samples.u[:, 0]
     blind = np.where(u < 0.3, np.nan, 0.0)  # it reads nothing else
     expected = np.sqrt(0.3 * 0.3**2 + 0.7 * 0.7**2)  # two uniform parts
-    assert left(belief, blind, 1.0) == pytest.approx(expected, rel=0.05)
+    assert remaining_fraction(samples, blind, 1.0) == pytest.approx(expected, rel=0.05)
     lone = np.where(u == u.min(), np.nan, 0.0)
-    assert left(belief, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
+    assert remaining_fraction(samples, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_gaussian_is_left_as_its_precisions_add():
@@ -75,19 +81,25 @@ def test_a_gaussian_is_left_as_its_precisions_add():
     prior = Prior(0.0, 1.0)
     u = np.clip(0.5 + 0.05 * rng.standard_normal(4000), 0.0, 1.0)[:, None]
     weights = rng.random(4000)
-    belief = ParameterSamples(
+    samples = ParameterSamples(
         (FreeParameter("a", "1", prior, 0.5, False),), u, weights / weights.sum()
     )
-    expected = belief.left[0] / np.sqrt(2.0)  # a reading as sharp as what is believed
-    sharp = belief.left[0] * prior.std
-    found = np.mean([left(belief, u[:, 0], sharp, seed=k) for k in range(6)])
+    expected = samples.remaining_fraction[0] / np.sqrt(2.0)  # a reading as sharp as the samples
+    sharp = samples.remaining_fraction[0] * prior.std
+    found = np.mean([remaining_fraction(samples, u[:, 0], sharp, seed=k) for k in range(6)])
     assert found == pytest.approx(expected, rel=0.03)
 
 
 def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
-    belief = line(800)
-    found = [left(belief, belief.u[:, 0], std) for std in (1e3, 1.0, 0.3, 0.1, 0.03, 0.01)]
-    assert found[0] == pytest.approx(belief.left[0], rel=0.02) and found[0] <= belief.left[0]
+    samples = line(800)
+    found = [
+        remaining_fraction(samples, samples.u[:, 0], std)
+        for std in (1e3, 1.0, 0.3, 0.1, 0.03, 0.01)
+    ]
+    assert (
+        found[0] == pytest.approx(samples.remaining_fraction[0], rel=0.02)
+        and found[0] <= samples.remaining_fraction[0]
+    )
     assert (np.diff(found) < 0).all()
 
 
@@ -98,9 +110,15 @@ def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
     at = Operating(slip=np.asarray([0.05, 0.3, 0.6]), load=np.asarray([120.0, 60.0, 30.0]))
     found = np.zeros((3, 3))
     for seed in range(4):
-        belief = samples_of_prior(free, 1000, seed)
-        ahead, soils = predicted_readings(case, belief, at), expected_variance(belief, 1, 400, seed)
-        found += [soils.remaining(soils.logs(ahead, ("torque",), k)) / 4 for k in range(3)]
+        samples = samples_of_prior(free, 1000, seed)
+        ahead, outcomes = (
+            predicted_readings(case, samples, at),
+            expected_variance(samples, 1, 400, seed),
+        )
+        found += [
+            outcomes.remaining_variance(outcomes.log_likelihood(ahead, ("torque",), k)) / 4
+            for k in range(3)
+        ]
     many = samples_of_prior(free, 20000, seed=7)
     y = predicted_readings(case, many, at).y[0]
     rng = np.random.default_rng(8)
@@ -110,8 +128,8 @@ def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
             std = 0.02 * y[k]
             reading = y[k][j] + std[j] * rng.standard_normal()
             weight = np.exp(-0.5 * ((reading - y[k]) / std) ** 2) / std
-            mean = weight @ many.shares / weight.sum()
-            variance.append(weight @ many.shares**2 / weight.sum() - mean**2)
+            mean = weight @ many.standardised / weight.sum()
+            variance.append(weight @ many.standardised**2 / weight.sum() - mean**2)
         np.testing.assert_allclose(
             np.sqrt(found[k]), np.sqrt(np.mean(variance, axis=0)), atol=0.045
         )
@@ -120,11 +138,11 @@ def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
 def test_noise_of_slip_makes_a_row_tell_less(model_file):
     case = read_case(model_file)
     shaky = replace(case, noise=case.noise | {"slip": Noise(constant=0.05)})
-    belief = samples_of_prior(select_free(case, None), 400)
+    samples = samples_of_prior(select_free(case, None), 400)
     at = Operating(slip=np.asarray([0.05]), load=np.asarray([60.0]))
     steep = [
-        (soils := expected_variance(belief, 1)).remaining(
-            soils.logs(predicted_readings(c, belief, at), ("torque",), 0)
+        (outcomes := expected_variance(samples, 1)).remaining_variance(
+            outcomes.log_likelihood(predicted_readings(c, samples, at), ("torque",), 0)
         )
         for c in (case, shaky)
     ]
