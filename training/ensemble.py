@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES, best_linear, shrunk
+from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES, best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
 from training.data.dataset import Dataset
 from training.onnx_graph.builder import Graph
@@ -59,7 +59,9 @@ def fuse_members(members: list[CalibratedRegressor], rule: str, data: Dataset) -
     z = error / np.stack([s for _, s in predictions])
     rmse = np.sqrt(np.mean(error**2, axis=1))
     m, _, q = error.shape
-    correlation = np.stack([shrunk(np.corrcoef(z[:, :, k]).reshape(m, m)) for k in range(q)])
+    correlation = np.stack(
+        [shrink_correlation(np.corrcoef(z[:, :, k]).reshape(m, m)) for k in range(q)]
+    )
     weights = np.stack(
         [best_linear(rmse[:, k], rmse[:, k], correlation[k]).weights for k in range(q)],
         axis=1,

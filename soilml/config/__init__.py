@@ -1,1 +1,1 @@
-"""What a model file holds: the case, its priors and the measurement noise."""
+"""Model files: the case, its priors and the measurement noise."""

@@ -1,4 +1,4 @@
-"""A case: gear, soil, what is known of them beforehand, and the sensors; a model file."""
+"""A case: gear, effects, soil, priors and sensor noise, as in a model file."""
 
 from __future__ import annotations
 
@@ -22,9 +22,18 @@ from soilml.quantities import COLUMNS
 
 @dataclass(frozen=True)
 class Case:
-    """A model on a soil, with priors by parameter path and sensor noise by column.
+    """A model on a soil, with priors and sensor noise.
 
-    Paths are those of `parameters()`: `cohesion`, `kphi`, `gear.radius`, `slip-sinkage.n1`.
+    Attributes
+    ----------
+    model
+        Gear and effects.
+    soil
+        Soil parameters.
+    prior
+        Priors by the paths of `parameters()`: `cohesion`, `kphi`, `slip-sinkage.n1`.
+    noise
+        Noise of the sensors by column name: `torque_Nm`, `slip`.
     """
 
     model: Model
@@ -61,9 +70,46 @@ class Case:
 
 
 def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
-    """The case in a TOML file; raises `InputError` naming file, table and key.
+    """Read a case from a TOML model file.
 
-    `effects` are those that [[effect]] may name.
+    Parameters
+    ----------
+    path
+        The file: tables [gear], [soil] with [soil.prior], [[effect]] and [noise].
+    effects
+        Effects that [[effect]] may name; those of the catalogue by default.
+
+    Returns
+    -------
+    Case
+
+    Raises
+    ------
+    InputError
+        Names file, table and key of what is missing, unknown or out of bounds.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> text = '''
+    ... [gear]
+    ... type = "wheel"
+    ... radius = 0.15
+    ... width = 0.12
+    ... [soil]
+    ... name = "wong1989/dry_sand"
+    ... [soil.prior]
+    ... friction_angle = [0.4, 0.8]
+    ... [noise]
+    ... torque_Nm = "2 %"
+    ... '''
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "model.toml"
+    ...     _ = path.write_text(text)
+    ...     case = read_case(path)
+    >>> print(case.model.gear.name, case.prior["friction_angle"], case.noise["torque_Nm"].share)
+    wheel Prior(lower=0.4, upper=0.8, log=False) 0.02
     """
     settings = read_settings(path)
     case = take_case(settings, effects)
@@ -72,14 +118,14 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
 
 
 def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
-    """Read [gear], [soil], [[effect]] and [noise], leaving other keys to the caller."""
+    """The case in the tables [gear], [soil], [[effect]] and [noise]; others are left unread."""
     gear_settings = settings.table("gear")
     kind = gear_settings.text("type")
     if kind not in GEARS:
         gear_settings.fail(f"type is {kind!r}; there are: {', '.join(GEARS)}")
     gear = _filled(GEARS[kind], gear_settings)
     gear_settings.finish()
-    the_soil, prior = _take_soil(settings.table("soil"))
+    own_soil, prior = _take_soil(settings.table("soil"))
     model = Model(gear)
     for entry in settings.tables("effect"):
         name = entry.text("name")
@@ -99,7 +145,7 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         if key in noise_settings:
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
-    return Case(model=model, soil=the_soil, prior=prior, noise=noise)
+    return Case(model=model, soil=own_soil, prior=prior, noise=noise)
 
 
 def _filled(cls: type, settings: Settings) -> Any:

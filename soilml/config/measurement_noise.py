@@ -1,4 +1,4 @@
-"""How far a sensor's reading strays."""
+"""Measurement noise: absolute, relative, or both."""
 
 from __future__ import annotations
 
@@ -14,13 +14,21 @@ from soilml.io.toml_settings import Settings
 
 @dataclass(frozen=True)
 class Noise:
-    """One standard deviation: a constant in the column's unit, a share of the reading, or both."""
+    """Standard deviation of a sensor, from an absolute and a relative part in quadrature.
+
+    Attributes
+    ----------
+    constant
+        Absolute part, in the unit of the column.
+    share
+        Relative part, as a fraction of the reading.
+    """
 
     constant: float = 0.0
     share: float = 0.0
 
     def std(self, reading: Any) -> Any:
-        """Standard deviation at these readings, in their unit."""
+        """Standard deviation (...) at readings (...), in their unit."""
         return np.hypot(self.constant, self.share * np.abs(reading))
 
     def as_setting(self) -> Any:
@@ -50,5 +58,5 @@ def take_noise(settings: Settings, key: str) -> Noise:
         settings.fail(f"{key} is {value!r}; needed is {needed}")
     size = noise.constant + noise.share
     if not (math.isfinite(size) and noise.constant >= 0 and noise.share >= 0 and size > 0):
-        settings.fail(f"{key} is {value!r}; a standard deviation must be above zero")
+        settings.fail(f"{key} is {value!r}; a standard deviation must be positive")
     return noise

@@ -25,5 +25,5 @@ def take_prior(settings: Settings, key: str) -> Prior:
         settings.fail(f"{key} is {value!r}; needed is {needed} with lower below upper")
     lower, upper = float(value[0]), float(value[1])
     if log and lower <= 0.0:
-        settings.fail(f"{key}: a logarithmic range must lie above zero, it begins at {lower:g}")
+        settings.fail(f"{key}: a logarithmic range must be positive, it begins at {lower:g}")
     return Prior(lower, upper, log)

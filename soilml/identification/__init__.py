@@ -85,7 +85,7 @@ def identify(
     >>> rows = Table({"slip": slip, "load_N": load, "torque_Nm": torque})
     >>> fit = identify(case, rows)
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
-    0.487 +- 0.010 rad
+    0.489 +- 0.006 rad
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")

@@ -68,7 +68,9 @@ def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     closed = LinearWheel(radius=gear.radius, width=gear.width)
     case = replace(case, model=replace(case.model, gear=closed))
     if data.reading_count < 3:
-        raise FitError(f"{data.reading_count} readings: the Newton-Raphson method needs three")
+        raise FitError(
+            f"{data.reading_count} readings: the Newton-Raphson method needs three or more"
+        )
     return with_fixed_parameter(case, "cohesion", lambda c: _solve(c, data, free))
 
 
@@ -127,8 +129,8 @@ def _minimise(linearised: Linearised, u: Floats) -> tuple[Floats, Floats, Floats
     for _ in range(STEPS):
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             raise FitError("Newton-Raphson left the range in which the wheel is carried")
-        step = np.linalg.lstsq(jacobian, -residual, rcond=1e-14)[0]
-        lower = _line_search(linearised, u, step, residual @ residual)
+        step = np.asarray(np.linalg.lstsq(jacobian, -residual, rcond=1e-14)[0], dtype=np.float64)
+        lower = _line_search(linearised, u, step, float(residual @ residual))
         if lower is None:
             if np.abs(step).max() > STALLED:
                 raise FitError(

@@ -211,7 +211,7 @@ class _LogDensity:
         if self.input_std is None:
             squares = np.nan_to_num(((y - self.reading) / std) ** 2, nan=np.inf).sum(axis=1)
             self.input_std = self._propagated(u[int(np.argmin(squares))])
-        return y, np.hypot(std, self.input_std)
+        return y, np.asarray(np.hypot(std, self.input_std))
 
     def _propagated(self, u: Floats) -> Floats:
         data = self.data

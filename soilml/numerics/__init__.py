@@ -1,1 +1,1 @@
-"""Mathematics that knows no soil: roots, quadrature, sampling, fusion of estimates."""
+"""Numerical methods without soil mechanics: roots, quadrature, sampling, fusion of estimates."""

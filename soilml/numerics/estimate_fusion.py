@@ -1,11 +1,12 @@
-"""Joining several estimates of one quantity into one.
+"""Fusion of several estimates of one quantity.
 
-Which rule is right depends on where the errors come from. Estimates from different sensors or
-different times err independently: weigh them by inverse variance. Regressors that read the same
-measurement err together (their residuals correlate by 0.8 and more): weighing them so claims far
-too much, and a rule that knows their correlation, or assumes the worst of it, is needed.
+The rule depends on the correlation of the errors. Estimates from different sensors or times have
+independent errors: inverse-variance weights are optimal. Regressors of the same measurement have
+correlated errors (0.8 and more): inverse-variance weights then understate the variance by far, and
+a rule that uses the correlation, or holds for any, is needed.
 
-All rules take `mean` and `std` of shape (m, ...), m estimators first, and return `FusedEstimate`.
+All rules take `mean` and `std` of shape (m, ...) for m estimators and return a `FusedEstimate`.
+They raise `InputError` for a standard deviation that is not positive.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from soilml.errors import InputError
 Floats = NDArray[np.float64]
 
 
-#: Keeps the correlation matrix of two estimators that are one and the same invertible.
-TWIN = 1e-9
+#: Ridge that keeps the correlation matrix of two equal estimators invertible.
+RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,11 +37,22 @@ class FusedEstimate:
 
 
 def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
-    r"""Weights 1 / sigma^2: right, and optimal, for independent errors alone.
+    r"""Inverse-variance weights, optimal for independent errors.
 
     .. math:: w_i = \sigma_i^{-2} / \sum_j \sigma_j^{-2}, \quad \sigma^2 = 1 / \sum_j \sigma_j^{-2}
 
-    References: Comin and Saaj 2017, eq. 26, for two.
+    Not for correlated errors, whose variance it understates.
+
+    Parameters
+    ----------
+    mean, std
+        Estimates and standard deviations (m, ...).
+    correlation
+        Not used.
+
+    References
+    ----------
+    Comin and Saaj 2017, eq. 26, for two.
     """
     _check(std)
     information = std**-2.0
@@ -49,12 +61,16 @@ def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = Non
 
 
 def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
-    r"""Mean of the two-sensor weights over all partners.
+    r"""Mean of the two-sensor weights over all pairs.
 
     .. math:: w_i = \frac{2}{m (m-1)} \sum_{j \ne i} \frac{\sigma_j^2}{\sigma_i^2 + \sigma_j^2}
 
-    References: Comin and Saaj 2017, eq. 30, for three. Heuristic: not optimal even for independent
-    errors, but less hostage to one understated variance.
+    A heuristic: not optimal even for independent errors, but less sensitive to one understated
+    variance. Not for correlated errors.
+
+    References
+    ----------
+    Comin and Saaj 2017, eq. 30, for three.
     """
     _check(std)
     m = len(mean)
@@ -71,14 +87,25 @@ def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> Fu
 
 
 def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) -> FusedEstimate:
-    r"""Non-negative best linear unbiased combination under the errors' correlation (m, m).
+    r"""Best linear unbiased combination with non-negative weights.
 
     .. math:: \min_w w^T S w, \quad S = D R D, \quad \sum_i w_i = 1, \quad w_i \ge 0
 
-    exactly, by looking at every subset of estimators: the unconstrained optimum over one of them,
-    where its weights are positive, is the optimum. Negative weights, which collinear estimators
-    ask for, trade on differences that are mostly noise. References: Bates and Granger, J. Oper.
-    Res. Soc. 20(4), 1969. For up to five or six estimators.
+    solved exactly by enumeration of the active sets: among the subsets of estimators whose
+    unconstrained optimum has non-negative weights, that of least variance. Negative weights, which
+    nearly collinear estimators would have, amplify differences that are mostly noise. The effort
+    grows as 2^m: for up to six estimators.
+
+    Parameters
+    ----------
+    mean, std
+        Estimates and standard deviations (m, ...).
+    correlation
+        Correlation R (m, m) of the errors; the identity by default.
+
+    References
+    ----------
+    Bates and Granger, J. Oper. Res. Soc. 20(4), 1969.
     """
     _check(std)
     m = len(mean)
@@ -86,7 +113,7 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     best_variance = np.full(std.shape[1:], np.inf)
     best_weights = np.zeros_like(std)
     for subset in _subsets(m):
-        inverse = np.linalg.inv(R[np.ix_(subset, subset)] + TWIN * np.eye(len(subset)))
+        inverse = np.linalg.inv(R[np.ix_(subset, subset)] + RIDGE * np.eye(len(subset)))
         scaled = np.zeros_like(std)
         for i, row in zip(subset, inverse, strict=True):
             scaled[i] = sum(x / std[j] for x, j in zip(row, subset, strict=True)) / std[i]
@@ -105,12 +132,16 @@ def _subsets(m: int) -> list[tuple[int, ...]]:
 def covariance_intersection(
     mean: Floats, std: Floats, correlation: Floats | None = None
 ) -> FusedEstimate:
-    r"""Equal shares of information: consistent whatever the correlation, never overconfident.
+    r"""Covariance intersection with equal weights: consistent for any correlation of the errors.
 
     .. math:: \sigma^{-2} = \frac{1}{m} \sum_i \sigma_i^{-2}, \quad
         w_i = \sigma_i^{-2} / \sum_j \sigma_j^{-2}
 
-    References: Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
+    Conservative: for independent errors the variance is m times the optimal one.
+
+    References
+    ----------
+    Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
     """
     _check(std)
     information = std**-2.0
@@ -119,15 +150,17 @@ def covariance_intersection(
 
 
 def _check(std: Floats) -> None:
-    """Raise `InputError` for an estimate that claims to be certain: no other has a weight then."""
+    """Raise `InputError` unless all standard deviations are positive."""
     if not bool(np.all(std > 0.0)):
-        raise InputError(f"a standard deviation is {np.min(std):g}; needed is a number above 0")
+        raise InputError(f"a standard deviation is {np.min(std):g}; it must be positive")
 
 
-def shrunk(correlation: Floats, share: float = 0.1) -> Floats:
-    """A correlation matrix drawn towards one in which all pairs correlate alike.
+def shrink_correlation(correlation: Floats, share: float = 0.1) -> Floats:
+    """A correlation matrix (m, m) shrunk by `share` towards its constant-correlation target.
 
-    References: Ledoit and Wolf, J. Portfolio Management 30(4), 2004 (constant correlation).
+    References
+    ----------
+    Ledoit and Wolf, J. Portfolio Management 30(4), 2004.
     """
     m = len(correlation)
     if m == 1:
@@ -137,12 +170,12 @@ def shrunk(correlation: Floats, share: float = 0.1) -> Floats:
     return np.asarray((1.0 - share) * correlation + share * target)
 
 
-#: The rule for regressors of the same measurement: it knows how their errors correlate.
+#: Name of the rule for regressors of the same measurement, whose correlation is known.
 BEST_LINEAR = "best-linear"
-#: The rule that holds whatever the correlation of the errors.
+#: Name of the rule for errors of unknown correlation.
 COVARIANCE_INTERSECTION = "covariance-intersection"
 
-#: Rule by the name that a training spec takes.
+#: Rules by their names in a training specification.
 RULES: dict[str, Callable[..., FusedEstimate]] = {
     BEST_LINEAR: best_linear,
     COVARIANCE_INTERSECTION: covariance_intersection,

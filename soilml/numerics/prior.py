@@ -1,4 +1,4 @@
-"""Where a parameter lies before anything is measured."""
+"""Priors: uniform or log-uniform between bounds."""
 
 from __future__ import annotations
 
@@ -14,20 +14,37 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Prior:
-    """Uniform between two bounds, or uniform in the logarithm."""
+    """Uniform distribution between two bounds, of the value or of its logarithm.
+
+    Attributes
+    ----------
+    lower, upper
+        Bounds in the unit of the parameter; positive if `log`.
+    log
+        Whether the logarithm is uniform.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> prior = Prior(0.005, 0.03)
+    >>> print(prior.at(np.asarray([0.0, 0.5, 1.0])))
+    [0.005  0.0175 0.03  ]
+    >>> print(f"{prior.std:.5f}")
+    0.00722
+    """
 
     lower: float
     upper: float
     log: bool = False
 
     def at(self, fraction: Floats) -> Floats:
-        """The values below which these fractions (0 to 1) of the prior lie."""
+        """Quantiles at `fraction` (...), probabilities from 0 to 1."""
         if self.log:
             return np.asarray(self.lower * (self.upper / self.lower) ** fraction)
         return np.asarray(self.lower + (self.upper - self.lower) * fraction)
 
     def fraction(self, value: float) -> float:
-        """The fraction of the prior below a value, kept inside 0 to 1."""
+        """Cumulative probability of a value, from 0 to 1."""
         if self.log:
             below = math.log(max(value, 1e-300) / self.lower) / math.log(self.upper / self.lower)
         else:
@@ -35,7 +52,7 @@ class Prior:
         return min(max(below, 0.0), 1.0)
 
     def rate(self, fraction: Floats) -> Floats:
-        """Derivative of `at`."""
+        """Derivative of `at` by `fraction`, (...)."""
         if self.log:
             return np.asarray(self.at(fraction) * math.log(self.upper / self.lower))
         return np.full_like(fraction, self.upper - self.lower)

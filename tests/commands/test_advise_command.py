@@ -78,7 +78,7 @@ def test_every_candidate_can_be_had_the_best_first(folder, capsys):
         (["model.toml", "--loads", "0"], "load 0 N cannot be driven"),
         (["model.toml", "--loads", "1:100:2000"], "too many to try; at most 1000"),
         (["model.toml", "--loads", "1e6"], "try smaller loads"),
-        (["model.toml", "--loads", "60", "--free", "phi"], "'phi' is no parameter"),
+        (["model.toml", "--loads", "60", "--free", "phi"], "'phi': no such parameter"),
         (["model.toml", "--loads", "60", "--where", "run=a"], "--where selects rows of RUNS.csv"),
         (["model.toml", "none.csv"], "none.csv: there is no such file"),
         (["silent.toml", "--loads", "60"], "declare it in [noise]"),

@@ -111,7 +111,7 @@ OPTIONS = {
     "holdout of no row": (["--holdout", "load_N=61"], "no row has load_N = 61"),
     "holdout of text": (["--holdout", "load_N=x"], "column load_N holds numbers, 'x' is none"),
     "too few runs": (["--holdout", "run"], "needs four runs or more; the table has 2"),
-    "unknown parameter": (["--free", "phi"], "'phi' is no parameter"),
+    "unknown parameter": (["--free", "phi"], "'phi': no such parameter"),
     "checked physics": (["--checked", "bulldozing=1"], "needed is EFFECT=STD, with one of"),
     "checked nonsense": (["--checked", "mood=1"], "needed is EFFECT=STD, with one of"),
     "checked without value": (["--checked", "torque-gain"], "must be a number above zero"),

@@ -147,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
     if advice.excluded_points:
         notes.append(
             f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "
-            "are excluded: a twentieth or more of the posterior samples does not carry the wheel there"
+            "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
         )
     print("\n".join(notes), file=sys.stderr)
     return 0

@@ -11,7 +11,7 @@ from soilml.numerics.estimate_fusion import (
     covariance_intersection,
     inverse_variance,
     pairwise,
-    shrunk,
+    shrink_correlation,
 )
 
 #: Comin and Saaj 2017: variances of torque and vibration, weight of torque. The printed variances
@@ -100,10 +100,10 @@ def test_covariance_intersection_never_claims_too_much():
 
 def test_shrinking_keeps_a_correlation_matrix():
     R = np.asarray([[1.0, 0.99, 0.5], [0.99, 1.0, 0.6], [0.5, 0.6, 1.0]])
-    small = shrunk(R, 0.3)
+    small = shrink_correlation(R, 0.3)
     np.testing.assert_allclose(np.diag(small), 1.0)
     assert np.linalg.eigvalsh(small).min() > np.linalg.eigvalsh(R).min()
-    assert shrunk(np.eye(1)).tolist() == [[1.0]]
+    assert shrink_correlation(np.eye(1)).tolist() == [[1.0]]
 
 
 @pytest.mark.parametrize("rule", RULES.values())
