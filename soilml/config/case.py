@@ -120,10 +120,10 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
 def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
     """The case in the tables [gear], [soil], [[effect]] and [noise]; others are left unread."""
     gear_settings = settings.table("gear")
-    kind = gear_settings.text("type")
-    if kind not in GEARS:
-        gear_settings.fail(f"type is {kind!r}; there are: {', '.join(GEARS)}")
-    gear = _filled(GEARS[kind], gear_settings)
+    gear_type = gear_settings.text("type")
+    if gear_type not in GEARS:
+        gear_settings.fail(f"type is {gear_type!r}; there are: {', '.join(GEARS)}")
+    gear = _instance(GEARS[gear_type], gear_settings)
     gear_settings.finish()
     own_soil, prior = _take_soil(settings.table("soil"))
     model = Model(gear)
@@ -133,7 +133,7 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
             entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
         priors = entry.table("prior")
         try:
-            model = model + _filled(effects[name], entry)
+            model = model + _instance(effects[name], entry)
         except InputError as error:
             entry.fail(str(error).removeprefix(f"{entry.where}: "))
         entry.finish()
@@ -148,16 +148,16 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
     return Case(model=model, soil=own_soil, prior=prior, noise=noise)
 
 
-def _filled(cls: type, settings: Settings) -> Any:
+def _instance(cls: type, settings: Settings) -> Any:
     """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
-    given = {
+    values = {
         f.name: settings.number(f.name)
         for f in fields(cls)
         if f.name in settings or f.default is MISSING
     }
     settings.knows(declared(cls))
     try:
-        made = cls(**given)
+        made = cls(**values)
     except InputError as error:
         settings.fail(str(error))
     check(made, f"{settings.where}: ")
@@ -172,18 +172,18 @@ def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
             base = soil(name)
         except InputError as error:
             settings.fail(str(error))
-        given = {k: settings.number(k) for k in declared(Soil) if k in settings}
+        values = {k: settings.number(k) for k in declared(Soil) if k in settings}
         settings.knows(declared(Soil))
-        made = with_values(base, given)
+        made = with_values(base, values)
         check(made, f"{settings.where}: ")
     else:
-        made = _filled(Soil, settings)
+        made = _instance(Soil, settings)
     settings.finish()
     return made, _take_priors(priors, Soil)
 
 
 def _take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
-    found = {}
+    priors = {}
     settings.knows(declared(cls))
     for key, parameter in declared(cls).items():
         if key in settings:
@@ -193,6 +193,6 @@ def _take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
                     f"{key} is [{prior.lower:g}, {prior.upper:g}]; it must lie between "
                     f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
                 )
-            found[key] = prior
+            priors[key] = prior
     settings.finish()
-    return found
+    return priors

@@ -53,15 +53,15 @@ class FreeParameter:
 
 
 def select_free(case: Case, names: Sequence[str] | None) -> list[FreeParameter]:
-    """The named parameters, or those with a prior; raises `InputError` for an unknown name."""
+    """The named parameters, by default those with a prior; `InputError` for an unknown name."""
     known = case.parameters()
-    wanted = list(case.prior) if names is None else list(dict.fromkeys(names))
-    if not wanted:
+    paths = list(case.prior) if names is None else list(dict.fromkeys(names))
+    if not paths:
         raise InputError(
             "nothing to identify: give [soil.prior] in the model file, or --free cohesion,..."
         )
-    found = []
-    for name in wanted:
+    free = []
+    for name in paths:
         if name not in known:
             raise InputError(
                 f"--free {name!r}: no such parameter; this model has: {', '.join(known)}"
@@ -70,10 +70,10 @@ def select_free(case: Case, names: Sequence[str] | None) -> list[FreeParameter]:
         prior = case.prior.get(name) or _DEFAULT_PRIORS.get(name)
         if prior is None:
             prior = _wide_prior(parameter, float(nominal))
-        found.append(
+        free.append(
             FreeParameter(name, parameter.unit, prior, float(nominal), name not in case.prior)
         )
-    return found
+    return free
 
 
 def values_at(free: Sequence[FreeParameter], u: Floats) -> tuple[Floats, Floats]:

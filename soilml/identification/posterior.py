@@ -218,7 +218,7 @@ class _LogDensity:
         noise = propagated_input_noise(
             self.case, self.free, u, data.at, data.slip_std, data.load_std
         )
-        return stack_channels(data, noise)[0]
+        return np.asarray(stack_channels(data, noise)[0])
 
 
 def _sampling_warnings(sample: ImportanceSample) -> tuple[str, ...]:
