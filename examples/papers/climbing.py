@@ -1,4 +1,4 @@
-"""What can a rover climb that has only driven gentle slopes? A simulated one, whose truth is known.
+"""Climbing ability of a simulated rover on a known soil, predicted from gentle slopes.
 
 Run from the repository root: python examples/papers/climbing.py
 """
@@ -34,8 +34,8 @@ front_share = 0.52     # of the weight on the front wheels, on the flat
 height_ratio = 0.4     # height of the centre of mass over the wheelbase
 
 [soil]
-cohesion = 0.0         # dry sand, given as in the paper
-friction_angle = 0.6632  # 38 degrees, given as in the paper
+cohesion = 0.0         # dry sand, known as in the paper
+friction_angle = 0.6632  # 38 degrees, known as in the paper
 
 [soil.prior]
 shear_modulus = [0.001, 0.05]
@@ -50,7 +50,7 @@ front_load = 0.05
 
 
 def run() -> None:
-    """Simulate, write the files of a rover's log, run the command, and draw."""
+    """Simulate, write the files, run the command, and draw."""
     FILES.mkdir(parents=True, exist_ok=True)
     true = SimulatedRover()
     rng = np.random.default_rng(4)
@@ -59,21 +59,22 @@ def run() -> None:
     write_files(climbs, artificial)
     print(
         f"A simulated rover of 12 kg on sand (c 0, phi 38 deg, k_x {1e3 * true.shear[2]:.1f} mm) "
-        f"drove slopes of 0 and 4 deg\nand made its wheels slip on the flat. What may it climb?\n"
+        f"climbed slopes of 0 and 4 deg\nand measured stress at artificial "
+        "slip on level ground. What can it climb?\n"
     )
     command = ["climb", str(FILES / "rover.toml"), str(FILES / "runs.csv")]
     command += ["--stress", str(FILES / "stress.csv"), "--out", str(FILES), "--slip-limit", "0.3"]
     if main(command) != 0:
         raise SystemExit(2)
-    found = json.loads((FILES / "climb.json").read_text())
+    report = json.loads((FILES / "climb.json").read_text())
     steepest = np.rad2deg(true.steepest)
     print(f"\ntruth: k_x {1e3 * true.shear[2]:.2f} mm, steepest slope {steepest:.1f} deg")
-    draw(true, climbs, artificial, found)
-    print(f"picture: {OUT / 'climbing.png'}")
+    draw(true, climbs, artificial, report)
+    print(f"figure: {OUT / 'climbing.png'}")
 
 
 def write_files(climbs: list[Climb], artificial: tuple[list[WheelRun], list[WheelRun]]) -> None:
-    """ROVER.toml, RUNS.csv and STRESS.csv, as a rover would log them."""
+    """ROVER.toml, RUNS.csv and STRESS.csv, as logged by a rover."""
     (FILES / "rover.toml").write_text(ROVER)
     runs, stress = climb_tables(climbs, *artificial, rim_speed=0.00915)
     (FILES / "runs.csv").write_text(csv_text(runs))
@@ -84,19 +85,19 @@ def draw(
     true: SimulatedRover,
     climbs: list[Climb],
     artificial: tuple[list[WheelRun], list[WheelRun]],
-    found: dict,
+    report: dict,
 ) -> None:
     """Stress by slip, k_x by slope, pull against slip, steepest slope."""
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
     draw_stress(axes[0, 0], artificial[0])
     draw_modulus(axes[0, 1], true)
-    draw_pull(axes[1, 0], true, climbs, found)
-    draw_slope(axes[1, 1], true, climbs, found)
+    draw_pull(axes[1, 0], true, climbs, report)
+    draw_slope(axes[1, 1], true, climbs, report)
     figure.savefig(OUT / "climbing.png", dpi=110)
 
 
 def draw_stress(axis, front: list[WheelRun]) -> None:
-    """Stress on the front wheel at the artificial slips: it moves forward."""
+    """Stress on the front wheel at the artificial slips, which moves forward with slip."""
     colours = plt.cm.viridis(np.linspace(0.0, 0.85, len(ARTIFICIAL_SLIPS)))
     for number, slip in enumerate(ARTIFICIAL_SLIPS):
         runs = [run for run in front if abs(run.slip - slip) < 0.03]
@@ -118,7 +119,7 @@ def draw_stress(axis, front: list[WheelRun]) -> None:
 
 
 def draw_modulus(axis, true: SimulatedRover) -> None:
-    """k_x of each slope, and what a wrong speed does to it."""
+    """k_x of each slope, also with an error of the speed."""
     climbs = true.simulate_climbs(np.random.default_rng(8))
     cohesion, friction, modulus = true.shear
     slopes = np.rad2deg(SLOPES)
@@ -127,11 +128,11 @@ def draw_modulus(axis, true: SimulatedRover) -> None:
             true.rover, climbs, cohesion=cohesion, friction_angle=friction, speed_error=error
         )
         mean = 1e3 * np.asarray([np.mean(each[4 * i : 4 * i + 4]) for i in range(len(slopes))])
-        label = "speed as read" if error == 0.0 else f"speed {100 * error:+.1f} %"
+        label = "speed as measured" if error == 0.0 else f"speed {100 * error:+.1f} %"
         axis.plot(slopes, mean, marker=mark, color=colour, label=label)
     axis.axhline(1e3 * modulus, color="0.6", ls="--", label="truth")
     axis.set(
-        title="Shear modulus found on each slope alone (4 runs each)",
+        title="Shear modulus estimated on each slope alone (4 runs each)",
         xlabel="slope (deg)",
         ylabel="k_x (mm)",
     )
@@ -139,27 +140,27 @@ def draw_modulus(axis, true: SimulatedRover) -> None:
     axis.legend(frameon=False)
 
 
-def draw_pull(axis, true: SimulatedRover, climbs: list[Climb], found: dict) -> None:
-    """Predicted drawbar pull, the truth, and what was driven."""
-    slip, pull = found["curve"]["slip"], found["curve"]["drawbar_pull_N"]
+def draw_pull(axis, true: SimulatedRover, climbs: list[Climb], report: dict) -> None:
+    """Predicted drawbar pull, the true one, and the climbs."""
+    slip, pull = report["curve"]["slip"], report["curve"]["drawbar_pull_N"]
     axis.fill_between(
         slip, pull["p05"], pull["p95"], color="C0", alpha=0.25, label="predicted, 90 %"
     )
     axis.plot(slip, pull["median"], color="C0")
     axis.plot(true.curve[0], true.curve[1], "k--", label="truth")
     weight = true.rover.weight
-    driven = [c.front.slip for c in climbs]
+    measured = [c.front.slip for c in climbs]
     axis.plot(
-        driven, [weight * np.sin(c.slope) for c in climbs], "C2o", label="driven: 0 and 4 deg"
+        measured, [weight * np.sin(c.slope) for c in climbs], "C2o", label="measured: 0 and 4 deg"
     )
     later = SLOPES[2:]
     needed = weight * np.sin(later)
     axis.plot(
-        [true.slip_at(s) for s in later], needed, "C1s", label="8, 10 and 12 deg: not driven yet"
+        [true.slip_at(s) for s in later], needed, "C1s", label="8, 10 and 12 deg: not yet climbed"
     )
     axis.axhline(0.0, color="0.8", lw=0.8)
     axis.set(
-        title="Drawbar pull of the rover, before it drove the steep slopes",
+        title="Drawbar pull of the rover, predicted before the steep slopes",
         xlabel="slip",
         ylabel="drawbar pull (N)",
         xlim=(0.0, 0.72),
@@ -168,18 +169,18 @@ def draw_pull(axis, true: SimulatedRover, climbs: list[Climb], found: dict) -> N
     axis.legend(frameon=False, loc="lower right")
 
 
-def draw_slope(axis, true: SimulatedRover, climbs: list[Climb], found: dict) -> None:
+def draw_slope(axis, true: SimulatedRover, climbs: list[Climb], report: dict) -> None:
     """Slope climbed at each slip, and the steepest."""
-    slip, slope = found["curve"]["slip"], found["curve"]["slope_rad"]
+    slip, slope = report["curve"]["slip"], report["curve"]["slope_rad"]
     axis.fill_between(
         slip, np.rad2deg(slope["p05"]), np.rad2deg(slope["p95"]), color="C0", alpha=0.25
     )
     axis.plot(slip, np.rad2deg(slope["median"]), color="C0", label="predicted, 90 %")
     axis.plot(true.curve[0], np.rad2deg(true.curve[2]), "k--", label="truth")
-    best = found["steepest_slope_rad"]
+    best = report["steepest_slope_rad"]
     axis.axhspan(np.rad2deg(best["p05"]), np.rad2deg(best["p95"]), color="C3", alpha=0.15)
     axis.axhline(np.rad2deg(best["median"]), color="C3", label="steepest slope, 90 %")
-    axis.axhline(np.rad2deg(true.steepest), color="k", ls=":", label="truth of it")
+    axis.axhline(np.rad2deg(true.steepest), color="k", ls=":", label="true steepest slope")
     axis.set(
         title="Slope climbed at each slip",
         xlabel="slip",

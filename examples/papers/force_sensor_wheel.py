@@ -50,7 +50,7 @@ NEEDED = WEIGHT * np.sin(np.radians(SLOPES))
 
 
 def main() -> None:
-    """The story, and its picture."""
+    """Print the results and draw the figure."""
     rng = np.random.default_rng(1)
     true_runs = [
         SteadyRun(slip=s, weight=WEIGHT, slope=np.radians(a))
@@ -62,11 +62,11 @@ def main() -> None:
         for i, arc in enumerate(arcs)
     ]
     runs = [measured(at, rng) for at in true_runs]
-    grips = [
+    estimates = [
         estimate_shear_modulus(r, at, SENSORS, STRENGTH)
         for r, at in zip(readings, runs, strict=True)
     ]
-    flat = grips[0]
+    flat = estimates[0]
     later = list(zip(readings, runs, strict=True))[1:]
     pulls = [predict_pull(r, at, SENSORS, STRENGTH, flat) for r, at in later]
     wide = [
@@ -75,19 +75,21 @@ def main() -> None:
     refitted = solve_force_balance(wide[0], true_runs[0], SENSORS, STRENGTH).shear_modulus
     known = [pulled(w, at, TRUE) for w, at in zip(wide, true_runs, strict=True)]
     tuned = [pulled(w, at, refitted) for w, at in zip(wide, true_runs, strict=True)]
-    felt = bin_stress(readings[0], SENSORS)
-    raw = felt.angle[felt.normal > 0]
+    binned = bin_stress(readings[0], SENSORS)
+    raw = binned.angle[binned.normal > 0]
 
-    print("Where an arc of 30 degrees must lie for one k_x of 7.2 mm, and what the sensors make")
-    print("of it: slip off by 1.5 % of the speed, weight by 0.3 N, 0.02 N on each sample")
+    print(
+        "Position of an arc of 30 degrees for one k_x of 7.2 mm, and its estimate by the sensors:"
+    )
+    print("errors of 1.5 % in speed, 0.3 N in weight and 0.02 N in each sample")
     rows = [
         (f"{s:.2f}", f"{a:.0f}", *angles(arc), *angles(g.profile), f"{1e3 * g.shear_modulus:.2f}",
          f"{1e3 * g.interval[0]:.2f}", f"{1e3 * g.interval[1]:.2f}", f"{1e3 * t:.1f}")
-        for s, a, arc, g, t in zip(SLIPS, SLOPES, arcs, grips, TABLE_I, strict=True)
+        for s, a, arc, g, t in zip(SLIPS, SLOPES, arcs, estimates, TABLE_I, strict=True)
     ]  # fmt: skip
-    header = ("slip", "slope deg", "true from", "to deg", "found from", "to deg")
+    header = ("slip", "slope deg", "true from", "to deg", "estimated from", "to deg")
     print(format_table((*header, "k_x mm", "90 % from", "to", "Table I mm"), rows, text_columns=0))
-    print(f"\nThe arc looks {np.rad2deg(np.ptp(raw)):.0f} degrees long to sensors of 9.5 mm.")
+    print(f"\nThe arc appears {np.rad2deg(np.ptp(raw)):.0f} degrees long with sensors of 9.5 mm.")
 
     print("\nDrawbar pull in N with the k_x found on level ground, and the conventional model's")
     rows = [
@@ -108,18 +110,18 @@ def main() -> None:
         print(f"\nA wheel with stress-shift {shift:g} on {on}, its model without:")
         print(f"  {diagnosed(shift, stiffer)}")
     OUT.mkdir(parents=True, exist_ok=True)
-    drawn(arcs, felt, grips, wide, pulls, known, tuned)
+    drawn(arcs, binned, estimates, wide, pulls, known, tuned)
 
 
 def without_noise(runs: list[SteadyRun], arcs: list[StressProfile]) -> None:
-    """How much hangs on the printed k_x, the contact, the disc, the lugs and the speed."""
+    """Sensitivity to the printed k_x, the contact, the disc, the lugs and the speed."""
     print("\nWithout noise")
     asked = [
         balanced_arc(np.radians(30.0), at, SENSORS, STRENGTH, modulus)
         for at, modulus in zip(runs, TABLE_I, strict=True)
     ]
     middles = [f"{np.rad2deg(0.5 * (a.exit_angle + a.entry_angle)):.0f}" for a in asked]
-    print(f"  middle of the arc that each printed k_x asks for, deg  {' '.join(middles)}")
+    print(f"  middle of the arc for each printed k_x, deg  {' '.join(middles)}")
     pulls = []
     for front in np.radians([35.0, 45.0, 50.0]):
         first, last = 1.0 - np.cos(front), 1.0 - np.cos(FRONT + REAR - front)
@@ -129,24 +131,26 @@ def without_noise(runs: list[SteadyRun], arcs: list[StressProfile]) -> None:
     print(f"  pull of the conventional 70 deg, 35, 45 or 50 in front, N  {' '.join(pulls)}")
     quiet = replace(SENSORS, noise=0.0)
     ways = {
-        "disc taken off": ((0.3, 0.3), profile_from_readings),
-        "as read": ((0.3, 0.3), as_read),
+        "deconvolved": ((0.3, 0.3), profile_from_readings),
+        "uncorrected": ((0.3, 0.3), as_read),
         "lugs 50 % in front, 10 % behind": ((0.5, 0.1), profile_from_readings),
     }
     for name, (lugs, way) in ways.items():
         level, later = (way(simulate_readings(arcs[i], quiet, lugs=lugs), quiet) for i in (0, 3))
         found = solve_force_balance(level, runs[0], quiet, STRENGTH).shear_modulus
         off = pulled(later, runs[3], found) - NEEDED[3]
-        print(f"  {name}: k_x off by {found / TRUE - 1:+.0%}, pull at slip 0.39 by {off:+.2f} N")
+        print(
+            f"  {name}: error of k_x {found / TRUE - 1:+.0%}, of the pull at slip 0.39 {off:+.2f} N"
+        )
     fast = replace(runs[0], slip=1.0 - (1.0 - SLIPS[0]) * (1.0 - SPEED_ERROR))
     found = solve_force_balance(arcs[0], fast, quiet, STRENGTH).shear_modulus
-    print(f"  speed read 1.5 % low at slip 0.11: k_x off by {found / TRUE - 1:+.0%}")
+    print(f"  speed read 1.5 % low at slip 0.11: error of k_x {found / TRUE - 1:+.0%}")
 
 
 def as_read(readings, wheel: SensingWheel) -> StressProfile:
-    """The mean of the readings, blurred by the disc."""
-    felt = bin_stress(readings, wheel)
-    return StressProfile(felt.angle, felt.normal)
+    """The mean of the readings, averaged over the disc."""
+    binned = bin_stress(readings, wheel)
+    return StressProfile(binned.angle, binned.normal)
 
 
 def measured(at: SteadyRun, rng: np.random.Generator) -> SteadyRun:
@@ -180,7 +184,7 @@ def angles(profile) -> tuple[str, str]:
 
 
 def diagnosed(shift: float, stiffer: float) -> str:
-    """What the gap workflow says of a wheel under which the stress sits in front."""
+    """Result of the gap workflow for a wheel whose stress is concentrated in front."""
     sand = replace(SAND, kphi=SAND.kphi * stiffer, kc=SAND.kc * stiffer)
     slip, load = (x.ravel() for x in np.meshgrid((*SLIPS[:4], 0.5), [10.0, 20.0, WEIGHT]))
     force = (Model(WHEEL) + StressShift(shift=shift))(sand, Operating(slip=slip, load=load))
@@ -212,39 +216,41 @@ def diagnosed(shift: float, stiffer: float) -> str:
     return f"soilml gap: {report.status}; {report.sentence} {size}"
 
 
-def drawn(arcs, felt, grips, wide, pulls, known, tuned) -> None:
+def drawn(arcs, binned, estimates, wide, pulls, known, tuned) -> None:
     """Four panels."""
     figure, ((a, b), (c, d)) = plt.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
     deg = np.rad2deg
     bar = {"fmt": "o", "capsize": 3, "ms": 5}
-    scale = grips[0].magnification
-    a.plot(deg(felt.angle), scale * felt.normal / 1e3, ".", ms=3, color="0.55", label="sensors")
+    scale = estimates[0].magnification
+    a.plot(deg(binned.angle), scale * binned.normal / 1e3, ".", ms=3, color="0.55", label="sensors")
     a.plot(deg(arcs[0].angle), arcs[0].normal / 1e3, color="k", lw=3, alpha=0.35, label="true")
-    found = grips[0].profile
-    a.plot(deg(found.angle), scale * found.normal / 1e3, "C0", label="found, disc taken off")
+    found = estimates[0].profile
+    a.plot(deg(found.angle), scale * found.normal / 1e3, "C0", label="found, deconvolved")
     load = forces_from_profile(
         wide[0], shear_modulus=TRUE, friction_angle=STRENGTH.friction_angle, slip=SLIPS[0],
         radius=SENSORS.radius, width=SENSORS.width,
     ).load  # fmt: skip
     a.plot(deg(wide[0].angle), wide[0].normal * WEIGHT / load / 1e3, "C3--", label="conventional")
     a.set_title("Level ground, slip 0.11; all scaled to the load")
-    for arc, slip, grip in zip(arcs, SLIPS, grips, strict=True):
+    for arc, slip, estimate in zip(arcs, SLIPS, estimates, strict=True):
         line = b.plot(deg(arc.angle), arc.normal / 1e3, lw=3, alpha=0.3)[0]
-        y = grip.magnification * grip.profile.normal / 1e3
-        b.plot(deg(grip.profile.angle), y, color=line.get_color(), label=f"slip {slip:.2f}")
-    b.set_title("Arcs of 30 deg that k_x = 7.2 mm asks for (pale), and found")
+        y = estimate.magnification * estimate.profile.normal / 1e3
+        b.plot(deg(estimate.profile.angle), y, color=line.get_color(), label=f"slip {slip:.2f}")
+    b.set_title("Arcs of 30 deg for k_x = 7.2 mm (pale), and estimates")
     for axes in (a, b):
         axes.set(xlim=(-40, 60), xlabel="angle on the rim, forward positive (deg)")
         axes.set_ylabel("normal stress (kPa)")
-    value = np.asarray([g.shear_modulus for g in grips])
-    ends = np.asarray([g.interval for g in grips])
+    value = np.asarray([g.shear_modulus for g in estimates])
+    ends = np.asarray([g.interval for g in estimates])
     c.axhline(1e3 * TRUE, color="0.6", lw=1)
-    c.errorbar(SLIPS, 1e3 * value, 1e3 * np.abs(ends.T - value), label="found, 90 %", **bar)
+    c.errorbar(SLIPS, 1e3 * value, 1e3 * np.abs(ends.T - value), label="estimated, 90 %", **bar)
     c.plot(SLIPS, 1e3 * np.asarray(TABLE_I), "k^", ms=6, mfc="none", label="Table I (measured)")
-    c.set(xlabel="slip", ylabel="k_x (mm)", ylim=(0, None), title="Shear modulus, put in 7.2 mm")
+    c.set(
+        xlabel="slip", ylabel="k_x (mm)", ylim=(0, None), title="Shear modulus, true value 7.2 mm"
+    )
     value = np.asarray([p.drawbar_pull for p in pulls])
     ends = np.asarray([p.interval for p in pulls])
-    d.plot(SLIPS, NEEDED, "k_", ms=16, mew=2, label="needed on the slope")
+    d.plot(SLIPS, NEEDED, "k_", ms=16, mew=2, label="required on the slope")
     d.errorbar(SLIPS[1:], value, np.abs(ends.T - value), label="from measured stress, 90 %", **bar)
     d.plot(SLIPS, known, "C3s--", ms=5, label="conventional, k_x = 7.2 mm")
     d.plot(SLIPS, tuned, "C1D:", ms=5, label="conventional, k_x of its own")

@@ -1,4 +1,4 @@
-"""A robot on tracks: its pull on sand and clay, and what eight runs of pull tell of the soil.
+"""A robot on tracks: pull on sand and clay, evaluation of signals, and soil from eight groups.
 
 Run from the repository root: python examples/papers/tracked_robot.py
 """
@@ -18,25 +18,33 @@ from soilml import Case, Model, Operating, soil
 from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
 from soilml.papers.wang2018 import LEVEL, plateau, printed
+from soilml.systems.tracked_robot import (
+    BEYOND_PEAK,
+    GROUSERS,
+    WANG2018,
+    GroupFits,
+    Regression,
+    identify_groups,
+    linear_regression,
+    low_pass,
+    rear_sinkage,
+    settling_from_moments,
+    slip_from_displacements,
+    stationary_mean,
+    track_balance,
+)
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
-    GroupFits,
-    identify_groups,
     predicted_pull,
     simulate_group,
 )
-from soilml.systems.tracked_robot.pull_regression import (
-    Regression,
-    implied_points,
-    linear_regression,
-)
-from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018, track_balance
+from soilml.systems.tracked_robot.pull_regression import implied_points
 
 OUT = Path("demo/papers/tracked_robot.png")
 PRINTED = {("sand", False): 600, ("sand", True): 620, ("clay", False): 800, ("clay", True): 950}
 COLOURS = {"sand": "#c08a2d", "clay": "#8c3b2e"}
-#: Between the values at which the paper's groups stand still: 20 and 40 degrees, 0.05 m, 0.9 and
-#: 1.2 kPa; the rest is ours.
+#: Bounds at which the paper's groups end: 20 and 40 degrees, 0.05 m, 0.9 and 1.2 kPa; the others
+#: are our choice.
 PRIOR = {
     "n": Prior(0.5, 1.5),
     "friction_angle": Prior(np.deg2rad(20.0), np.deg2rad(40.0)),
@@ -50,36 +58,79 @@ TABLE = ("n", "friction_angle", "kp", "shear_modulus", "cohesion")
 
 
 def main() -> None:
-    """Print the story and draw its picture."""
+    """Print the results and draw the figure."""
     print("One of two tracks carries 638 N; plateaus are means over slips of 0.5 to 0.9.\n")
     print("soil  grousers  printed N  computed N  difference")
-    for (ground, lugs), told in PRINTED.items():
+    for (ground, lugs), printed_pull in PRINTED.items():
         found = plateau(ground, grousers=lugs)
         name = "12 mm" if lugs else "none"
-        print(f"{ground}  {name:8s}  {told:9d}  {found:10.0f}  {found / told - 1.0:+10.1%}")
+        print(
+            f"{ground}  {name:8s}  {printed_pull:9d}  {found:10.0f}  "
+            f"{found / printed_pull - 1.0:+10.1%}"
+        )
     at = Operating(slip=0.2, load=WANG2018.load)
-    hanging()
-    print("\nWhat carries the load at slip 0.2")
+    sensitivity_to_assumptions()
+    print("\nDistribution of the load at slip 0.2")
     print("soil  front wheel  belt between  rear wheel  sinkage mm  tension kN")
     for ground in COLOURS:
         model = Model(WANG2018.track, BEYOND_PEAK[ground])
-        stands = track_balance(model, soil(f"wang2018/{ground}"), at)
+        balance = track_balance(model, soil(f"wang2018/{ground}"), at)
         sunk = 1e3 * float(model(soil(f"wang2018/{ground}"), at).sinkage)
         print(
-            f"{ground}  {stands.front:11.0%}  {stands.middle:12.0%}  {stands.rear:10.0%}"
-            f"  {sunk:10.1f}  {1e-3 * stands.tension:10.1f}"
+            f"{ground}  {balance.front:11.0%}  {balance.middle:12.0%}  {balance.rear:10.0%}"
+            f"  {sunk:10.1f}  {1e-3 * balance.tension:10.1f}"
         )
+    trim_by_moments()
+    pull_test()
     case, groups = eight_groups()
     fresh = simulate_group(
         case, np.linspace(0.06, 0.84, 18), WANG2018.load, np.random.default_rng(18)
     )
-    lines = told_by(case, groups, fresh)
+    lines = regression_of_fresh_rows(case, groups, fresh)
     draw(case, groups, fresh, lines)
-    print(f"\npicture: {OUT}")
+    print(f"\nfigure: {OUT}")
 
 
-def hanging() -> None:
-    """How much of the four plateaus hangs on what the paper does not print."""
+def trim_by_moments() -> None:
+    """Trim angle from the balance of moments: the tail sinks as the pull increases."""
+    sand, slip = soil("wang2018/sand"), np.asarray([0.02, 0.1, 0.5])
+    at, model = Operating(slip=slip, load=WANG2018.load), Model(WANG2018.track)
+    settling = settling_from_moments(model, sand, at, behind=0.01, hitch=0.03)
+    trimmed = Model(replace(WANG2018.track, settling=settling))
+    pull, trim = trimmed(sand, at).drawbar_pull, track_balance(trimmed, sand, at).trim
+    print("\nTrim on sand from moments: centre of mass 10 mm behind the middle, hitch 30 mm high")
+    print("slip   pull N  trim deg")
+    for row in zip(slip, 2.0 * pull, np.rad2deg(trim), strict=True):
+        print("{:4.2f}  {:7.0f}  {:8.2f}".format(*row))
+
+
+def pull_test() -> None:
+    """Slip, sinkage and mean pull from the simulated signals of one pull test."""
+    rate, rng = 100.0, np.random.default_rng(7)
+    time = np.arange(0.0, 60.0, 1.0 / rate)
+    ramp = np.clip((time - 8.0) / 10.0, 0.0, 1.0)  # pause, then 10 s until the pull is constant
+    pull = 560.0 * ramp + 15.0 * rng.standard_normal(len(time))
+    belt = 0.02 * time
+    robot = (1.0 - 0.3 * ramp.mean()) * belt
+    shaking = 0.005 * np.sin(2.0 * np.pi * 15.0 * time)
+    trim, spacing, depth = 0.03, 0.7, 0.018
+    front = 0.2 + 0.5 * spacing * np.sin(trim) + shaking
+    rear = 0.2 + depth - 0.5 * spacing * np.sin(trim) - shaking
+    sinkage = rear_sinkage(
+        low_pass(rear, rate, 2.0), low_pass(front, rate, 2.0), np.full(len(time), trim), spacing
+    )
+    plateau_pull = stationary_mean(pull, above=50.0)
+    slip = slip_from_displacements(belt, robot, span=1000)
+    print(f"\nOne simulated pull test: 560 N, slip {0.3 * ramp.mean():.3f}, sinkage 18 mm")
+    print(
+        f"  mean pull {plateau_pull.mean:.1f} +- {plateau_pull.std_error:.1f} N from "
+        f"{plateau_pull.start / rate:.0f} to {plateau_pull.stop / rate:.0f} s\n"
+        f"  slip {slip.mean():.3f}, sinkage {1e3 * np.median(sinkage):.1f} mm after the low-pass"
+    )
+
+
+def sensitivity_to_assumptions() -> None:
+    """The four plateaus under other assumptions on what the paper does not print."""
     track, bare, hump = WANG2018.track, (), BEYOND_PEAK["clay"]
     softer = (replace(hump[0], residual=0.6),)
     sooner = replace(GROUSERS, yielding=1.5)
@@ -106,7 +157,7 @@ def hanging() -> None:
 
 
 def eight_groups() -> tuple[Case, GroupFits]:
-    """Eight groups of pulls on the paper's sand with the gauge's noise, and what they say."""
+    """Simulate eight groups of pulls on the paper's sand with measurement noise, and fit them."""
     noise = {"drawbar_pull_N": Noise(constant=10.0, share=0.05)}
     case = Case(Model(WANG2018.track), soil("wang2018/sand"), PRIOR, noise)
     rng = np.random.default_rng(2018)
@@ -114,22 +165,22 @@ def eight_groups() -> tuple[Case, GroupFits]:
     tables = [simulate_group(case, slips, WANG2018.load, rng) for _ in range(8)]
     groups = identify_groups(case, tables)
     print("\nEight groups of ten pulls each, 5 % and 10 N noise, one load, five unknowns")
-    print("parameter       true     mean      std  prior std  left of prior, a group  all rows")
+    print("parameter       true     mean      std  prior std  prior remaining, a group  all rows")
     for i, name in enumerate(PARAMETERS):
         scale = UNITS.get(name, 1.0)
         true = float(getattr(case.soil, name))
         print(
             f"{name:14s} {scale * true:7.4g}  {scale * groups.mean[i]:7.4g}  "
             f"{scale * groups.std[i]:7.2g}  {scale * PRIOR[name].std:9.2g}  "
-            f"{groups.left[name]:22.0%}  {groups.joint.remaining_fraction[name]:8.0%}"
+            f"{groups.remaining_fraction[name]:22.0%}  {groups.pooled.remaining_fraction[name]:8.0%}"
         )
-    print(f"told hardly or not at all by a group: {', '.join(groups.open)}")
+    print(f"hardly identified or not identified: {', '.join(groups.unidentified)}")
     return case, groups
 
 
-def told_by(case: Case, groups: GroupFits, fresh: object) -> Regression:
-    """Predictions of the groups' average on rows that no group has seen."""
-    line = linear_regression(averaged(case, groups, fresh), fresh["drawbar_pull_N"])
+def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> Regression:
+    """Regression of new measurements on the predictions of the groups' average."""
+    line = linear_regression(mean_prediction(case, groups, fresh), fresh["drawbar_pull_N"])
     book = printed()
     n = implied_points(book["regression_r2"], book["regression_f"])
     print("\nMeasured against predicted, fresh rows      r2       F   slope  points")
@@ -144,9 +195,9 @@ def told_by(case: Case, groups: GroupFits, fresh: object) -> Regression:
     return line
 
 
-def averaged(case: Case, groups: GroupFits, table: object) -> np.ndarray:
-    """Pull that the average of the groups predicts, N."""
-    return predicted_pull(case, replace(groups.joint, values=groups.mean), table)
+def mean_prediction(case: Case, groups: GroupFits, table: object) -> np.ndarray:
+    """Pull predicted by the average of the groups, N."""
+    return predicted_pull(case, replace(groups.pooled, values=groups.mean), table)
 
 
 def draw(case: Case, groups: GroupFits, fresh: object, line: Regression) -> None:
@@ -162,15 +213,15 @@ def draw(case: Case, groups: GroupFits, fresh: object, line: Regression) -> None
 
 
 def draw_pull(ax: plt.Axes) -> None:
-    """Drawbar pull against slip, printed plateaus beside it."""
+    """Drawbar pull against slip, with the printed plateaus."""
     slip = np.linspace(0.005, 0.95, 60)
-    for (ground, lugs), told in PRINTED.items():
+    for (ground, lugs), printed_pull in PRINTED.items():
         effects = (*((GROUSERS,) if lugs else ()), *BEYOND_PEAK[ground])
         pull = WANG2018.pull(soil(f"wang2018/{ground}"), slip, effects)
         name = f"{ground}, 12 mm grousers" if lugs else f"{ground}, bare"
         style = "--" if lugs else "-"
         ax.plot(slip, pull, style, color=COLOURS[ground], label=name)
-        ax.plot(1.0, told, "^" if lugs else "o", color=COLOURS[ground], ms=7, clip_on=False)
+        ax.plot(1.0, printed_pull, "^" if lugs else "o", color=COLOURS[ground], ms=7, clip_on=False)
     ax.plot([], [], "ok", label="printed plateau, bare")
     ax.plot([], [], "^k", label="printed plateau, grousers")
     ax.set(xlabel="slip", ylabel="drawbar pull of the robot, N", xlim=(0, 1), ylim=(0, 1350))
@@ -238,8 +289,8 @@ def draw_groups(ax: plt.Axes, case: Case, groups: GroupFits) -> None:
         )
     ax.axhspan(0.0, 1.0, color="0.95", zorder=0)
     ax.set_xticks(range(5), SYMBOLS)
-    ax.set(ylabel="place within the prior, 0 to 1", ylim=(-0.06, 1.24))
-    ax.set_title("Five unknowns from pull at one load: most run to an end")
+    ax.set(ylabel="position within the prior, 0 to 1", ylim=(-0.06, 1.24))
+    ax.set_title("Five unknowns from pull at one load: most end at a bound")
     ax.legend(fontsize=8, ncols=3, loc="upper center")
 
 
@@ -247,7 +298,7 @@ def draw_regression(
     ax: plt.Axes, case: Case, groups: GroupFits, fresh: object, line: Regression
 ) -> None:
     """Fresh measurements against what the average of the groups predicts."""
-    x, y = averaged(case, groups, fresh), 1.0 * fresh["drawbar_pull_N"]
+    x, y = mean_prediction(case, groups, fresh), 1.0 * fresh["drawbar_pull_N"]
     ends = np.asarray([0.0, 1.1 * max(x.max(), y.max() / 2)])
     ax.plot(2 * x, 2 * y, "o", color="#26547c", label="fresh rows")
     ax.plot(2 * ends, 2 * ends, color="0.6", lw=1, label="agreement")
@@ -256,7 +307,7 @@ def draw_regression(
     ax.plot(2 * ends, 2 * fitted, color="#d1495b", label=said)
     ax.set(xlabel="predicted pull of the robot, N", ylabel="measured pull (simulated), N")
     ax.set(xlim=(0, 2 * ends[1]), ylim=(0, 2 * ends[1]))
-    ax.set_title("A soil that is not identified still predicts pull")
+    ax.set_title("A soil that is not identified still predicts the pull")
     ax.legend(fontsize=8, loc="upper left")
 
 

@@ -37,7 +37,7 @@ from soilml.systems.wheel_legs.sensing.simulated_stances import (
 )
 from soilml.systems.wheel_legs.sensing.slip_fits import fit_torque_slip
 from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.sensing.soil_from_slip import soil_from_torque
+from soilml.systems.wheel_legs.sensing.soil_from_slip import soil_from_torque, soil_from_vibration
 from soilml.systems.wheel_legs.sensing.stick_slip import (
     SpringLeg,
     simulate_stance,
@@ -57,7 +57,7 @@ ROVER = 50.0 * 9.81  # N on each wheel
 
 
 def run() -> None:
-    """Print the story and draw the picture."""
+    """Print the results and draw the figure."""
     figure, axes = plt.subplots(2, 2, figsize=(12.5, 9.5), constrained_layout=True)
     torque_slip(axes[0, 0])
     vibration_slip(axes[0, 1])
@@ -66,7 +66,7 @@ def run() -> None:
     own_gap()
     OUT.mkdir(parents=True, exist_ok=True)
     figure.savefig(OUT / "wheel_leg_slip.png", dpi=110)
-    print(f"\npicture: {OUT / 'wheel_leg_slip.png'}")
+    print(f"\nfigure: {OUT / 'wheel_leg_slip.png'}")
 
 
 def torque_slip(axes: plt.Axes) -> None:
@@ -145,45 +145,51 @@ def vibration_slip(axes: plt.Axes) -> None:
     print(f"  R2 of slip on amplitude, median leg   {planar.goodness['slip']:6.2f}")
     print(f"  R2 of the planes: intercept, slope    {planar.goodness['intercept']:6.2f}"
           f"{planar.goodness['slope']:6.2f}   (printed 0.98, 0.96)")  # fmt: skip
+    one = soil_from_vibration(2.0, 0.25)
+    angle, spread = np.rad2deg(one.friction_angle), np.rad2deg(one.std[0])
+    print(f"  2 m/s^2 at slip 0.25, printed linear model: phi = {angle:.0f} +- {spread:.0f}"
+          " degrees")  # fmt: skip
     print("  springs of the four soils by table VII: "
           + ", ".join(f"{k / 1e3:.2f} kN/m and {np.rad2deg(d):.0f} degrees"
                       for k, d in zip(spring, increment, strict=True)))  # fmt: skip
 
 
 def fusion(axes: plt.Axes) -> None:
-    """Torque, vibration and sinkage on simulated soils: each alone and joined."""
-    learn, hold = simulate_stances(400, seed=1), simulate_stances(400, seed=2)
-    print("\nOne stance on each of 400 simulated soils not learned from")
+    """Torque, vibration and sinkage on simulated soils: each alone and fused."""
+    train, test = simulate_stances(400, seed=1), simulate_stances(400, seed=2)
+    print("\nOne stance on each of 400 simulated test soils")
     names = (*SENSORS, *RULES)
     for k, name in enumerate(PROPERTIES):
         unit, scale = (("degrees", 180.0 / np.pi), ("N/cm^2", 1e-4))[k]
-        senses = fit_estimators(learn, name)
-        found = score_estimators(senses, hold)
-        print(f"  {name.replace('_', ' '):<24} {'RMSE':>8} {'claimed':>8} {'in 95 %':>8}  {unit}")
-        for sense in names:
-            row = found[sense]
-            print(f"    {sense:<22} {scale * row.rmse:8.2f} {scale * row.predicted_std:8.2f}"
+        estimators = fit_estimators(train, name)
+        found = score_estimators(estimators, test)
+        print(f"  {name.replace('_', ' '):<24} {'RMSE':>8} {'std':>8} {'in 95 %':>8}  {unit}")
+        for sensor in names:
+            row = found[sensor]
+            print(f"    {sensor:<22} {scale * row.rmse:8.2f} {scale * row.predicted_std:8.2f}"
                   f" {100 * row.coverage_95:7.0f}%")  # fmt: skip
         between = {
             "torque, vibration": (0, 1),
             "torque, sinkage": (0, 2),
             "vibration, sinkage": (1, 2),
         }
-        told = ", ".join(f"{two} {senses.correlation[at]:.2f}" for two, at in between.items())
-        print(f"    errors correlate: {told}")
-        truth = np.std(hold.ground.soil.friction_angle if k == 0 else hold.ground.normal_stiffness)
+        correlations = ", ".join(
+            f"{two} {estimators.correlation[at]:.2f}" for two, at in between.items()
+        )
+        print(f"    correlation of the errors: {correlations}")
+        truth = np.std(test.ground.soil.friction_angle if k == 0 else test.ground.normal_stiffness)
         place = np.arange(len(names)) + 0.38 * (k - 0.5)
         label = f"{name.replace('_', ' ')} (spread {scale * truth:.1f} {unit})"
         bars = axes.bar(place, [found[n].rmse / truth for n in names], 0.36, label=label)
         axes.bar_label(bars, [f"{100 * found[n].coverage_95:.0f}" for n in names], fontsize=8)
     axes.set_xticks(range(len(names)), [n.replace(" ", "\n") for n in names])
     axes.set(ylabel="RMSE over the spread of the soils", ylim=(0, 1.35))
-    axes.set_title("Three senses and three rules; above: truths inside the claimed 95 %")
+    axes.set_title("Three sensors and three rules; above: coverage of the 95 % intervals")
     axes.legend(fontsize=8)
 
 
 def mobility(axes: plt.Axes) -> None:
-    """Pull efficiency of the heavier rover's wheel, and what width and slip do to it."""
+    """Pull efficiency of the heavier rover's wheel as a function of width and slip."""
     print("\nPull efficiency (%) of a wheel of 0.15 m radius under 50 kg")
     print("  width m  slip" + "".join(f"{name:>8}" for name in NAMES) + "   classes as published")
     want = traffic_class(np.asarray(PUBLISHED) / 100)
@@ -221,7 +227,7 @@ def efficiency(name: str, width: Floats | float, slip: float) -> Floats:
 
 
 def own_gap(seed: int = 0) -> None:
-    """The midstance model against walks by resistive forces, as if those were measured."""
+    """The midstance model compared with walks by resistive forces in place of measurements."""
     loads, slips = (8.0, 11.0, 14.0, 17.0), np.linspace(0.05, 0.5, 6)
     load, slip = (v.ravel() for v in np.meshgrid(loads, slips, indexing="ij"))
     legs = [wheel_leg("LTF", mass=value / 9.81) for value in load]

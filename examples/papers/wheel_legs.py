@@ -2,7 +2,7 @@
 
     python examples/papers/wheel_legs.py
 
-prints what legs and feet do, and draws demo/papers/wheel_legs.png.
+prints slip and sinkage by legs and feet, and draws demo/papers/wheel_legs.png.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ CM = 100.0
 
 
 def figures(legs, feet, soils, fit):
-    """The story in figures."""
+    """Print the results."""
     print("Legs without feet on alpha_z = 0.7 N/cm3, a full turn:")
     print("  legs   slip rms   sinkage rms   sinkage max")
     for n, (slip, rms, most) in enumerate(
@@ -51,7 +51,7 @@ def figures(legs, feet, soils, fit):
             f"{slipping[0][i] * 1e6:6.2f} +- {slipping[1][i] * 1e6:4.2f}  per N/cm3"
         )
     ltf, srf = feet.feet.index("LTF"), feet.feet.index("SRF")
-    margins = [told[0][ltf] / told[0][srf] - 1.0 for told in (sinking, slipping)]
+    margins = [slope[0][ltf] / slope[0][srf] - 1.0 for slope in (sinking, slipping)]
     print("  the LTF is more sensitive than the SRF by {:.0%} and {:.0%}".format(*margins))
     print("\nSoil from midstance sinkage, four soils in three states:")
     print("                     fitted   printed")
@@ -62,16 +62,16 @@ def figures(legs, feet, soils, fit):
     print(f"  R2               {fit.friction_r2:8.2f}      0.98")
     more = fit_simulated_sinkage(simulate_sinkage(offset=True))
     print(
-        f"  missed on soils left out: sigma_1 by {fit.stiffness_scatter:.0%}\n"
+        f"  error on soils left out: sigma_1 {fit.stiffness_scatter:.0%}\n"
         f"  with sigma_0 in the walk: s_sigma {more.s_sigma / CM:.1f}, R2 {more.stiffness_r2:.2f}, "
-        f"missed by {more.stiffness_scatter:.0%}"
+        f"error {more.stiffness_scatter:.0%}"
     )
-    told = fit(0.05, 0.005)
+    estimate = fit(0.05, 0.005)
     print(
-        f"  sunk 5.0 +- 0.5 cm: sigma_1 {told.normal_stiffness / 1e4:.1f} +- "
-        f"{told.normal_stiffness_std / 1e4:.1f} N/cm2, phi {told.friction_angle:.2f} +- "
-        f"{told.friction_angle_std:.2f} rad, "
-        f"where the soils themselves spread by {np.std(soils.friction_angle):.2f}"
+        f"  sunk 5.0 +- 0.5 cm: sigma_1 {estimate.normal_stiffness / 1e4:.1f} +- "
+        f"{estimate.normal_stiffness_std / 1e4:.1f} N/cm2, phi {estimate.friction_angle:.2f} +- "
+        f"{estimate.friction_angle_std:.2f} rad, "
+        f"standard deviation of the soils {np.std(soils.friction_angle):.2f}"
     )
 
 
@@ -194,8 +194,8 @@ def characterised(axes, soils, fit):
             label=name if soils.state[i] == "medium" else None,
         )
     z = np.linspace(0.012, 0.17, 200)
-    told = fit(z)
-    mean, std = told.normal_stiffness / 1e4, told.normal_stiffness_std / 1e4
+    estimate = fit(z)
+    mean, std = estimate.normal_stiffness / 1e4, estimate.normal_stiffness_std / 1e4
     axes.plot(z * CM, mean, color="#3b4252", label=f"fitted, {fit.s_sigma / CM:.1f} N/cm / z")
     axes.fill_between(z * CM, mean - std, mean + std, color="#3b4252", alpha=0.12, lw=0)
     axes.plot(z * CM, 3.39 / (z * CM), "--", color="#8a8f98", label="printed, 3.39 N/cm / z")

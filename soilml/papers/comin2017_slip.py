@@ -1,4 +1,4 @@
-"""What Comin and Saaj 2017 print of slip, soil from slip, fusion and mobility, computed.
+"""The numbers that Comin and Saaj 2017 print on slip, soil, fusion and mobility, computed.
 
 Torque-slip: `FOOT` in midstance under `LOAD` on the four soils at the five commanded slips.
 Vibration-slip: legs of 3 to 6 kN/m on a soil of 40 degrees whose friction drops by 4 to 20 degrees
@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 #: Width (m) and slip of the rover's wheel, neither printed.
 WIDTH, SLIP = 0.18, 0.2
-#: Springs that the vibration-slip models are fitted to: N/m, rad, and the soil's friction angle.
+#: Springs to which the vibration-slip models are fitted: N/m, rad, and the friction angle.
 STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
 DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
 FRICTION = math.radians(40.0)
@@ -63,25 +63,25 @@ def torque_fit() -> SlipModelFit[TorqueSlip]:
 def vibrations() -> tuple[Floats, Floats, Floats]:
     """(vibration in m/s^2 (slips, springs), drop of friction, stiffness) of all springs."""
     stiffness, drop = (v.ravel() for v in np.meshgrid(STIFFNESSES, DROPS))
-    felt = vibration_amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
-    return felt, drop, stiffness
+    vibration = vibration_amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
+    return vibration, drop, stiffness
 
 
 @cache
 def vibration_fit(planar: bool) -> SlipModelFit[VibrationSlip]:
     """Table V fitted to the rotating spring."""
-    felt, drop, stiffness = vibrations()
-    return fit_vibration_slip(felt, SLIPS[1:], drop, stiffness, planar)
+    vibration, drop, stiffness = vibrations()
+    return fit_vibration_slip(vibration, SLIPS[1:], drop, stiffness, planar)
 
 
 def fused_slip(torque: str, vibration: str) -> FusedEstimate:
-    """Slips from torque and vibration joined, of errors as table VI prints them (in %)."""
+    """Fused slip from torque and vibration, with the standard deviations of table VI (in %)."""
     std = 100.0 * np.asarray([TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std])
     return inverse_variance(np.zeros(2), std)
 
 
 def fused_soil(name: str) -> FusedEstimate:
-    """Three estimates of a property joined by eq. 30, of errors as table VIII prints them (%)."""
+    """Three estimates of a property fused by eq. 30, with the std of table VIII (%)."""
     return pairwise(np.zeros(3), np.asarray(STD[name]))
 
 
@@ -110,8 +110,8 @@ def _weight(torque: str, vibration: str) -> float:
 
 
 def _slip_gain(torque: str, vibration: str, index: int) -> float:
-    alone = (TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std)[index]
-    return float(fused_slip(torque, vibration).std) - 100.0 * alone
+    single = (TORQUE_SLIP[torque].slip_std, VIBRATION_SLIP[vibration].slip_std)[index]
+    return float(fused_slip(torque, vibration).std) - 100.0 * single
 
 
 def _soil_weight(name: str, index: int) -> float:

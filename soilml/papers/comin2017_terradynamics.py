@@ -1,4 +1,4 @@
-"""What Comin and Saaj 2017 print of walks by resistive forces, computed."""
+"""The numbers that Comin and Saaj 2017 print on walking by resistive-force theory, computed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from soilml.systems.wheel_legs.walking.gait_metrics import (
 from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.resistive_force import stress_gains
 
-#: Ground on which numbers of legs are compared, the middle of the paper's range; not printed.
+#: Ground for the comparison of numbers of legs: the middle of the paper's range; not printed.
 MIDDLE = LinearGround(stiffness=0.7e6)
 
 
@@ -49,10 +49,10 @@ def _fit() -> SinkageFit:
 
 
 def _rank(values: Array, foot: str) -> float:
-    """Place of a foot, from 1, by value from the least; NaN where grounds disagree."""
+    """Rank of a foot, from 1 for the lowest value; NaN if grounds disagree."""
     rows = values.reshape(len(_feet().feet), -1)
-    places = 1 + np.argsort(np.argsort(rows, axis=0), axis=0)[_feet().feet.index(foot)]
-    return float(places[0]) if np.ptp(places) == 0 else float("nan")
+    ranks = 1 + np.argsort(np.argsort(rows, axis=0), axis=0)[_feet().feet.index(foot)]
+    return float(ranks[0]) if np.ptp(ranks) == 0 else float("nan")
 
 
 def _slope(values: Array) -> Array:
@@ -87,6 +87,6 @@ COMPUTED: dict[str, Callable[[], float]] = {
 
 
 def _drop() -> Array:
-    """Share by which each added leg lowers the largest sinkage."""
-    most = _legs().max_sinkage
-    return 1.0 - most[1:] / most[:-1]
+    """Relative decrease of the maximum sinkage by each additional leg."""
+    largest = _legs().max_sinkage
+    return 1.0 - largest[1:] / largest[:-1]

@@ -1,4 +1,4 @@
-"""What nagatani2009 prints, computed."""
+"""The numbers that Nagatani, Ikeda, Sato and Yoshida 2009 print, computed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from soilml.systems.force_sensor_wheel import (
 GRAVITY = 9.80665
 #: Table I pairs its five slips with the five slopes of section IV.A, in order.
 SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
-#: Share of the way to the entry angle that keeps 30 of 70 degrees, rounded as the effect cites it.
+#: Shift of the exit towards the entry that leaves 30 of 70 degrees, rounded as in the effect.
 SHIFT = 0.57
 WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
 STRENGTH = ShearStrength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
@@ -35,8 +35,8 @@ WEIGHT = 28.92
 
 
 @cache
-def _found(slip: float) -> tuple[StressProfile, float]:
-    """The stress and the k_x (m) that the sensors give of an arc of 30 degrees with one k_x."""
+def _through_sensors(slip: float) -> tuple[StressProfile, float]:
+    """Stress and k_x (m) estimated through the sensors from an arc of 30 degrees with one k_x."""
     at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
     true = balanced_arc(math.radians(30.0), at, WHEEL, STRENGTH, float(SAND.shear_modulus))
     profile = profile_from_readings(simulate_readings(true, WHEEL), WHEEL)
@@ -44,27 +44,27 @@ def _found(slip: float) -> tuple[StressProfile, float]:
 
 
 def _modulus(slip: float) -> float:
-    return _found(slip)[1]
+    return _through_sensors(slip)[1]
 
 
 def _arc() -> float:
-    """The stressed arc in degrees, mean over the runs up to slip 0.5."""
-    profiles = [_found(slip)[0] for slip in SLOPES if slip < 0.5]
+    """Length of the stressed arc in degrees, mean over the runs up to slip 0.5."""
+    profiles = [_through_sensors(slip)[0] for slip in SLOPES if slip < 0.5]
     return float(np.rad2deg(np.mean([p.entry_angle - p.exit_angle for p in profiles])))
 
 
-def _shifted() -> float:
-    """The arc in degrees that `stress-shift` leaves of 70 degrees of contact."""
+def _shifted_arc() -> float:
+    """Length of the arc in degrees that remains of 70 degrees with `stress-shift`."""
     wheel, at = Wheel(radius=WHEEL.radius, width=WHEEL.width), Operating(slip=0.0, load=WEIGHT)
     depth = np.asarray(WHEEL.radius * (1.0 - math.cos(math.radians(70.0))))
     scene = LoadCase(wheel, SAND, at)
     rim = wheel.contact_geometry(depth, SAND, at)
-    left = StressShift(shift=SHIFT).on_contact(rim, scene)
-    return float(np.rad2deg(left.entry - left.exit))
+    shifted = StressShift(shift=SHIFT).on_contact(rim, scene)
+    return float(np.rad2deg(shifted.entry - shifted.exit))
 
 
-#: Keys of what the wheel and the sand of the catalogue keep as printed.
-GIVEN = frozenset(
+#: Keys of inputs: wheel and sand of the catalogue have the printed values.
+INPUTS = frozenset(
     (
         *("radius", "width", "sensors", "diameter", "interval", "rim_speed", "saturation"),
         *("deadband", "cohesion", "friction_angle", "modulus_flat"),
@@ -86,6 +86,6 @@ COMPUTED: dict[str, Callable[[], float]] = {
     "friction_angle": lambda: math.degrees(SAND.friction_angle),
     "modulus_flat": lambda: float(SAND.shear_modulus),
     "arc": _arc,
-    "arc_effect": _shifted,
+    "arc_effect": _shifted_arc,
     **{f"modulus_{round(100 * slip):02d}": partial(_modulus, slip) for slip in SLOPES},
 }

@@ -1,4 +1,4 @@
-"""A printed number, and how a computed one stands beside it."""
+"""A printed number, and its comparison with the computed one."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from dataclasses import dataclass
 from importlib import resources
 
 from soilml.errors import InputError
-from soilml.papers import PAPERS
+from soilml.papers.catalogue import PAPERS, chapters
 
+#: Columns of the CSV file of a chapter.
 COLUMNS = ("key", "what", "source", "unit", "published", "tolerance", "reason")
 
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that a paper prints, how near a faithful model must come, or why it cannot.
+    """A number printed in a paper, with the tolerance within which a model must reproduce it.
 
-    `tolerance` is a share of the number where the file gives per cent, else in its unit. A row
-    with a `reason` is known not to be reproduced; one that nothing computes must have a reason.
-    A number that is `given` is an input that the model keeps as printed: read back, not computed.
+    `tolerance` is a fraction of the number where the file states per cent, else in its unit. A row
+    with a `reason` is known not to be reproduced; a row that nothing computes must have a reason.
+    An input (`is_input`) is kept by the model as printed: it is read back and is not a result.
     """
 
     paper: str
@@ -33,7 +34,7 @@ class PrintedNumber:
     tolerance: float
     relative: bool
     reason: str
-    given: bool
+    is_input: bool
     compute: Callable[[], float] | None
 
     @property
@@ -41,51 +42,60 @@ class PrintedNumber:
         """Largest difference that counts as reproduced, in the number's unit."""
         return self.tolerance * (abs(self.published) if self.relative else 1.0)
 
-    def compared(self) -> Comparison:
-        """Compute the number and judge it; takes as long as its model takes."""
+    def compare(self) -> Comparison:
+        """Compute the number and compare; takes as long as its model."""
         value = math.nan if self.compute is None else float(self.compute())
         return Comparison(self, value, bool(abs(value - self.published) <= self.allowed))
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A printed number, the computed one (NaN where nothing computes it), and the judgement."""
+    """A printed number, the computed one (NaN where nothing computes it), and the result."""
 
     row: PrintedNumber
     computed: float
     holds: bool
 
     @property
-    def said(self) -> str:
-        """The judgement in words."""
+    def verdict(self) -> str:
+        """yes, known, NO, given or not computed: see `soilml papers --help`."""
         if self.holds:
-            return "given" if self.row.given else "yes"
+            return "given" if self.row.is_input else "yes"
         if not self.row.reason:
             return "NO"
         return "not computed" if math.isnan(self.computed) else "known"
 
     @property
-    def honest(self) -> bool:
-        """Whether the file tells the truth: reproduced, or not and said so."""
+    def is_consistent(self) -> bool:
+        """Whether the number is reproduced and has no reason, or is not and has one."""
         return self.holds != bool(self.row.reason)
 
 
 def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
-    """Every row of one paper, or of all; raises `InputError` for a paper that is not there."""
+    """Iterate over the printed numbers of one paper, or of all.
+
+    Raises `InputError` for an unknown paper.
+
+    Examples
+    --------
+    >>> number = next(printed_numbers("nagatani2009"))
+    >>> number.what, number.published, number.compare().verdict
+    ('wheel radius', 0.055, 'given')
+    """
     if paper is not None and paper not in PAPERS:
         raise InputError(f"no paper {paper!r}; there are: {', '.join(PAPERS)}")
     for name in PAPERS if paper is None else (paper,):
-        for chapter in PAPERS[name]:
+        for chapter in chapters(name):
             module = importlib.import_module(f"soilml.papers.{chapter}")
-            given: frozenset[str] = getattr(module, "GIVEN", frozenset())
+            inputs: frozenset[str] = getattr(module, "INPUTS", frozenset())
             text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
             for entry in csv.DictReader(text.splitlines()):
                 compute = module.COMPUTED.get(entry["key"])
-                yield _row(name, entry, compute, entry["key"] in given)
+                yield _parse_row(name, entry, compute, entry["key"] in inputs)
 
 
-def _row(
-    paper: str, entry: dict[str, str], compute: Callable[[], float] | None, given: bool
+def _parse_row(
+    paper: str, entry: dict[str, str], compute: Callable[[], float] | None, is_input: bool
 ) -> PrintedNumber:
     tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
     return PrintedNumber(
@@ -98,6 +108,6 @@ def _row(
         tolerance=float(tolerance.rstrip("% ")) / 100.0 if relative else float(tolerance),
         relative=relative,
         reason=entry["reason"].strip(),
-        given=given,
+        is_input=is_input,
         compute=compute,
     )

@@ -1,4 +1,4 @@
-"""What Wang, Yan and Du 2018 print of their tracked robot, computed."""
+"""The numbers that Wang, Yan and Du 2018 print on their tracked robot, computed."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from soilml.physics.soils import soil
 from soilml.systems.tracked_robot.pull_regression import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
-#: Slips over which a curve of drawbar pull counts as level.
+#: Slips over which the drawbar pull is averaged as its plateau.
 LEVEL = np.linspace(0.5, 0.9, 9)
 
 
 @cache
 def plateau(ground: str, *, grousers: bool) -> float:
-    """Mean drawbar pull (N) of the robot over the slips at which its curve is level."""
+    """Mean drawbar pull (N) of the robot over the slips of the plateau."""
     effects = (*((GROUSERS,) if grousers else ()), *BEYOND_PEAK[ground])
     return float(WANG2018.pull(soil(f"wang2018/{ground}"), LEVEL, effects).mean())
 
@@ -32,8 +32,8 @@ def printed() -> dict[str, float]:
     return {row["key"]: float(row["published"]) for row in csv.DictReader(text.splitlines())}
 
 
-def averaged(name: str) -> float:
-    """Mean of one parameter over the eight groups as Table 1 prints them, angles in rad."""
+def group_mean(name: str) -> float:
+    """Mean of one parameter over the eight groups of Table 1, angles in rad."""
     groups = [
         v for key, v in printed().items() if key.startswith("table1_") and key.endswith(f"_{name}")
     ]
@@ -42,21 +42,21 @@ def averaged(name: str) -> float:
 
 
 def variance_ratio() -> float:
-    """F of a straight line with the printed r2 through the number of points that both imply."""
+    """F of a line with the printed r2 and the number of points implied by r2 and F."""
     r2 = printed()["regression_r2"]
     points = round(implied_points(r2, printed()["regression_f"]))
     return r2 / (1.0 - r2) * (points - 2)
 
 
 def gain(ground: str) -> float:
-    """What grousers add to the plateau, N."""
+    """Increase of the plateau by grousers, N."""
     return plateau(ground, grousers=True) - plateau(ground, grousers=False)
 
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     **{
-        f"sand_{name}": partial(averaged, name)
+        f"sand_{name}": partial(group_mean, name)
         for name in ("n", "friction_angle", "kp", "shear_modulus", "cohesion")
     },
     "regression_f": variance_ratio,

@@ -1,7 +1,7 @@
-"""What Xue et al. 2016 print, computed.
+"""The numbers that Xue et al. 2016 print, computed.
 
-Their result figures are not here: the text says that the parameters are predicted accurately, and
-gives no number for it.
+Their results are not included: the text states that the parameters are predicted accurately without
+giving a number.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
-#: The wheel is assumed, the soil is of another paper; the load is printed.
+#: The wheel is assumed, the soil is from another paper, the load is printed.
 NAME = "ding2015/lunar_soil"
 WHEEL = LinearWheel(radius=0.15, width=0.15)
 LOAD = 50.0
-#: More soil than lunar: equations must agree wherever they hold.
+#: Cohesions beyond the lunar range as well: the equations must agree for all of them.
 SLIPS = np.linspace(0.2, 0.6, 9)
 COHESIONS = np.asarray([0.0, 170.0, 2700.0])[:, None]
-#: Readings a method is tried with, at slips and loads of which no two are alike.
-MOST_READINGS = 4
+#: Largest number of readings with which a method is tried, at distinct slips and loads.
+MAX_READINGS = 4
 
 
 def _soil() -> Soil:
-    """Lunar soil of the catalogue with the maximum stress midway, as the paper has it."""
+    """Lunar soil of the catalogue with the maximum stress midway, as in the paper."""
     return soil(NAME, cohesion=COHESIONS, a0=0.5, a1=0.0)
 
 
 @dataclass(frozen=True)
-class _Sums:
-    """Load (N), drawbar pull (N) and torque (N m) by quadrature of the straight stresses."""
+class _Integrals:
+    """Load (N), drawbar pull (N) and torque (N m) by quadrature of the linear stresses."""
 
     load: Floats
     pull: Floats
@@ -54,12 +54,12 @@ class _Sums:
 
 
 @cache
-def _driven() -> Force:
+def _simulated() -> Force:
     return Model(WHEEL)(_soil(), Operating(slip=SLIPS, load=LOAD))
 
 
 @cache
-def _quadrature() -> _Sums:
+def _quadrature() -> _Integrals:
     r"""Eqs. 2-4 of the stresses of eqs. 1 and 5-8, piece by piece, at the model's own sinkage.
 
     .. math:: \tau_{offset} = \tau(0), \qquad \tau_m = \tau(\theta_m)
@@ -67,7 +67,7 @@ def _quadrature() -> _Sums:
     with the Gauss-Legendre rule of 40 points: exact to rounding for these integrands.
     """
     ground, r, area = _soil(), WHEEL.radius, WHEEL.radius * WHEEL.width
-    entry = np.asarray(_driven().entry_angle)
+    entry = np.asarray(_simulated().entry_angle)
     peak = 0.5 * entry  # theta_2 = 0
     depth = r * (np.cos(peak) - np.cos(entry))
     normal = (ground.kc / WHEEL.width + ground.kphi) * depth**ground.n
@@ -82,7 +82,7 @@ def _quadrature() -> _Sums:
             load += area * step * (sigma * np.cos(angle) + tau * np.sin(angle))
             pull += area * step * (tau * np.cos(angle) - sigma * np.sin(angle))
             torque += r * area * step * tau
-    return _Sums(load, pull, torque)
+    return _Integrals(load, pull, torque)
 
 
 def _shear(normal: Floats | float, angle: Floats | float, entry: Floats) -> Floats:
@@ -95,8 +95,8 @@ def _shear(normal: Floats | float, angle: Floats | float, entry: Floats) -> Floa
     )
 
 
-def _apart(found: Floats, expected: Floats, size: Floats) -> float:
-    return float(np.max(np.abs(found - expected) / np.abs(size)))
+def _relative_difference(values: Floats, expected: Floats, scale: Floats) -> float:
+    return float(np.max(np.abs(values - expected) / np.abs(scale)))
 
 
 @cache
@@ -104,21 +104,21 @@ def _angles() -> tuple[float, float]:
     """Angle of the maximum stress over the sum of entry and exit angle, and exit angle (rad)."""
     at = Operating(slip=SLIPS, load=LOAD)
     leave, peak = Model(WHEEL).profile(_soil(), at).angle
-    entry = _driven().entry_angle
+    entry = _simulated().entry_angle
     return float(np.max(peak / (entry + leave))), float(np.max(np.abs(leave)))
 
 
-def _determined() -> float:
-    """Directions of (c, phi, K) that one torque tells of: the rank of its derivatives."""
+def _identifiable_combinations() -> float:
+    """Number of combinations of (c, phi, K) determined by one torque: rank of its derivatives."""
     ground, at = soil(NAME, a0=0.5, a1=0.0), Operating(slip=0.4, load=LOAD)
-    beside = np.asarray([0.999, 1.001])
-    moved = (replace(ground, **{name: getattr(ground, name) * beside}) for name in SHEAR)
+    factors = np.asarray([0.999, 1.001])
+    moved = (replace(ground, **{name: getattr(ground, name) * factors}) for name in SHEAR)
     slopes = [np.diff(Model(WHEEL)(one, at).torque) for one in moved]
     return float(np.linalg.matrix_rank(np.asarray(slopes)))
 
 
 def _least_readings(method: str, free: tuple[str, ...]) -> float:
-    """The fewest readings, torque and sinkage of each, from which a method finds its unknowns."""
+    """Fewest readings of torque and sinkage from which a method identifies its unknowns."""
     priors = {
         "cohesion": Prior(0.0, 5000.0),
         "friction_angle": Prior(0.3, 1.0),
@@ -127,10 +127,10 @@ def _least_readings(method: str, free: tuple[str, ...]) -> float:
     }
     noise = {"torque_Nm": Noise(share=0.001), "sinkage_m": Noise(constant=1e-6)}
     case = Case(Model(WHEEL), soil(NAME, a0=0.5, a1=0.0), priors, noise)
-    slip = np.linspace(0.2, 0.6, MOST_READINGS)
-    load = np.linspace(30.0, 70.0, MOST_READINGS)
+    slip = np.linspace(0.2, 0.6, MAX_READINGS)
+    load = np.linspace(30.0, 70.0, MAX_READINGS)
     force = case.model(case.soil, Operating(slip=slip, load=load))
-    for count in range(1, MOST_READINGS + 1):
+    for count in range(1, MAX_READINGS + 1):
         columns = {"slip": slip, "load_N": load, "torque_Nm": force.torque}
         if method == "linear":
             columns["sinkage_m"] = force.sinkage
@@ -142,24 +142,24 @@ def _least_readings(method: str, free: tuple[str, ...]) -> float:
     return float("nan")
 
 
-#: Keys of what the simplified wheel is told, and keeps.
-GIVEN = frozenset({"load", "theta_m", "theta_2"})
+#: Keys of inputs of the simplified wheel.
+INPUTS = frozenset({"load", "theta_m", "theta_2"})
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "load": lambda: float(_quadrature().load[1, 0]),
     "theta_m": lambda: _angles()[0],
     "theta_2": lambda: _angles()[1],
-    "load_consistent": lambda: _apart(
-        _driven().load, _quadrature().load, np.full_like(_quadrature().load, LOAD)
+    "load_consistent": lambda: _relative_difference(
+        _simulated().load, _quadrature().load, np.full_like(_quadrature().load, LOAD)
     ),
-    "pull_consistent": lambda: _apart(
-        _driven().drawbar_pull, _quadrature().pull, np.full_like(_quadrature().load, LOAD)
+    "pull_consistent": lambda: _relative_difference(
+        _simulated().drawbar_pull, _quadrature().pull, np.full_like(_quadrature().load, LOAD)
     ),
-    "torque_consistent": lambda: _apart(
-        _driven().torque, _quadrature().torque, _quadrature().torque
+    "torque_consistent": lambda: _relative_difference(
+        _simulated().torque, _quadrature().torque, _quadrature().torque
     ),
-    "determined": _determined,
+    "determined": _identifiable_combinations,
     "linear_readings": lambda: _least_readings("linear", ("cohesion", "friction_angle")),
     "newton_readings": lambda: _least_readings("newton", ("friction_angle", "shear_modulus")),
 }

@@ -14,8 +14,7 @@ from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import output_files
 from soilml.io.text_tables import format_table
 from soilml.optional_imports import need
-from soilml.papers import PAPERS, TITLES
-from soilml.papers.published import Comparison, printed_numbers
+from soilml.papers import PAPERS, Comparison, printed_numbers
 
 HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
@@ -60,14 +59,14 @@ def run(args: argparse.Namespace) -> int:
     found = []
     with progress_bar("computing", len(rows)) as progress:
         for row in rows:
-            found.append(row.compared())
+            found.append(row.compare())
             progress(len(found))
     if args.out is not None or not is_terminal():
         write_columns(_columns(found), args.out)
     else:
         papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
         print("\n\n".join(_page(paper, its, args.all) for paper, its in papers.items()), end="\n\n")
-    count = Counter(c.said for c in found)
+    count = Counter(c.verdict for c in found)
     print(
         f"{len(found)} printed numbers: {count['yes']} reproduced within their tolerance, "
         f"{count['known']} known to miss it, {count['NO']} wrong; {count['given']} inputs kept as "
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it, then what the table omits."""
-    shown = [c for c in found if every or c.said in ("yes", "known", "NO")]
+    shown = [c for c in found if every or c.verdict in ("yes", "known", "NO")]
     notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
     lines = []
     for c in shown:
@@ -87,21 +86,21 @@ def _page(paper: str, found: list[Comparison], every: bool) -> str:
         mark = f" [{notes.index(row.reason) + 1}]" if row.reason else ""
         allowed = f"{100 * row.tolerance:.3g} %" if row.relative else f"{row.tolerance:.3g}"
         computed = "" if math.isnan(c.computed) else f"{c.computed:.4g}"
-        numbers = (f"{row.published:.4g}", computed, "" if c.said == "not computed" else allowed)
-        lines.append((f"{c.said}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
+        numbers = (f"{row.published:.4g}", computed, "" if c.verdict == "not computed" else allowed)
+        lines.append((f"{c.verdict}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
     header = ("holds", "unit", "printed", "computed", "tolerance", "what (where)")
-    page = [TITLES[paper], format_table(header, lines, text_columns=2, last_left=True)]
+    page = [PAPERS[paper].title, format_table(header, lines, text_columns=2, last_left=True)]
     page += [_wrapped(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
     return "\n".join(page + ([] if every else _rest(found)))
 
 
 def _rest(found: list[Comparison]) -> list[str]:
     """What the table omits: inputs, and numbers that are not computed, by reason."""
-    given = [c.row.what for c in found if c.said == "given"]
+    given = [c.row.what for c in found if c.verdict == "given"]
     said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
     why: dict[str, list[str]] = {}
     for c in found:
-        if c.said == "not computed":
+        if c.verdict == "not computed":
             why.setdefault(c.row.reason, []).append(c.row.source)
     for reason, sources in why.items():
         where = "; ".join(dict.fromkeys(sources))
@@ -120,7 +119,7 @@ def _columns(found: list[Comparison]) -> dict[str, list[object]]:
         "what": [c.row.what for c in found],
         "source": [c.row.source for c in found],
         "unit": [c.row.unit for c in found],
-        "holds": [c.said for c in found],
+        "holds": [c.verdict for c in found],
         "reason": [c.row.reason for c in found],
         "published": [c.row.published for c in found],
         "computed": [c.computed for c in found],
