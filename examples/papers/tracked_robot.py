@@ -172,7 +172,8 @@ def eight_groups() -> tuple[Case, GroupFits]:
         print(
             f"{name:14s} {scale * true:7.4g}  {scale * groups.mean[i]:7.4g}  "
             f"{scale * groups.std[i]:7.2g}  {scale * PRIOR[name].std:9.2g}  "
-            f"{groups.remaining_fraction[name]:22.0%}  {groups.pooled.remaining_fraction[name]:8.0%}"
+            f"{groups.remaining_fraction[name]:22.0%}  "
+            f"{groups.pooled.remaining_fraction[name]:8.0%}"
         )
     print(f"hardly identified or not identified: {', '.join(groups.unidentified)}")
     return case, groups

@@ -53,14 +53,14 @@ def folder(tmp_path, tables, monkeypatch):
     return tmp_path
 
 
-def test_an_output_without_a_name_is_refused(folder, capsys):
+def test_an_empty_output_name_is_refused(folder, capsys):
     before = sorted(folder.iterdir())
     assert main([*COMMAND, "--out", ""]) == 2
     assert "--out is empty" in capsys.readouterr().err
     assert sorted(folder.iterdir()) == before
 
 
-def test_the_slope_that_a_rover_climbs_is_within_its_band(folder, true, capsys):
+def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
     assert main([*COMMAND, "--slip-limit", "0.3"]) == 0
     found = json.loads(capsys.readouterr().out)
     best = found["steepest_slope_rad"]
@@ -72,10 +72,10 @@ def test_the_slope_that_a_rover_climbs_is_within_its_band(folder, true, capsys):
     assert len(found["runs"]) == 6
 
 
-def test_a_folder_gets_the_answer_its_curve_and_the_climbs(folder, capsys):
+def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
     assert main([*COMMAND, "--out", "found"]) == 0
-    said = capsys.readouterr().out
-    assert "6 climbs on 3 slopes" in said and "steepest slope" in said
+    message = capsys.readouterr().out
+    assert "6 climbs on 3 slopes" in message and "steepest slope" in message
     assert sorted(f.name for f in (folder / "found").iterdir()) == [
         "climb.json", "climbs.csv", "curve.csv",
     ]  # fmt: skip
@@ -86,13 +86,13 @@ def test_a_folder_gets_the_answer_its_curve_and_the_climbs(folder, capsys):
         assert low <= middle <= high
 
 
-def test_the_same_seed_gives_the_same_answer(folder):
+def test_the_same_seed_gives_the_same_result(folder):
     for name in ("a.json", "b.json"):
         assert main([*COMMAND, "--seed", "3", "--out", name]) == 0
     assert (folder / "a.json").read_text() == (folder / "b.json").read_text()
 
 
-def test_tables_give_back_what_was_logged(folder, tables):
+def test_tables_are_read_back_as_written(folder, tables):
     data = read_climb_data("runs.csv", "stress.csv", Noise(share=0.05))
     again = climb_tables(data.climbs, rim_speed=0.00915)
     for name, values in tables[0].items():
@@ -195,22 +195,22 @@ FAULTS = {
 }
 
 
-def refused(folder, capsys, said, command=COMMAND):
+def refused(folder, capsys, message, command=COMMAND):
     before = sorted(p.name for p in folder.rglob("*"))
     assert main([*command, "--out", "found"]) == 2
     captured = capsys.readouterr()
-    assert captured.err.count("\n") == 1 and said in captured.err, captured.err
+    assert captured.err.count("\n") == 1 and message in captured.err, captured.err
     assert captured.out == ""
     assert sorted(p.name for p in folder.rglob("*")) == before
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_bad_tables_are_one_clear_line(folder, tables, capsys, fault):
-    change, said = FAULTS[fault]
+def test_invalid_tables_are_refused_in_one_line(folder, tables, capsys, fault):
+    change, message = FAULTS[fault]
     runs, stress = change(*tables)
     (folder / "runs.csv").write_text(csv_text(runs))
     (folder / "stress.csv").write_text(csv_text(stress))
-    refused(folder, capsys, said)
+    refused(folder, capsys, message)
 
 
 ROVER_FAULTS = {
@@ -230,10 +230,10 @@ ROVER_FAULTS = {
 
 
 @pytest.mark.parametrize("fault", ROVER_FAULTS)
-def test_bad_rover_files_are_one_clear_line(folder, capsys, fault):
-    text, said = ROVER_FAULTS[fault]
+def test_invalid_rover_files_are_refused_in_one_line(folder, capsys, fault):
+    text, message = ROVER_FAULTS[fault]
     (folder / "rover.toml").write_text(text)
-    refused(folder, capsys, said)
+    refused(folder, capsys, message)
 
 
 def test_too_few_slopes_are_refused_with_the_number_needed(folder, tables, capsys):
@@ -243,17 +243,17 @@ def test_too_few_slopes_are_refused_with_the_number_needed(folder, tables, capsy
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--slip-limit", "0.95"], "there is no prediction outside"),
         (["--slip-limit", "30"], "needed is a slip from 0 to 1"),
         (["--seed", "-1"], "needed is a whole number"),
     ],
 )
-def test_bad_options_are_one_clear_line(folder, capsys, options, said):
-    refused(folder, capsys, said, [*COMMAND, *options])
+def test_invalid_options_are_refused_in_one_line(folder, capsys, options, message):
+    refused(folder, capsys, message, [*COMMAND, *options])
 
 
-def test_the_answer_is_not_written_over_a_table(folder, capsys):
+def test_a_table_is_not_overwritten(folder, capsys):
     assert main([*COMMAND, "--out", "runs.csv"]) == 2
     assert "is a file; needed is a folder" in capsys.readouterr().err

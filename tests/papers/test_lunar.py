@@ -57,17 +57,17 @@ def test_one_reading_hardly_narrows_any_parameter_alone(truth):
     assert (left(truth, np.asarray([0.4]), np.asarray([50.0])) > 0.6).all()
 
 
-def test_slips_at_one_load_tell_the_shear_modulus_and_not_the_cohesion(truth):
+def test_slips_at_one_load_identify_the_shear_modulus_but_not_the_cohesion(truth):
     cohesion, _, modulus = left(truth, np.linspace(0.2, 0.6, 8), np.full(8, 50.0))
     assert modulus < 0.3
     assert cohesion > 0.8
 
 
-def test_slips_at_three_loads_tell_all_three(truth):
+def test_slips_at_three_loads_identify_all_three_parameters(truth):
     assert (left(truth, *three_loads()) < 0.3).all()
 
 
-def test_soils_are_drawn_inside_the_prior_and_as_the_gaussian_says(truth):
+def test_soil_samples_follow_the_gaussian_inside_the_prior(truth):
     rng = np.random.default_rng(5)
     covariance = np.diag((0.02 * SPREAD) ** 2)
     draws = drawn(CASE, truth, covariance, rng, 4000)
@@ -77,7 +77,7 @@ def test_soils_are_drawn_inside_the_prior_and_as_the_gaussian_says(truth):
     assert ((cornered >= LOWER) & (cornered <= UPPER)).all()
 
 
-def test_a_soil_that_is_known_gives_its_own_pull(truth):
+def test_a_known_soil_gives_its_own_pull(truth):
     rng = np.random.default_rng(6)
     known = everywhere(truth, np.diag((1e-6 * SPREAD) ** 2), 5)
     pull, low, high = band(CASE, *known, SLIPS, 50.0, rng, 50)
@@ -85,7 +85,7 @@ def test_a_soil_that_is_known_gives_its_own_pull(truth):
     assert (high - low < 1e-3).all()
 
 
-def test_a_reading_foretells_the_pull_best_at_its_own_slip_and_the_prior_worst(estimator):
+def test_a_reading_predicts_the_pull_best_at_its_own_slip_and_the_prior_worst(estimator):
     rng = np.random.default_rng(7)
     seen = drive(CASE, SLIPS, 50.0, 80, rng)
     sound = estimator(slip=SLIPS, torque=seen.torque, load=50.0).in_range

@@ -24,7 +24,7 @@ def test_a_printed_number_is_reproduced_or_has_a_reason(row):
 
 
 @pytest.mark.parametrize("chapter", CHAPTERS)
-def test_a_chapter_is_whole(chapter):
+def test_a_chapter_is_complete(chapter):
     text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
     entries = list(csv.DictReader(text.splitlines()))
     keys = [entry["key"] for entry in entries]
@@ -35,13 +35,13 @@ def test_a_chapter_is_whole(chapter):
         assert entry["what"] and entry["source"] and entry["unit"] and entry["tolerance"]
 
 
-def test_an_input_that_is_kept_counts_as_no_result():
+def test_an_input_is_not_counted_as_a_result():
     kept = [row.compare() for row in ROWS if row.is_input]
     assert {one.verdict for one in kept} == {"given"}
     assert all(abs(one.computed - one.row.published) <= 0.01 for one in kept)
 
 
-def test_a_person_sees_what_is_computed_and_the_rest_by_reason(monkeypatch, capsys):
+def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(monkeypatch, capsys):
     monkeypatch.setattr("soilml.cli.commands.papers.is_terminal", lambda: True)
     assert main(["papers", "nagatani2009"]) == 0
     short = capsys.readouterr()

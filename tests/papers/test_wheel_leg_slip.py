@@ -54,7 +54,7 @@ def test_the_middle_line_of_the_fusion_rule_as_printed_does_not_sum_to_one():
     np.testing.assert_allclose(3 * weights[1], T / (V + T) + S / (V + S))
 
 
-def test_the_lines_on_the_page_run():
+def test_the_example_on_the_page_runs():
     page = (ROOT / "docs/papers/comin2017_slip.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)

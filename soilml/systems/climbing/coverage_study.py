@@ -93,11 +93,11 @@ def random_rover(rng: np.random.Generator) -> SimulatedRover:
     def arc(entry: float) -> StressArc:
         return StressArc(
             entry=entry + rng.uniform(-0.02, 0.02),
-            forward=rng.uniform(0.20, 0.34),
-            bend=rng.uniform(1.2, 2.2),
+            shift=rng.uniform(0.20, 0.34),
+            shift_exponent=rng.uniform(1.2, 2.2),
             width=rng.uniform(0.48, 0.56),
-            behind=rng.uniform(1.1, 1.7),
-            ahead=rng.uniform(0.8, 1.1),
+            rear_exponent=rng.uniform(1.1, 1.7),
+            front_exponent=rng.uniform(0.8, 1.1),
         )
 
     while True:

@@ -35,23 +35,23 @@ class StressArc:
     """
 
     entry: float = 0.33
-    forward: float = 0.28
-    bend: float = 1.5
+    shift: float = 0.28
+    shift_exponent: float = 1.5
     width: float = 0.53
-    behind: float = 1.4
-    ahead: float = 0.9
+    rear_exponent: float = 1.4
+    front_exponent: float = 0.9
 
     def entry_angle(self, slip: float) -> float:
         """Entry angle at a slip, rad."""
-        return self.entry + self.forward * float(max(slip, 0.0) ** self.bend)
+        return self.entry + self.shift * float(max(slip, 0.0) ** self.shift_exponent)
 
     def stress(self, slip: float, angle: Floats) -> Floats:
         """Shape of the stress at angles (p,), with maximum 1."""
         entry = self.entry_angle(slip)
         x = np.clip((angle - entry + self.width) / self.width, 0.0, 1.0)
-        peak = self.behind / (self.behind + self.ahead)
-        largest = peak**self.behind * (1.0 - peak) ** self.ahead
-        return np.asarray(x**self.behind * (1.0 - x) ** self.ahead / largest)
+        peak = self.rear_exponent / (self.rear_exponent + self.front_exponent)
+        largest = peak**self.rear_exponent * (1.0 - peak) ** self.front_exponent
+        return np.asarray(x**self.rear_exponent * (1.0 - x) ** self.front_exponent / largest)
 
 
 @dataclass(frozen=True)
@@ -130,13 +130,13 @@ class SimulatedRover:
         self, rng: np.random.Generator, slips: Sequence[float] = ARTIFICIAL_SLIPS, repeats: int = 5
     ) -> tuple[list[WheelRun], list[WheelRun]]:
         """Stress on front and on rear wheels at artificial slips on level ground."""
-        found: tuple[list[WheelRun], list[WheelRun]] = ([], [])
-        for runs, wheel in zip(found, WHEELS, strict=True):
+        by_wheel: tuple[list[WheelRun], list[WheelRun]] = ([], [])
+        for runs, wheel in zip(by_wheel, WHEELS, strict=True):
             for slip in slips:
                 for _ in range(repeats):
                     error = np.sqrt(3.0) * self.noise.speed * rng.uniform(-1.0, 1.0)
                     runs.append(self.measure(wheel, slip, 0.0, rng, speed_error=error))
-        return found
+        return by_wheel
 
     def measure(
         self,

@@ -88,9 +88,9 @@ def _slips(climbed: Table) -> dict[Key, float]:
             f"{climbed.source}: column slip is missing; needed is slip, or speed_m_s and "
             "rim_speed_m_s of each wheel"
         )
-    found: dict[Key, float] = {}
+    slips: dict[Key, float] = {}
     for row, key in enumerate(zip(climbed["run"], climbed["wheel"], strict=True)):
-        if key in found:
+        if key in slips:
             raise TableError(
                 f"{climbed.place(row)}: run {key[0]} has a second row for its {key[1]} wheel; "
                 "give each repetition a name of its own"
@@ -100,8 +100,8 @@ def _slips(climbed: Table) -> dict[Key, float]:
                 f"{climbed.place(row)}, column {from_column}: gives slip {slip[row]:.3g}; needed "
                 "is a slip between -1 and 1"
             )
-        found[key] = float(slip[row])
-    return found
+        slips[key] = float(slip[row])
+    return slips
 
 
 def _slip_of_speeds(climbed: Table) -> Floats:
@@ -116,7 +116,7 @@ def _wheel_runs(
     stresses: Table, slips: dict[Key, float], noise: Noise, runs: str
 ) -> dict[Key, WheelRun]:
     """The stress of each wheel in each run, at its slip."""
-    found: dict[Key, WheelRun] = {}
+    wheel_runs: dict[Key, WheelRun] = {}
     for name, rows in stresses.groups():
         for wheel in dict.fromkeys(rows["wheel"].tolist()):
             own = rows.rows(rows["wheel"] == wheel)
@@ -131,8 +131,8 @@ def _wheel_runs(
                 read = own["normal_Pa_std"][order]
                 std = np.where(np.isnan(read), std, read)
             slip = _slip(own, slips.get((name, wheel)), where, runs)
-            found[name, wheel] = WheelRun(slip, profile, np.asarray(std, dtype=np.float64))
-    return found
+            wheel_runs[name, wheel] = WheelRun(slip, profile, np.asarray(std, dtype=np.float64))
+    return wheel_runs
 
 
 def _slip(rows: Table, climbed: float | None, where: str, runs: str) -> float:

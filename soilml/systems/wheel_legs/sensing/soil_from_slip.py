@@ -169,16 +169,16 @@ def _check_pairs(reading: Floats, slip: Floats, name: str, std: float) -> tuple[
     return reading, slip
 
 
-def _check_physical(found: LegSoil) -> LegSoil:
+def _check_physical(estimate: LegSoil) -> LegSoil:
     """The estimate; raises `FitError` if it is not physical within its standard deviations."""
-    angle, stiffness = found.friction_angle, found.normal_stiffness
-    angle_far, stiffness_far = MAX_EXCESS * found.std
-    if not -angle_far <= angle <= 0.5 * np.pi + angle_far or stiffness < -stiffness_far:
+    angle, stiffness = estimate.friction_angle, estimate.normal_stiffness
+    angle_margin, stiffness_margin = MAX_EXCESS * estimate.std
+    if not -angle_margin <= angle <= 0.5 * np.pi + angle_margin or stiffness < -stiffness_margin:
         raise FitError(
             f"these pairs give a friction angle of {angle:.3g} rad and a stiffness of "
             f"{stiffness:.3g} Pa, which is not physical: the model is not valid for them"
         )
-    return found
+    return estimate
 
 
 def _line(

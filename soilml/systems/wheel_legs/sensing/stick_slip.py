@@ -107,8 +107,8 @@ def _integrate(
     )  # fmt: skip
     _check_ranges(slip, static, gap)
     mu_s, mu_d = np.tan(static), np.tan(static - gap)
-    standing, dashpot = length - M * GRAVITY / k, 2.0 * zeta * np.sqrt(k * M)
-    if not (standing > 0.5 * length).all():
+    loaded_length, dashpot = length - M * GRAVITY / k, 2.0 * zeta * np.sqrt(k * M)
+    if not (loaded_length > 0.5 * length).all():
         raise InputError(
             f"stiffness is {k.min():g} N/m: the leg is compressed by more than half its length; it "
             f"must be above {2.0 * (M * GRAVITY / length).max():g} N/m"
@@ -117,8 +117,8 @@ def _integrate(
     def forces(t: Floats, z: Floats, w: Floats, x: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Normal force, and the horizontal force on the foot."""
         angle = omega * t
-        reach = (1.0 - slip) * standing * np.sin(angle) - x
-        rate = (1.0 - slip) * standing * omega * np.cos(angle) - v
+        reach = (1.0 - slip) * loaded_length * np.sin(angle) - x
+        rate = (1.0 - slip) * loaded_length * omega * np.cos(angle) - v
         span = np.hypot(z, reach)
         cos, sin = z / span, reach / span
         axial = np.maximum(k * (length - span) - dashpot * (w * cos + rate * sin), 0.0)
@@ -129,7 +129,7 @@ def _integrate(
     count = int(np.ceil(np.max(lasts * fastest) * STEPS_PER_PERIOD / (2.0 * math.pi)))
     dt = lasts / count
     half = 0.5 * dt
-    z, w, x, v = standing, np.zeros_like(k), np.zeros_like(k), np.zeros_like(k)
+    z, w, x, v = loaded_length, np.zeros_like(k), np.zeros_like(k), np.zeros_like(k)
     heading = np.zeros_like(k)  # direction of sliding of the foot, 0 where it sticks
     for step in range(count + 1):
         t = step * dt

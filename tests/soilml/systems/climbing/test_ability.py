@@ -44,7 +44,7 @@ def ability(ground, stresses):
     return climbing_ability(ground, *stresses)
 
 
-def test_stress_between_measured_slips_lies_where_it_is(true, stresses):
+def test_stress_is_interpolated_between_measured_slips(true, stresses):
     arc, front = true.arcs[0], stresses[0]
     slips = np.asarray([0.1, 0.25, 0.5])
     for slip, profile in zip(slips, front.profiles(slips), strict=True):
@@ -61,19 +61,19 @@ def test_stress_moves_forward_with_slip(stresses):
     assert np.all(np.diff([p.entry_angle for p in profiles]) > 0.0)
 
 
-def test_nothing_is_said_of_slips_where_no_stress_was_measured(stresses):
+def test_slips_without_measured_stress_are_refused(stresses):
     for slip in (0.01, 0.8):
         with pytest.raises(FitError, match="stress was measured from"):
             stresses[0].profiles(np.asarray([slip]))
 
 
-def test_stress_at_one_slip_says_nothing_of_others(true):
+def test_stress_at_one_slip_is_refused(true):
     front, _ = true.simulate_artificial_slip(np.random.default_rng(0), [0.2], 3)
     with pytest.raises(FitError, match="two slips"):
         StressBySlip.fit(front)
 
 
-def test_redrawn_stress_scatters_as_the_readings_do(true, stresses):
+def test_resampled_stress_scatters_as_the_readings(true, stresses):
     rng = np.random.default_rng(0)
     at = np.asarray([0.36])
     entries = [stresses[0].resampled(rng).profiles(at)[0].entry_angle for _ in range(60)]
@@ -102,7 +102,7 @@ def test_a_slip_limit_beyond_the_stresses_is_refused(ability):
         ability.steepest_within(0.95)
 
 
-def test_front_and_rear_must_share_slips(true, ground):
+def test_slips_of_front_and_rear_must_overlap(true, ground):
     rng = np.random.default_rng(1)
     front, _ = true.simulate_artificial_slip(rng, [0.04, 0.13], 2)
     _, rear = true.simulate_artificial_slip(rng, [0.36, 0.68], 2)
@@ -110,7 +110,7 @@ def test_front_and_rear_must_share_slips(true, ground):
         climbing_ability(ground, StressBySlip.fit(front), StressBySlip.fit(rear))
 
 
-def test_worse_speed_widens_the_band(true):
+def test_a_larger_speed_error_widens_the_interval(true):
     climbs = true.simulate_climbs(np.random.default_rng(3), [0.0, 0.07], 2)
     narrow = identify_ground(true.rover, climbs, fixed=SAND, noise=true.noise)
     poor = replace(true.noise, speed_scale=0.02)
@@ -137,7 +137,7 @@ def test_a_profile_keeps_its_shape_whatever_its_height():
     np.testing.assert_allclose(low.profiles(at)[0].normal, high.profiles(at)[0].normal, atol=1e-9)
 
 
-def test_the_lines_on_the_page_run():
+def test_the_example_on_the_page_runs():
     page = (Path(__file__).parents[4] / "docs/papers/nagatani_climbing.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)

@@ -31,7 +31,7 @@ def exact():
     return SimulatedRover(noise=noise, stress=0.0)
 
 
-def test_the_shear_modulus_of_given_sand_is_found(true, climbs):
+def test_the_shear_modulus_is_identified_with_known_strength(true, climbs):
     ground = identify_ground(true.rover, climbs, fixed=SAND)
     assert ground.fit.names == ("shear_modulus",)
     error = ground.fit["shear_modulus"] - true.shear[2]
@@ -40,7 +40,7 @@ def test_the_shear_modulus_of_given_sand_is_found(true, climbs):
     assert np.all(ground.samples[:, 0] == 0.0)
 
 
-def test_friction_and_shear_modulus_trade_for_one_another(true, climbs):
+def test_friction_angle_and_shear_modulus_are_correlated(true, climbs):
     fit = identify_ground(true.rover, climbs, fixed={"cohesion": 0.0}).fit
     assert fit.correlation[0, 1] > 0.8
     assert fit.std[1] > 3.0 * identify_ground(true.rover, climbs, fixed=SAND).fit.std[0]
@@ -48,7 +48,7 @@ def test_friction_and_shear_modulus_trade_for_one_another(true, climbs):
         assert abs(value - truth) < 3.0 * std
 
 
-def test_cohesion_that_slopes_do_not_show_is_said_not_to_be_identified(true, climbs):
+def test_cohesion_is_reported_as_not_identified(true, climbs):
     ground = identify_ground(true.rover, climbs)
     assert ground.fit.remaining_fraction["cohesion"] > 0.8
     assert any("cohesion is not identified" in text for text in ground.fit.warnings)
@@ -67,12 +67,12 @@ def test_repetitions_of_a_slope_are_one_condition(climbs):
     assert [len(group) for group in group_by_slope(climbs, 0.005)] == [3, 3, 3, 3]
 
 
-def test_one_slope_finds_the_shear_modulus_and_says_it_is_one(true, climbs):
+def test_one_slope_identifies_the_shear_modulus_with_a_warning(true, climbs):
     ground = identify_ground(true.rover, climbs[:3], fixed=SAND)
     assert any("one slope" in text for text in ground.fit.warnings)
 
 
-def test_a_rover_that_does_not_know_its_loads_finds_the_same_soil(true, climbs):
+def test_unknown_wheel_loads_give_the_same_soil(true, climbs):
     unknown = replace(true.rover, front_share=None, height_ratio=None)
     known, shared = (
         identify_ground(rover, climbs, fixed=SAND).fit for rover in (true.rover, unknown)
@@ -80,7 +80,7 @@ def test_a_rover_that_does_not_know_its_loads_finds_the_same_soil(true, climbs):
     assert shared.values[0] == pytest.approx(known.values[0], abs=2.0 * known.std[0])
 
 
-def test_a_climb_beyond_all_grip_is_refused_by_name(true, climbs):
+def test_a_climb_beyond_the_largest_pull_is_refused_by_name(true, climbs):
     steep = [replace(climbs[0], name="cliff", slope=0.9), *climbs[1:]]
     with pytest.raises(InputError, match=r"run cliff: a slope of 0.9 rad requires .* at most"):
         identify_ground(true.rover, steep)
@@ -108,7 +108,7 @@ def test_each_slope_alone_gives_nearly_one_shear_modulus(exact):
     assert each == pytest.approx(np.full(4, exact.shear[2]), rel=0.06)
 
 
-def test_an_error_of_the_speed_spoils_the_shear_modulus_at_low_slip(exact):
+def test_a_speed_error_affects_the_shear_modulus_most_at_low_slip(exact):
     climbs = exact.simulate_climbs(np.random.default_rng(1), SLOPES, 1)
     size = {"cohesion": 0.0, "friction_angle": SAND["friction_angle"]}
     low, as_read, high = (
@@ -119,13 +119,13 @@ def test_an_error_of_the_speed_spoils_the_shear_modulus_at_low_slip(exact):
     assert (low[0] - high[0]) / as_read[0] > 5.0 * (low[-1] - high[-1]) / as_read[-1]
 
 
-def test_no_shear_modulus_balances_a_slope_beyond_grip(true, climbs):
+def test_no_shear_modulus_balances_a_slope_beyond_the_largest_pull(true, climbs):
     cliff = replace(climbs[0], slope=0.9)
     size = {"cohesion": 0.0, "friction_angle": SAND["friction_angle"]}
     assert np.isnan(modulus_per_climb(true.rover, [cliff], **size)).all()
 
 
-def test_bands_hold_the_truth_of_drawn_rovers():
+def test_intervals_cover_the_truth_of_random_rovers():
     """Six rovers: three or fewer inside bands of nine tenths would come once in sixty."""
     found = simulate_coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())
     for name, covered in found.items():

@@ -26,7 +26,7 @@ def climb(true):
     return true.simulate_climbs(np.random.default_rng(0), [0.14], 1)[0]
 
 
-def test_forces_are_straight_lines_in_magnification_and_cohesion(true, climb):
+def test_forces_are_linear_in_magnification_and_cohesion(true, climb):
     wheel = force_components(climb.front, true.rover, 0.007)
     whole = forces_from_profile(
         climb.front.profile,
@@ -49,12 +49,12 @@ def test_the_wheels_carry_the_weight_across_the_slope():
     assert rover.loads(0.2)[0] / rover.loads(0.2)[1] < rover.loads(0.0)[0] / rover.loads(0.0)[1]
 
 
-def test_half_a_centre_of_mass_is_refused():
+def test_an_incomplete_centre_of_mass_is_refused():
     with pytest.raises(InputError, match="belong together"):
         Rover(mass=12.0, radius=0.055, width=0.064, front_share=0.5)
 
 
-def test_a_climb_balances_at_its_true_soil(true, climb):
+def test_the_forces_of_a_climb_balance_at_its_true_soil(true, climb):
     c, phi, k = true.shear
     wheels = (
         force_components(climb.front, true.rover, k),
@@ -65,7 +65,7 @@ def test_a_climb_balances_at_its_true_soil(true, climb):
     assert pull == pytest.approx(true.rover.weight * np.sin(climb.slope), abs=0.6)
 
 
-def test_soil_that_gives_way_pulls_less(true, climb):
+def test_a_larger_shear_modulus_pulls_less(true, climb):
     wheels = tuple(
         force_components(w, true.rover, np.asarray([0.003, 0.007, 0.02])) for w in climb.wheels
     )
@@ -73,7 +73,7 @@ def test_soil_that_gives_way_pulls_less(true, climb):
     assert np.all(np.diff(pull) < 0.0)
 
 
-def test_the_slope_that_a_forces_climbs_is_where_pull_equals_weight(true, climb):
+def test_the_pull_at_the_equilibrium_slope_equals_the_weight_along_it(true, climb):
     wheels = tuple(force_components(w, true.rover, 0.007) for w in climb.wheels)
     for cohesion in (0.0, 800.0):
         forces = slope_pull(true.rover, wheels, cohesion, np.tan(0.66), true.rover.front_share)
@@ -83,7 +83,7 @@ def test_the_slope_that_a_forces_climbs_is_where_pull_equals_weight(true, climb)
         assert forces.pull(slope) == pytest.approx(apart, rel=1e-12)
 
 
-def test_loads_of_wheels_are_found_from_climbs(true):
+def test_wheel_loads_are_estimated_from_climbs(true):
     climbs = true.simulate_climbs(np.random.default_rng(1), [0.0, 0.07, 0.14, 0.2], 1)
     unknown = replace(true.rover, front_share=None, height_ratio=None)
     found = estimate_wheel_loads(unknown, climbs, true.shear)
@@ -98,7 +98,7 @@ def test_speed_matters_most_at_low_slip(true):
     assert by_speed[0] > 2.0 * by_speed[2]
 
 
-def test_noise_of_the_balance_is_what_repeated_readings_show():
+def test_the_std_of_the_balance_is_that_of_repeated_readings():
     """First-order spread against 200 readings of one climb."""
     noise = Uncertainty(speed=0.006, slope=0.004, entry_angle=0.0, front_load=0.08)
     true = SimulatedRover(noise=noise, stress=0.2)

@@ -103,7 +103,7 @@ def test_the_stress_of_the_model_gives_the_forces_of_the_model():
 
 
 @pytest.mark.parametrize(("slip", "slope"), [(0.11, 0.0), (0.39, 6.0), (0.8, 8.0)])
-def test_the_modulus_and_magnification_put_in_come_back(slip, slope):
+def test_modulus_and_magnification_are_recovered(slip, slope):
     at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(slope))
     arc = balanced_arc(math.radians(30.0), at, SENSORS, STRENGTH, TRUE, lean=0.2)
     found = solve_force_balance(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
@@ -111,13 +111,13 @@ def test_the_modulus_and_magnification_put_in_come_back(slip, slope):
     assert found.magnification == pytest.approx(1.7, rel=1e-6)
 
 
-def test_softer_shear_pulls_less():
+def test_a_larger_shear_modulus_reduces_the_pull():
     profile, modulus = parabolic_arc(0.2, 0.5, 2e4), np.geomspace(1e-4, 1.0, 30)
     found = forces_from_profile(profile, shear_modulus=modulus, friction_angle=PHI, slip=0.2, **RIM)
     assert (np.diff(found.drawbar_pull / found.load) < 0).all()
 
 
-def test_the_arc_that_table_i_asks_for_moves_forward_with_slip():
+def test_the_arc_implied_by_table_i_moves_forward_with_slip():
     printed = {0.11: (0.0072, 0), 0.18: (0.0073, 2), 0.29: (0.0070, 4), 0.39: (0.0066, 6)}
     printed[0.80] = (0.0026, 8)
     peaks = [
@@ -133,7 +133,7 @@ def test_the_arc_that_table_i_asks_for_moves_forward_with_slip():
     assert (np.diff(peaks) > 0).all()
 
 
-def test_the_conventional_profile_makes_too_much_of_the_grip():
+def test_the_conventional_profile_overestimates_the_pull():
     at = SteadyRun(slip=0.11, weight=WEIGHT)
     sand, wheel = soil("nagatani2009/toyoura_sand"), Wheel(**RIM)
     wide = bekker_stress_profile(wheel, sand, slip=0.11, sinkage=0.016, rebound=0.3)
@@ -144,7 +144,7 @@ def test_the_conventional_profile_makes_too_much_of_the_grip():
     assert float(found.drawbar_pull / found.load) * WEIGHT > 4.0
 
 
-def test_no_balance_says_which_side():
+def test_a_missing_solution_names_its_side():
     front, rear = parabolic_arc(0.9, 0.5, 2e4), parabolic_arc(-0.5, 0.5, 2e4)
     at = SteadyRun(slip=0.2, weight=WEIGHT)
     with pytest.raises(FitError, match="even with fully mobilised shear"):
@@ -160,7 +160,7 @@ def test_no_balance_says_which_side():
         )
 
 
-def test_there_is_at_most_one_balance():
+def test_there_is_at_most_one_solution():
     rng, modulus = np.random.default_rng(0), np.geomspace(1e-5, 10.0, 64)
     for _ in range(150):
         arc = parabolic_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
@@ -171,7 +171,7 @@ def test_there_is_at_most_one_balance():
         assert np.count_nonzero(above[1:] != above[:-1]) <= 1
 
 
-def test_several_balances_would_be_said(monkeypatch):
+def test_several_solutions_are_reported(monkeypatch):
     waves = lambda *given: (np.sin(np.log(given[-1])), np.ones_like(given[-1]))  # noqa: E731
     monkeypatch.setattr("soilml.systems.force_sensor_wheel.force_balance.excess_pull", waves)
     with pytest.raises(FitError, match="shear moduli satisfy both balances"):
@@ -181,7 +181,7 @@ def test_several_balances_would_be_said(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("angle", "normal", "said"),
+    ("angle", "normal", "message"),
     [
         ([0.0, 0.1, 0.2], [0.0, 0.0, 0.0], "without contact"),
         ([0.0, 10.0, 20.0], [0.0, 1.0, 0.0], "radians"),
@@ -193,8 +193,8 @@ def test_several_balances_would_be_said(monkeypatch):
         ([[0.0, 0.1, 0.2]], [0.0, 1.0, 0.0], "must be"),
     ],
 )
-def test_what_is_no_profile_is_refused(angle, normal, said):
-    with pytest.raises(InputError, match=said):
+def test_an_invalid_profile_is_refused(angle, normal, message):
+    with pytest.raises(InputError, match=message):
         StressProfile(np.asarray(angle), np.asarray(normal))
 
 

@@ -48,7 +48,7 @@ def test_a_sensor_reads_the_mean_over_its_disc():
     assert edge.force[at_edge].mean() == pytest.approx(0.5 * force.max(), rel=0.03)
 
 
-def test_the_deadband_and_the_end_of_the_sensors_show():
+def test_deadband_and_saturation_limit_the_readings():
     force = simulate_readings(arc(), NOISY, turns=2).force
     assert force[force > 0].min() >= 0.1
     strong = simulate_readings(
@@ -57,14 +57,14 @@ def test_the_deadband_and_the_end_of_the_sensors_show():
     assert strong.max() == 4.4
 
 
-def test_more_stress_in_the_middle_keeps_the_mean_over_the_width():
+def test_a_crowned_stress_keeps_the_mean_over_the_width():
     many = replace(QUIET, sensors=40, deadband=0.0)
     even, crowned = (simulate_readings(arc(), many, turns=1, crown=c).force for c in (0.0, 0.4))
     assert crowned.mean() == pytest.approx(even.mean(), rel=1e-3)
     assert crowned[..., 20].max() > 1.3 * crowned[..., 0].max()
 
 
-def test_readings_as_they_are_look_too_long_and_make_k_too_large():
+def test_uncorrected_readings_lengthen_the_arc_and_overestimate_k():
     binned = bin_stress(simulate_readings(arc(), QUIET), QUIET)
     raw = StressProfile(binned.angle, binned.normal)
     assert raw.entry_angle > arc().entry_angle + 0.01
@@ -73,14 +73,14 @@ def test_readings_as_they_are_look_too_long_and_make_k_too_large():
 
 @pytest.mark.parametrize("at", [LEVEL, UP], ids=["level", "uphill"])
 @pytest.mark.parametrize("lean", [-0.4, 0.0])
-def test_the_modulus_comes_back_through_quiet_sensors(at, lean):
+def test_the_modulus_is_recovered_through_noiseless_sensors(at, lean):
     readings = simulate_readings(arc(at, lean), QUIET, crown=0.3, lugs=(0.3, 0.3))
     found = solve_force_balance(profile_from_readings(readings, QUIET), at, QUIET, STRENGTH)
     assert found.shear_modulus == pytest.approx(TRUE, rel=0.02)
     assert found.magnification == pytest.approx(1.0 / 0.7, rel=0.03)
 
 
-def test_the_modulus_of_a_wheel_with_stress_shift_comes_back_through_quiet_sensors():
+def test_the_modulus_of_a_wheel_with_stress_shift_is_recovered():
     model = Model(Wheel(radius=0.055, width=0.064)) + ExitAngle(kappa=0.1) + StressShift(shift=0.3)
     sand, at = soil("nagatani2009/toyoura_sand"), Operating(slip=0.3, load=20.0)
     force, p = model(sand, at), model.profile(sand, at, points=401)
@@ -93,7 +93,7 @@ def test_the_modulus_of_a_wheel_with_stress_shift_comes_back_through_quiet_senso
     assert found.shear_modulus == pytest.approx(TRUE, rel=0.02)
 
 
-def test_lugs_that_carry_more_in_front_make_k_too_large():
+def test_lugs_that_carry_more_in_front_cause_k_to_be_overestimated():
     """M is one number: it cannot follow the lugs along the arc."""
     even, front = (
         solve_force_balance(
@@ -108,18 +108,18 @@ def test_lugs_that_carry_more_in_front_make_k_too_large():
     assert front.magnification == pytest.approx(even.magnification, rel=0.02)
 
 
-def test_a_saturated_top_is_inferred_from_the_flanks_and_said():
+def test_a_saturated_peak_is_inferred_from_the_flanks_with_a_warning():
     weak = replace(QUIET, saturation=1.2)
     readings = simulate_readings(arc(), weak)
     grip = estimate_shear_modulus(readings, LEVEL, weak, STRENGTH)
-    assert any("saturated" in said for said in grip.warnings)
+    assert any("saturated" in message for message in grip.warnings)
     assert grip.shear_modulus == pytest.approx(TRUE, rel=0.05)
     assert not estimate_shear_modulus(
         simulate_readings(arc(), QUIET), LEVEL, QUIET, STRENGTH
     ).warnings
 
 
-def test_nine_of_ten_intervals_hold_the_truth():
+def test_intervals_have_the_nominal_coverage():
     rng, runs = np.random.default_rng(7), 50
     held = pulled = 0
     apart = []
@@ -149,7 +149,7 @@ def test_nine_of_ten_intervals_hold_the_truth():
     assert float(np.std(apart)) == pytest.approx(1.0, abs=0.3)
 
 
-def test_noisier_sensors_and_unsure_slips_widen_the_answer():
+def test_noise_and_slip_uncertainty_widen_the_estimate():
     def std(noise, slip_std):
         wheel = replace(NOISY, noise=noise)
         at = replace(LEVEL, slip_std=slip_std)
@@ -161,7 +161,7 @@ def test_noisier_sensors_and_unsure_slips_widen_the_answer():
     assert std(0.02, 0.02) > 2.0 * std(0.02, 0.0)
 
 
-def test_a_pull_beyond_the_slips_it_holds_for_says_so():
+def test_a_pull_beyond_the_valid_slips_carries_a_warning():
     grip = estimate_shear_modulus(simulate_readings(arc(), QUIET), LEVEL, QUIET, STRENGTH)
     fast = SteadyRun(slip=0.8, weight=WEIGHT, slope=math.radians(8.0))
     found = predict_pull(simulate_readings(arc(fast), QUIET), fast, QUIET, STRENGTH, grip)
@@ -184,7 +184,7 @@ def test_the_jackknife_of_a_mean_is_its_variance():
     assert found[0, 0] == pytest.approx(force.var(ddof=1) / 8, rel=1e-9)
 
 
-def test_readings_that_tell_nothing_are_refused():
+def test_uninformative_readings_are_refused():
     readings = simulate_readings(arc(), QUIET, turns=2)
     with pytest.raises(InputError, match="without contact"):
         bin_stress(SensorReadings(readings.angle, 0.0 * readings.force), QUIET)
@@ -210,7 +210,7 @@ def test_readings_that_tell_nothing_are_refused():
         simulate_readings(arc(), QUIET, turns=0)
 
 
-def test_the_lines_on_the_page_run():
+def test_the_example_on_the_page_runs():
     page = (Path(__file__).parents[4] / "docs/papers/nagatani2009.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)

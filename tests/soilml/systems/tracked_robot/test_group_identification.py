@@ -42,7 +42,7 @@ def groups():
     return identify_groups(CASE, tables, SHEAR)
 
 
-def test_pull_at_one_load_finds_friction_and_modulus_and_not_cohesion(groups):
+def test_pull_at_one_load_identifies_friction_and_modulus_but_not_cohesion(groups):
     assert groups.names == SHEAR
     assert "cohesion" in groups.unidentified
     assert (
@@ -55,20 +55,20 @@ def test_pull_at_one_load_finds_friction_and_modulus_and_not_cohesion(groups):
     assert groups.std[cohesion] > 0.7 * PRIOR["cohesion"].std
 
 
-def test_the_truth_lies_within_what_is_claimed(groups):
+def test_the_truth_lies_within_the_reported_uncertainty(groups):
     truth = np.asarray([getattr(CASE.soil, name) for name in groups.names])
     assert (np.abs(groups.mean - truth) < 3.0 * groups.std).all()
     assert (np.abs(groups.pooled.values - truth) < 3.0 * groups.pooled.std).all()
 
 
-def test_an_average_is_surer_than_a_group_only_where_groups_differ(groups):
+def test_averaging_reduces_only_scatter_between_groups(groups):
     each = np.sqrt(np.mean([fit.std**2 for fit in groups.fits], axis=0))
     assert (groups.std <= 1.2 * each).all()
     same = replace(groups, fits=(groups.fits[0],) * 4)
     np.testing.assert_allclose(same.std, groups.fits[0].std)
 
 
-def test_a_fit_predicts_fresh_runs(groups):
+def test_a_fit_predicts_new_runs(groups):
     fresh = simulate_group(
         CASE, np.linspace(0.08, 0.8, 12), WANG2018.load, np.random.default_rng(9)
     )
@@ -76,7 +76,7 @@ def test_a_fit_predicts_fresh_runs(groups):
     assert line.r2 > 0.95 and abs(line.slope - 1.0) < 4.0 * line.slope_std
 
 
-def test_five_parameters_are_those_of_the_paper_and_one_group_is_no_average():
+def test_the_five_parameters_are_those_of_the_paper_and_one_group_is_refused():
     assert set(PARAMETERS) == set(PRIOR)
     table = simulate_group(CASE, np.linspace(0.1, 0.8, 4), WANG2018.load, np.random.default_rng(0))
     with pytest.raises(InputError, match="1 groups of data"):

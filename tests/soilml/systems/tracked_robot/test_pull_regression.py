@@ -21,7 +21,7 @@ def test_the_line_is_that_of_scipy():
     assert ours.points == 18
 
 
-def test_the_size_of_f_gives_away_the_number_of_points():
+def test_r2_and_f_imply_the_number_of_points():
     x = np.arange(25.0)
     line = linear_regression(x, x + np.sin(7.0 * x))
     assert implied_points(line.r2, line.f) == pytest.approx(25.0)

@@ -75,7 +75,7 @@ def test_a_tail_that_settles_moves_the_pressure_back():
     assert down.centre > level.centre + 0.01 and down.rear > level.rear
 
 
-def test_a_pull_above_the_ground_sets_the_tail_down():
+def test_a_raised_hitch_lowers_the_tail():
     """Wang et al. 2018, section 4.1.3: the more it pulls, the more the robot inclines."""
     model = Model(WANG2018.track)
     at = Operating(slip=np.asarray([0.02, 0.1, 0.5]), load=WANG2018.load)
@@ -90,7 +90,7 @@ def test_a_pull_above_the_ground_sets_the_tail_down():
     assert np.isnan(settling_from_moments(model, SAND, at, behind=-0.3)).all()
 
 
-def test_the_lines_on_the_page_run(capsys):
+def test_the_example_on_the_page_runs(capsys):
     page = (Path(__file__).parents[4] / "docs/papers/wang2018.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)

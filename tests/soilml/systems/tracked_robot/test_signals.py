@@ -23,7 +23,7 @@ def remembered(count, memory, rng):
     return scipy_signal.lfilter([1.0], [1.0, -keep], steps)
 
 
-def test_the_filter_takes_vibration_and_leaves_the_sinkage_where_it_is():
+def test_the_filter_removes_vibration_without_delay():
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     slow = 0.01 * np.sin(2.0 * np.pi * 0.1 * t)
     shaken = slow + 0.005 * np.sin(2.0 * np.pi * 15.0 * t)
@@ -34,18 +34,18 @@ def test_the_filter_takes_vibration_and_leaves_the_sinkage_where_it_is():
 
 
 @pytest.mark.parametrize("memory", [0.3, 8.0])
-def test_the_error_of_the_mean_knows_that_noise_remembers(memory):
+def test_the_standard_error_accounts_for_correlated_noise(memory):
     rng = np.random.default_rng(1)
-    off, said = [], []
+    off, message = [], []
     for _ in range(150):
         found = stationary_mean(600.0 + 20.0 * remembered(4000, memory, rng))
         off.append(found.mean - 600.0)
-        said.append(found.std_error)
-    ratio = np.sqrt(np.mean(np.square(off)) / np.mean(np.square(said)))
+        message.append(found.std_error)
+    ratio = np.sqrt(np.mean(np.square(off)) / np.mean(np.square(message)))
     assert 0.8 < ratio < 1.35  # scatter of samples would say 4 times too little at 8
 
 
-def test_ramps_before_and_after_the_pull_are_left_out():
+def test_ramps_before_and_after_the_pull_are_excluded():
     rng = np.random.default_rng(2)
     pull = np.concatenate(
         [np.zeros(800), np.linspace(0, 620, 900), np.full(3000, 620.0), np.linspace(620, 0, 400)]
@@ -59,7 +59,7 @@ def test_ramps_before_and_after_the_pull_are_left_out():
     )  # waiting stands still too
 
 
-def test_a_signal_that_never_stands_still_is_refused():
+def test_a_signal_without_stationary_part_is_refused():
     with pytest.raises(FitError, match="are stationary"):
         stationary_mean(np.linspace(0.0, 600.0, 2000))
     with pytest.raises(FitError, match="are stationary"):
@@ -92,7 +92,7 @@ def test_the_mean_of_a_rut_keeps_the_volume_of_soil():
     assert rut_mean([0.02], [0.01], pitch, pitch) == pytest.approx(0.02)
 
 
-def test_bad_signals_are_told_apart():
+def test_invalid_signals_are_refused_with_their_cause():
     good = np.zeros(500)
     with pytest.raises(InputError, match="signal is nan at sample 7"):
         low_pass(np.where(np.arange(500) == 7, np.nan, good), RATE, 5.0)

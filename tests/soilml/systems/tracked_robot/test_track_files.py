@@ -51,7 +51,7 @@ def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(mode
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("base = 0.6", "base = 0.15", "model.toml [gear]: base is 0.15 m with wheels of radius"),
         ("base = 0.6\n", "", "model.toml [gear]: base is missing"),
@@ -63,8 +63,8 @@ def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(mode
         ),
     ],
 )
-def test_a_track_that_cannot_be_is_refused_in_one_line(model, old, new, said, capsys):
+def test_an_invalid_track_is_refused_in_one_line(model, old, new, message, capsys):
     model.write_text(MODEL.replace(old, new))
     assert main(["simulate", str(model), "--slip", "0.2", "--load", "600"]) == 2
     error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1
+    assert message in error and error.count("\n") == 1

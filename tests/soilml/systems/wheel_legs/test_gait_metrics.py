@@ -54,13 +54,13 @@ def test_the_largest_foot_slips_least_and_none_most(feet):
     assert np.all(cif < np.minimum(ltf, srf)) and np.all(none > np.maximum(ltf, srf))
 
 
-def test_the_load_testing_foot_tells_stiffness_best_by_sinkage(feet):
+def test_sinkage_is_most_sensitive_to_stiffness_with_the_load_testing_foot(feet):
     slope, _ = feet.sensitivity(feet.sinkage)
     assert np.all(slope < 0)
     assert feet.feet[np.argmin(slope)] == "LTF" and feet.feet[np.argmax(slope)] == "CIF"
 
 
-def test_no_foot_tells_stiffness_best_by_slip_then_the_load_testing_foot(feet):
+def test_slip_is_most_sensitive_to_stiffness_without_a_foot(feet):
     slope, error = feet.sensitivity(feet.slip)
     assert [feet.feet[i] for i in np.argsort(slope)] == ["none", "LTF", "SRF", "CIF"]
     assert np.all(error > 0)
@@ -79,7 +79,7 @@ def test_falling_ends_where_a_value_is_not_lower():
     assert decreasing_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
 
 
-def test_a_walk_that_stopped_has_no_figures():
+def test_a_stopped_walk_has_no_metrics():
     stopped = gait_metrics(walk(wheel_leg("LTF"), LinearGround(stiffness=10.0)))
     assert stopped.status[0] != 0
     figures = [v for name, v in vars(stopped).items() if name != "status"]

@@ -58,7 +58,7 @@ def test_legs_stand_evenly_about_the_hub():
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"legs": 0}, "0 legs"),
         ({"legs": 7}, "1 to 6"),
@@ -71,12 +71,12 @@ def test_legs_stand_evenly_about_the_hub():
         ({"clearance": -0.1}, "body"),
     ],
 )
-def test_what_is_no_wheel_leg_is_refused_in_one_line(change, said):
-    with pytest.raises(InputError, match=said):
+def test_an_invalid_wheel_leg_is_refused_in_one_line(change, message):
+    with pytest.raises(InputError, match=message):
         wheel_leg("LTF", **change)
     assert replace(WheelLeg(), **change).invalid_reason
 
 
-def test_an_unknown_foot_is_refused_with_those_there_are():
+def test_an_unknown_foot_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"no foot 'boot'; there are: none, LTF, SRF, CIF"):
         wheel_leg("boot")

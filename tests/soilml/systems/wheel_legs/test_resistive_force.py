@@ -19,7 +19,7 @@ def test_a_flat_plate_pushed_straight_down_has_the_unit_gain_and_no_side_force()
     assert across == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_plate_moved_down_is_pushed_up_and_one_drawn_out_is_held_back_less():
+def test_a_withdrawn_plate_is_resisted_less_than_an_intruding_one():
     _, going_in = stress_gains(BETA, DOWN)
     assert np.all(going_in > 0)
     _, going_out = stress_gains(0.0, UP)
@@ -45,7 +45,7 @@ def test_a_ski_is_lifted_and_a_plough_much_less():
     assert ski > 3 * plough
 
 
-def test_a_plate_square_to_its_motion_feels_more_than_one_edge_on():
+def test_a_plate_normal_to_its_motion_is_resisted_more_than_one_edge_on():
     for gamma in (np.pi / 6, np.pi / 4, np.pi / 3):
         square = np.hypot(*stress_gains(np.pi / 2 - gamma, gamma))
         edge_on = np.hypot(*stress_gains(-gamma, gamma))
@@ -61,6 +61,6 @@ def test_the_form_without_angles_is_the_same_law():
     np.testing.assert_allclose(z, up, atol=1e-14)
 
 
-def test_what_depends_on_the_motion_always_takes_work():
+def test_the_motion_dependent_part_always_dissipates():
     _, _, xx, xz, zx, zz = resistance_terms(np.cos(2 * BETA), np.sin(2 * BETA))
     assert np.all(xx > 0) and np.all(4 * xx * zz > (xz + zx) ** 2)

@@ -27,7 +27,7 @@ def test_the_best_linear_rule_errs_no_more_than_any_other(estimators):
         assert found["best linear"].rmse < 1.03 * found[name].rmse, name
 
 
-def test_rules_for_independent_errors_claim_too_much_where_errors_go_together(estimators):
+def test_rules_for_independent_errors_are_overconfident_for_correlated_errors(estimators):
     found = score_estimators(estimators, HOLD)
     assert np.abs(estimators.correlation[np.triu_indices(3, 1)]).max() > 0.5
     assert found["inverse variance"].coverage_95 < 0.92
@@ -35,7 +35,7 @@ def test_rules_for_independent_errors_claim_too_much_where_errors_go_together(es
     assert found["best linear"].coverage_95 == pytest.approx(0.95, abs=0.035)
 
 
-def test_sinkage_tells_the_stiffness_better_than_torque_or_vibration():
+def test_sinkage_estimates_the_stiffness_better_than_torque_or_vibration():
     found = score_estimators(fit_estimators(LEARN, "normal_stiffness"), HOLD)
     assert found["sinkage"].rmse < 0.7 * min(found["torque"].rmse, found["vibration"].rmse)
 

@@ -28,7 +28,7 @@ def test_denser_soil_is_sunk_into_less(rows):
     assert np.all(np.diff(rows.sinkage.reshape(4, 3), axis=1) < 0)
 
 
-def test_lines_that_hold_are_found_exactly():
+def test_exact_relations_are_recovered():
     z = np.array([0.01, 0.02, 0.03, 0.05])
     found = fit_sinkage(z, 400.0 / z, 0.8 - 6.0 * z, list("abcd"))
     assert found.s_sigma == pytest.approx(400.0)
@@ -47,7 +47,7 @@ def test_stiffness_goes_down_as_sinkage_goes_up(fit):
     assert np.all(found.normal_stiffness_std > 0) and np.all(found.friction_angle_std > 0)
 
 
-def test_soils_left_out_of_the_fit_lie_within_what_it_claims(rows):
+def test_soils_left_out_of_the_fit_lie_within_its_uncertainty(rows):
     soils = np.array(rows.soil)
     stiffness_off, friction_off = [], []
     for name in GROUNDS:
@@ -65,21 +65,21 @@ def test_soils_left_out_of_the_fit_lie_within_what_it_claims(rows):
     assert np.sqrt(np.mean(np.square(friction_off))) < 1.5
 
 
-def test_friction_cannot_be_told_from_simulated_sinkage(rows, fit):
+def test_friction_is_not_identified_by_simulated_sinkage(rows, fit):
     assert fit.friction_r2 < 0.2
     assert fit.friction_scatter > np.std(rows.friction_angle)
 
 
-def test_what_the_fit_has_not_seen_is_flagged(fit):
+def test_extrapolation_is_flagged(fit):
     assert fit([0.001, 0.05, 0.5]).in_range.tolist() == [False, True, False]
 
 
-def test_more_doubt_about_sinkage_is_more_doubt_about_the_soil(fit):
+def test_uncertain_sinkage_makes_the_soil_uncertain(fit):
     assert fit(0.05, 0.01).normal_stiffness_std > fit(0.05).normal_stiffness_std
 
 
 @pytest.mark.parametrize("sinkage", [0.0, -0.01, np.nan])
-def test_a_sinkage_that_is_none_is_refused(fit, sinkage):
+def test_an_invalid_sinkage_is_refused(fit, sinkage):
     with pytest.raises(InputError, match="above 0"):
         fit(sinkage)
 

@@ -22,7 +22,7 @@ SANDS = sample_soils(12, seed=2)
 
 
 @pytest.mark.parametrize("name", ["terramechanics", "empirical"])
-def test_a_torque_law_is_found_again_from_what_it_gives(name):
+def test_a_torque_model_is_recovered_from_its_own_values(name):
     law, angle, stiffness = TORQUE_SLIP[name], SANDS.soil.friction_angle, SANDS.normal_stiffness
     a, b = law.line(angle, stiffness)
     torque = (SLIPS[:, None] - a) / b
@@ -32,7 +32,7 @@ def test_a_torque_law_is_found_again_from_what_it_gives(name):
     assert min(fitted.goodness.values()) == pytest.approx(1.0)
 
 
-def test_a_vibration_law_is_found_again_from_what_it_gives():
+def test_a_vibration_model_is_recovered_from_its_own_values():
     law = VIBRATION_SLIP["planar"]
     a, b = law.line(*GRID)
     fitted = fit_vibration_slip((SLIPS[:, None] - a) / b, SLIPS, *GRID, planar=True)

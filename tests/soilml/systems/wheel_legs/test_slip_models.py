@@ -68,7 +68,7 @@ def test_one_vibration_and_slip_give_the_drop_that_gives_that_slip():
     assert law.slip(3.0, drop, law.assumed) == pytest.approx(0.3)
 
 
-def test_models_that_cannot_tell_say_which_can():
+def test_an_indeterminate_model_names_the_alternative():
     with pytest.raises(InputError, match="use the planar model"):
         VIBRATION_SLIP["linear"].spring(0.1, 0.1)
     with pytest.raises(InputError, match="use the linear model"):

@@ -49,7 +49,7 @@ def test_slips_that_hardly_differ_cannot_make_a_line():
 
 
 @pytest.mark.parametrize("name", ["empirical", "simplified"])
-def test_the_error_of_torque_is_what_repeated_tests_show(name):
+def test_the_std_from_torque_is_that_of_repeated_tests(name):
     rng, law = np.random.default_rng(3), TORQUE_SLIP[name]
     a, b = law.line(ANGLE, STIFFNESS)
     torque = (SLIPS - a) / b
@@ -66,7 +66,7 @@ def test_the_error_of_torque_is_what_repeated_tests_show(name):
     assert np.std(errors) == pytest.approx(np.mean(claimed), rel=0.15)
 
 
-def test_the_error_of_vibration_is_what_repeated_tests_show():
+def test_the_std_from_vibration_is_that_of_repeated_tests():
     rng, law = np.random.default_rng(4), VIBRATION_SLIP["linear"]
     slip = law.slip(2.0, np.deg2rad(38.0), 1.0) + 0.5 * law.slip_std * rng.standard_normal(2000)
     drawn = [soil_from_vibration(2.0, s) for s in slip]
@@ -74,18 +74,18 @@ def test_the_error_of_vibration_is_what_repeated_tests_show():
     assert errors == pytest.approx(0.5 * drawn[0].std[0], rel=0.1)
 
 
-def test_more_pairs_tell_more():
+def test_more_pairs_reduce_the_uncertainty():
     law = TORQUE_SLIP["simplified"]
     one = soil_from_torque(1.0, 0.2, law)
     many = soil_from_torque(np.full(4, 1.0), np.full(4, 0.2), law)
     assert many.std[0] == pytest.approx(one.std[0] / 2)
 
 
-def test_a_noisy_torque_sensor_tells_less():
+def test_torque_noise_increases_the_uncertainty():
     assert (soil_from_torque(1.0, 0.2, torque_std=0.2).std > soil_from_torque(1.0, 0.2).std).all()
 
 
-def test_what_makes_no_pair_is_refused():
+def test_invalid_pairs_are_refused():
     with pytest.raises(InputError, match="2 values of torque and 1 slips"):
         soil_from_torque([1.0, 2.0], [0.1])
     with pytest.raises(InputError, match="is not a number"):
@@ -101,6 +101,6 @@ def test_what_makes_no_pair_is_refused():
 
 
 @pytest.mark.parametrize(("torque", "slip"), [(1e9, 0.2), (-1.0, 0.2), (1.0, -0.9)])
-def test_no_answer_is_a_soil_that_cannot_be(torque, slip):
+def test_an_unphysical_estimate_is_refused(torque, slip):
     with pytest.raises(FitError, match="which is not physical"):
         soil_from_torque(torque, slip)

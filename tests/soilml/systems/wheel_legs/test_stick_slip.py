@@ -19,7 +19,7 @@ PHI, GAP = np.deg2rad(40.0), np.deg2rad(10.0)
 SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])
 
 
-def test_a_foot_that_never_slips_feels_the_slow_roll_alone():
+def test_a_sticking_foot_causes_no_vibration():
     found = simulate_stance(LEG, 0.0, PHI, GAP)
     assert np.abs(found.foot_displacement).max() == 0.0
     assert vibration_amplitude(LEG, 0.0, PHI, GAP) < 0.01 * GRAVITY
@@ -58,7 +58,7 @@ def test_without_bending_a_five_legged_wheel_leg_slips_on_slippery_soil_alone():
     assert simulate_stance(bare, 0.2, np.deg2rad(20), GAP).foot_displacement.max() > 0.01
 
 
-def test_a_foot_slides_about_as_far_as_the_slip_asks():
+def test_a_foot_slides_about_as_far_as_the_slip_requires():
     found = simulate_stance(LEG, SLIPS[1:], PHI, GAP)
     bend = (PHI + 0.05) / LEG.bending * LEG.hub_mass * GRAVITY / LEG.stiffness
     asked = SLIPS[1:] * LEG.length * np.sin(np.pi / 5)
@@ -77,7 +77,7 @@ def test_more_slip_shakes_the_hub_of_a_leg_that_bends_easily_more():
     assert found[-1] > 1.1 * found[1] > 10.0 * found[0]
 
 
-def test_no_step_moves_the_answer(monkeypatch):
+def test_the_amplitude_does_not_depend_on_the_step(monkeypatch):
     coarse = vibration_amplitude(LEG, SLIPS, PHI, GAP)
     monkeypatch.setattr(stick_slip, "STEPS_PER_PERIOD", 240)
     np.testing.assert_allclose(coarse, vibration_amplitude(LEG, SLIPS, PHI, GAP), rtol=0.02)
@@ -87,7 +87,7 @@ def test_a_friction_that_does_not_drop_lets_the_foot_slide_more_smoothly():
     assert vibration_amplitude(LEG, 0.3, PHI, 0.0) < 0.3 * vibration_amplitude(LEG, 0.3, PHI, GAP)
 
 
-def test_rows_do_not_know_each_other():
+def test_cases_are_independent():
     one = vibration_amplitude(LEG, 0.25, PHI, GAP)
     many = vibration_amplitude(LEG, SLIPS[:, None], PHI, np.asarray([0.05, GAP]))
     assert many.shape == (5, 2)
@@ -97,15 +97,15 @@ def test_rows_do_not_know_each_other():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         ({"slip": -0.1}, "slip is -0.1; it must lie between 0 and 1"),
         ({"friction_angle": 40.0}, "friction_angle is 40"),
         ({"increment": 0.9}, "friction_angle - increment is -0.2"),
     ],
 )
-def test_what_the_spring_is_not_for_is_refused(given, said):
-    with pytest.raises(InputError, match=said):
+def test_values_outside_the_model_are_refused(given, message):
+    with pytest.raises(InputError, match=message):
         vibration_amplitude(LEG, **({"slip": 0.2, "friction_angle": 0.7, "increment": 0.1} | given))
     with pytest.raises(InputError, match="compressed by more than half"):
         vibration_amplitude(SpringLeg(stiffness=100.0), 0.2, 0.7, 0.1)

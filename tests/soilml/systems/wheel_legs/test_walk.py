@@ -77,7 +77,7 @@ def test_the_leg_nearest_to_straight_down_passes_it_once_a_stride(slipping):
     assert np.all(np.abs(slipping.attack - np.pi / 2) <= STRIDE / 2 + 1e-9)
 
 
-def test_a_case_walks_alike_alone_and_in_company():
+def test_a_case_does_not_depend_on_the_batch():
     cases = [wheel_leg("none", legs=3), wheel_leg("CIF"), wheel_leg("LTF", legs=6)]
     together = walk(cases, SAND, turns=0.5, steps=500)
     for i, case in enumerate(cases):
@@ -103,7 +103,7 @@ def test_shorter_steps_change_little():
     np.testing.assert_allclose(coarse.mean_slip, fine.mean_slip, atol=1e-3)
 
 
-def test_slopes_of_the_reaction_are_its_derivatives():
+def test_the_jacobian_of_the_reaction_is_its_derivative():
     cases = [wheel_leg("LTF"), wheel_leg("CIF", legs=3)]
     given = batch_plates(cases, [SAND, GROUNDS["SSC-2"]])
     at, fading = given.at(0.3), np.full(2, 1e-3)
@@ -125,7 +125,7 @@ def test_slopes_of_the_reaction_are_its_derivatives():
         np.testing.assert_allclose(analytic, (ahead - behind) / 2e-7, rtol=1e-4, atol=1e-2)
 
 
-def test_cases_that_cannot_walk_say_why_and_leave_the_others_alone():
+def test_invalid_cases_have_a_status_and_do_not_affect_the_others():
     good = wheel_leg("LTF")
     stub = replace(good, foot=FEET["none"], leg=Section(10, 0.016, 0.015, 0.002))
     hung = wheel_leg("none", legs=1, body_area=0.0)
@@ -152,7 +152,7 @@ def test_a_start_too_high_for_the_time_never_touches_the_ground():
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "message"),
     [
         (lambda: walk(WheelLeg(), SAND, steps=10), "at least 100 steps"),
         (lambda: walk(WheelLeg(), SAND, turns=0.0), "above 0"),
@@ -162,8 +162,8 @@ def test_a_start_too_high_for_the_time_never_touches_the_ground():
         (lambda: walk([WheelLeg()] * 2, [SAND] * 3), "2 wheel-legs for 3 cases"),
     ],
 )
-def test_settings_of_no_simulation_are_refused(call, said):
-    with pytest.raises(InputError, match=said):
+def test_invalid_settings_are_refused(call, message):
+    with pytest.raises(InputError, match=message):
         call()
 
 
@@ -193,7 +193,7 @@ def test_a_walk_at_a_tenth_of_the_speed_leaves_the_same_track():
     assert slow.x[-1, 0] == pytest.approx(quick.x[-1, 0], rel=0.01)
 
 
-def test_the_lines_on_the_page_run():
+def test_the_example_on_the_page_runs():
     page = (Path(__file__).parents[4] / "docs/papers/comin2017.md").read_text()
     names: dict = {}
     exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
