@@ -1,7 +1,7 @@
 """Shear parameters of loose lunar soil along a sweep of slip, learned by an LS-SVM.
 
 The system of Xue et al. 2016: (slip, torque, load) to (cohesion, friction angle, shear modulus),
-trained on the simplified wheel of their eqs. 2-8, and drawbar pull from what is found.
+trained on the simplified wheel of their eqs. 2-8, and drawbar pull from the estimate.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-from lunar.census import show_many
+from lunar.evaluation import show_evaluation
 from lunar.exact import posterior
-from lunar.pictures import SHOWN, Sweep, Told, draw_sweep, draw_told
-from lunar.pull import band, everywhere, spread
-from lunar.sweep import Floats, bounds, driven, noisy, soils, table, three_loads
+from lunar.figures import SHOWN, PosteriorPanel, Sweep, draw_posteriors, draw_sweep
+from lunar.pull import mean_and_interval, pull_interval, repeat_over_slips
+from lunar.sweep import Floats, add_torque_noise, bounds, soils, table, three_loads, wheel_forces
 
 from soilml import Case, Estimator, identify, read_case
 from soilml.cli import main
@@ -27,20 +27,20 @@ HERE = Path(__file__).parent.relative_to(Path.cwd()) / "lunar"
 OUT = Path("demo/papers")
 LOAD = 50.0
 SLIPS = 81
-#: Where the soil of the pictures lies in the prior of each parameter: off its middle.
+#: Position of the soil of the figures within the prior of each parameter.
 FRACTIONS = (1.0 / 3.0, 2.0 / 3.0, 1.0 / 3.0)
 SEED = 50
 
 
 def command(*words: str) -> None:
-    """Run a command of soilml as if typed, and show it."""
+    """Print and run a command of soilml."""
     print(f"\n$ soilml {shlex.join(words)}", flush=True)
     if main(words) != 0:
         sys.exit(1)
 
 
 def run() -> None:
-    """Train, sweep, count, and draw."""
+    """Train, simulate a sweep, evaluate, and draw."""
     started = time.perf_counter()
     OUT.mkdir(parents=True, exist_ok=True)
     data, model = str(OUT / "lunar.parquet"), str(OUT / "lunar.onnx")
@@ -50,8 +50,8 @@ def run() -> None:
     rng = np.random.default_rng(SEED)
     truth = np.asarray([case.prior[n].at(f) for n, f in zip(SHEAR, FRACTIONS, strict=True)])
     show_sweep(case, estimator, truth, rng)
-    show_told(case, estimator, truth, rng)
-    show_many(case, estimator, LOAD, SEED + 1)
+    show_information(case, estimator, truth, rng)
+    show_evaluation(case, estimator, LOAD, SEED + 1)
     print(
         f"\n{time.perf_counter() - started:.0f} s; {OUT}/lunar_lssvm.png, lunar_single_triple.png"
     )
@@ -60,8 +60,8 @@ def run() -> None:
 def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.Generator) -> None:
     """One soil of the prior, swept at one load: estimates and drawbar pull."""
     slip, load = np.linspace(0.2, 0.6, SLIPS), np.full(SLIPS, LOAD)
-    force = driven(case, truth, slip, LOAD)
-    torque = noisy(case, force.torque, rng)
+    force = wheel_forces(case, truth, slip, LOAD)
+    torque = add_torque_noise(case, force.torque, rng)
     single = estimator(slip=slip, torque=torque, load=LOAD)
     joint = estimator.run(slip=slip, torque=torque, load=load)
     least = identify(case, table(slip, torque, load))
@@ -88,20 +88,26 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         said = [f"{value * factor:.3g} +- {std * factor:.2g}" for value, std in cells]
         lines.append((f"{name.replace('_', ' ')} {unit}", f"{truth[k] * factor:.3g}", *said))
     print(f"\nA soil of the prior, slip swept from 0.2 to 0.6 at {LOAD:g} N in {SLIPS} readings;")
-    print("one of them, at slip 0.4, and all together:\n")
+    print("one of them, at slip 0.4, and all pooled:\n")
     print(format_table(header, lines))
     width = ", ".join(f"{100 * w:.0f} %" for w in joint.std / joint.prior_std)
-    print(
-        "\nAll have one load: cohesion and friction angle cannot be told apart. Joined, the LS-SVM"
-    )
+    print("\nAll have one load: cohesion and friction angle are confounded. Pooled, the LS-SVM")
     print(f"leaves {width} of the prior's widths, and")
-    print(f"least squares says: {'; '.join(least.warnings) or 'nothing to note'}")
+    print(f"least squares reports: {'; '.join(least.warnings) or 'no warning'}")
     found = {
-        "prior": spread(driven(case, soils(case, 1000, rng)[:, None, :], slip, LOAD).drawbar_pull),
-        "one": band(case, single.mean, single.covariance, slip, LOAD, rng),
-        "all": band(case, *everywhere(joint.mean, joint.covariance, SLIPS), slip, LOAD, rng),
-        "least": band(case, *everywhere(least.values, least.covariance, SLIPS), slip, LOAD, rng),
-        "exact": spread(driven(case, exact[:1000, None, :], slip, LOAD).drawbar_pull),
+        "prior": mean_and_interval(
+            wheel_forces(case, soils(case, 1000, rng)[:, None, :], slip, LOAD).drawbar_pull
+        ),
+        "one": pull_interval(case, single.mean, single.covariance, slip, LOAD, rng),
+        "all": pull_interval(
+            case, *repeat_over_slips(joint.mean, joint.covariance, SLIPS), slip, LOAD, rng
+        ),
+        "least": pull_interval(
+            case, *repeat_over_slips(least.values, least.covariance, SLIPS), slip, LOAD, rng
+        ),
+        "exact": mean_and_interval(
+            wheel_forces(case, exact[:1000, None, :], slip, LOAD).drawbar_pull
+        ),
     }
     lines = []
     for name, said in (
@@ -114,8 +120,8 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         mean, low, high = found[name]
         error = np.sqrt(np.mean((mean - force.drawbar_pull) ** 2))
         lines.append((said, f"{error:.2f}", f"{np.mean(high - low):.2f}"))
-    print("\nDrawbar pull along the sweep, foretold from what was found:\n")
-    print(format_table(("from", "RMS error N", "90 % band N"), lines))
+    print("\nDrawbar pull along the sweep, predicted from the estimates:\n")
+    print(format_table(("from", "RMS error N", "90 % interval N"), lines))
     sweep = Sweep(
         slip, single, joint, (least.values, least.std), exact, truth, bounds(case),
         force.drawbar_pull, found,
@@ -123,25 +129,29 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
     draw_sweep(sweep, OUT / "lunar_lssvm.png")
 
 
-def show_told(case: Case, estimator: Estimator, truth: Floats, rng: np.random.Generator) -> None:
-    """What one reading, eight at one load and eighteen at three leave possible."""
+def show_information(
+    case: Case, estimator: Estimator, truth: Floats, rng: np.random.Generator
+) -> None:
+    """Posterior from one reading, eight at one load and eighteen at three loads."""
     drives = (
-        ("one reading: a sheet", np.asarray([0.4]), np.asarray([LOAD])),
+        ("one reading: a surface", np.asarray([0.4]), np.asarray([LOAD])),
         ("8 slips at one load: a ridge", np.linspace(0.2, 0.6, 8), np.full(8, LOAD)),
         ("6 slips at each of 3 loads: a spot", *three_loads()),
     )
     told, lines = [], []
     for title, slip, load in drives:
-        torque = noisy(case, driven(case, truth, slip, load).torque, rng)
+        torque = add_torque_noise(case, wheel_forces(case, truth, slip, load).torque, rng)
         draws = posterior(case, slip, torque, load, rng, 3000)
         found = estimator.run(slip=slip, torque=torque, load=load)
-        told.append(Told(title, draws, found.mean, found.covariance))
+        told.append(PosteriorPanel(title, draws, found.mean, found.covariance))
         left = np.concatenate([draws.std(axis=0), found.std]) / np.tile(found.prior_std, 2)
         lines.append((title.split(":")[0], *(f"{100 * share:.0f} %" for share in left)))
-    print("\nOne reading is one equation for three unknowns; other slips tell K, loads the rest.")
-    print("Width left of the prior, by the exact posterior and by the LS-SVM:\n")
+    print(
+        "\nOne reading is one equation for three unknowns; other slips determine K, loads the rest."
+    )
+    print("Remaining prior width, by the exact posterior and by the LS-SVM:\n")
     print(format_table(("", "c exact", "phi exact", "K exact", "c", "phi", "K"), lines))
-    draw_told(told, truth, bounds(case), OUT / "lunar_single_triple.png")
+    draw_posteriors(told, truth, bounds(case), OUT / "lunar_single_triple.png")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Soils that explain readings: draws of the exact posterior."""
+"""Samples of the exact posterior of the soil, given readings."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from soilml.identification.posterior import sample_posterior
 def posterior(
     case: Case, slip: Floats, torque: Floats, load: Floats, rng: np.random.Generator, count: int
 ) -> Floats:
-    """`count` soils (count, 3) of what readings (r,) on one soil leave possible under the prior.
+    """`count` posterior samples (count, 3) of the soil, given readings (r,) on it.
 
-    From the weighted samples of `soilml identify --method posterior`.
+    Drawn from the weighted samples of `soilml identify --method posterior`.
     """
     free = select_free(case, None)
     found, _ = sample_posterior(case, read_observations(case, table(slip, torque, load)), free)

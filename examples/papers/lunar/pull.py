@@ -1,22 +1,22 @@
-"""Drawbar pull from an estimate of the soil, with its band."""
+"""Drawbar pull from an estimate of the soil, with its 90 % interval."""
 
 from __future__ import annotations
 
 import numpy as np
-from lunar.sweep import Floats, bounds, driven
+from lunar.sweep import Floats, bounds, wheel_forces
 
 from soilml import Case
 
-#: Soils drawn for one that is kept: a Gaussian at a corner of the prior has an eighth inside.
+#: Samples drawn per sample returned: of a Gaussian at a corner of the prior an eighth lies inside.
 SPARE = 6
 
 
-def drawn(
+def sample_soils(
     case: Case, mean: Floats, covariance: Floats, rng: np.random.Generator, count: int
 ) -> Floats:
-    """Soils (count, ..., 3) of Gaussians (..., 3) and (..., 3, 3), those inside the prior's range.
+    """Samples (count, ..., 3) of Gaussians (..., 3) and (..., 3, 3), truncated to the prior.
 
-    Where fewer than `count` of the draws lie inside, they are taken more than once.
+    If fewer than `count` samples lie inside, they are repeated.
     """
     lower, upper = bounds(case)
     scale = upper - lower
@@ -30,7 +30,7 @@ def drawn(
     return np.clip(np.take_along_axis(values, place[..., None], axis=0), lower, upper)
 
 
-def band(
+def pull_interval(
     case: Case,
     mean: Floats,
     covariance: Floats,
@@ -39,23 +39,25 @@ def band(
     rng: np.random.Generator,
     count: int = 800,
 ) -> tuple[Floats, Floats, Floats]:
-    """Drawbar pull (N) that estimates (..., 3) foretell at slips (...): mean, and 90 % between.
+    """Drawbar pull (N) predicted from estimates (..., 3) at slips (...): mean and 90 % interval.
 
-    The soil's bearing is that of the case; what the estimates leave open of the shear parameters is
-    carried by draws.
+    The bearing parameters are those of the case; the uncertainty of the shear parameters is
+    propagated by sampling.
     """
-    pull = driven(case, drawn(case, mean, covariance, rng, count), slip, load).drawbar_pull
-    return spread(pull)
+    pull = wheel_forces(
+        case, sample_soils(case, mean, covariance, rng, count), slip, load
+    ).drawbar_pull
+    return mean_and_interval(pull)
 
 
-def spread(draws: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean of draws (count, ...), and the ends of what holds 90 % of them."""
+def mean_and_interval(draws: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean of samples (count, ...), and the ends of their 90 % interval."""
     low, high = np.quantile(draws, [0.05, 0.95], axis=0)
     return draws.mean(axis=0), low, high
 
 
-def everywhere(mean: Floats, covariance: Floats, slips: int) -> tuple[Floats, Floats]:
-    """Estimates (..., 3) of whole drives, repeated for each of their slips: (..., slips, 3)."""
+def repeat_over_slips(mean: Floats, covariance: Floats, slips: int) -> tuple[Floats, Floats]:
+    """Estimates (..., 3) repeated for each slip: (..., slips, 3)."""
     shape = (*mean.shape[:-1], slips, 3)
     wide = np.broadcast_to(covariance[..., None, :, :], (*shape, 3))
     return np.broadcast_to(mean[..., None, :], shape), wide

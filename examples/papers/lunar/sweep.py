@@ -1,4 +1,4 @@
-"""Soils of a prior, and what a wheel on them reports."""
+"""Soils of a prior, and simulated readings of a wheel on them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ Floats = NDArray[np.float64]
 
 
 def soils(case: Case, count: int, rng: np.random.Generator) -> Floats:
-    """Cohesion (Pa), friction angle (rad), shear modulus (m) drawn from the prior, (count, 3)."""
+    """Cohesion (Pa), friction angle (rad), shear modulus (m) sampled from the prior, (count, 3)."""
     return np.stack([case.prior[name].at(rng.random(count)) for name in SHEAR], axis=1)
 
 
-def driven(case: Case, values: Floats, slip: Floats, load: Floats | float) -> Force:
-    """What a case's model says of soils (..., 3) at slips and loads that broadcast with (...)."""
+def wheel_forces(case: Case, values: Floats, slip: Floats, load: Floats | float) -> Force:
+    """Forces of a case's model on soils (..., 3) at slips and loads that broadcast with (...)."""
     changed = case.with_values({name: values[..., k] for k, name in enumerate(SHEAR)})
     return changed.model(changed.soil, Operating(slip=slip, load=load))
 
 
-def noisy(case: Case, torque: Floats, rng: np.random.Generator) -> Floats:
-    """What the torque sensor of a case reports, N m."""
+def add_torque_noise(case: Case, torque: Floats, rng: np.random.Generator) -> Floats:
+    """Torque (N m) with the sensor noise of a case."""
     return torque + case.noise["torque_Nm"].std(torque) * rng.standard_normal(torque.shape)
 
 
@@ -35,7 +35,7 @@ def bounds(case: Case) -> tuple[Floats, Floats]:
 
 
 def table(slip: Floats, torque: Floats, load: Floats) -> Table:
-    """Readings (r,) of one soil, as `identify` takes them."""
+    """Readings (r,) of one soil as a table for `identify`."""
     run = np.full(slip.shape, "sweep")
     return Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
 

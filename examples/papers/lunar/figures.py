@@ -1,4 +1,4 @@
-"""The two pictures of the lunar sweep."""
+"""The two figures of the lunar sweep."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lunar.pull import spread
+from lunar.pull import mean_and_interval
 from lunar.sweep import Floats
 
 from soilml import Estimate
@@ -23,7 +23,7 @@ GREY, TRUTH = "0.92", "k"
 
 @dataclass(frozen=True)
 class Sweep:
-    """One drive: slips (m,), estimates of each reading and of all, and pulls from each."""
+    """A sweep: slips (m,), estimates of each reading and of all, and pulls from each."""
 
     slip: Floats
     single: Estimate
@@ -33,12 +33,12 @@ class Sweep:
     truth: Floats  # (3,)
     prior: tuple[Floats, Floats]  # ends, (3,)
     pull: Floats  # N, true, (m,)
-    pulls: dict[str, tuple[Floats, Floats, Floats]]  # mean, and 90 % between
+    pulls: dict[str, tuple[Floats, Floats, Floats]]  # mean, and 90 % interval
 
 
 @dataclass(frozen=True)
-class Told:
-    """What some readings tell: exact draws (n, 3), and a Gaussian of the LS-SVM."""
+class PosteriorPanel:
+    """Posterior of some readings: exact samples (n, 3), and the Gaussian of the LS-SVM."""
 
     title: str
     draws: Floats
@@ -61,7 +61,7 @@ def draw_sweep(sweep: Sweep, out: Path) -> None:
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False)
     figure.suptitle(
-        "A sweep of slip at 50 N: what each reading of slip, torque and load tells (90 %)"
+        "A sweep of slip at 50 N: information in each reading of slip, torque and load (90 %)"
     )
     with atomic_output(out) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
@@ -90,7 +90,7 @@ def _parameter(axis: Any, sweep: Sweep, k: int) -> None:
         [0.642], [value[k] * factor], np.asarray(ends) * factor,
         fmt="s", color=LEAST, label="all, least squares", **bar,
     )  # fmt: skip
-    value, *ends = spread(sweep.exact[:, k])
+    value, *ends = mean_and_interval(sweep.exact[:, k])
     axis.errorbar(
         [0.664], [value * factor], np.abs(np.asarray(ends) - value)[:, None] * factor,
         fmt="o", color=EXACT, label="all, exact posterior", **bar,
@@ -117,11 +117,13 @@ def _pulls(axis: Any, sweep: Sweep) -> None:
     axis.plot(sweep.slip, sweep.pull, color=TRUTH, lw=1.4, ls="--")
     axis.annotate("prior's mean", (sweep.slip[-1], mean_of_prior), (6, -3), color="0.4",
                   textcoords="offset points", fontsize=9)  # fmt: skip
-    axis.set_title("drawbar pull foretold from these, N (bands and lines: 90 %)")
+    axis.set_title("drawbar pull predicted from these, N (bands and lines: 90 %)")
     axis.set_xlim(0.19, 0.68)
 
 
-def draw_told(told: list[Told], truth: Floats, prior: tuple[Floats, Floats], out: Path) -> None:
+def draw_posteriors(
+    told: list[PosteriorPanel], truth: Floats, prior: tuple[Floats, Floats], out: Path
+) -> None:
     """Pairs of parameters, row by row, for more readings from left to right."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
@@ -156,7 +158,7 @@ def draw_told(told: list[Told], truth: Floats, prior: tuple[Floats, Floats], out
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=11)
     figure.suptitle(
-        "What readings of slip, torque and load can tell of lunar soil; the frame is the prior",
+        "Information of slip, torque and load on lunar soil; the frame is the prior",
         fontsize=13,
     )
     with atomic_output(out) as part:
@@ -164,7 +166,7 @@ def draw_told(told: list[Told], truth: Floats, prior: tuple[Floats, Floats], out
 
 
 def _ellipse(axis: Any, mean: Floats, covariance: Floats, i: int, j: int) -> None:
-    """The ellipse that holds 90 % of a Gaussian of two of the parameters."""
+    """The 90 % ellipse of a Gaussian of two parameters."""
     pair = [i, j]
     variance, vectors = np.linalg.eigh(covariance[np.ix_(pair, pair)])
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
