@@ -21,7 +21,7 @@ from lunar.sweep import Floats, add_torque_noise, soils, table, three_loads, whe
 
 from soilml import Case, Estimator, Model, Wheel, identify
 from soilml.io.text_tables import format_table
-from soilml.quantities import SHEAR
+from soilml.quantities import SHEAR, Z_90
 
 SOILS, FITTED = 200, 25
 SLIPS = np.linspace(0.2, 0.6, 9)
@@ -122,7 +122,7 @@ def _fits(case: Case, truth: Case, load: float, rng: np.random.Generator) -> lis
     found = PullPredictions(
         *pull_interval(case, *repeat_over_slips(mean, covariance, len(SLIPS)), SLIPS, load, rng)
     )
-    return [*_errors(off, np.abs(off) <= 1.645 * std, spread), _score(found, pull)]
+    return [*_errors(off, np.abs(off) <= Z_90 * std, spread), _score(found, pull)]
 
 
 def _errors(off: Floats, inside: Mask, spread: Floats) -> list[str]:
