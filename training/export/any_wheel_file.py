@@ -66,7 +66,7 @@ def export_any_wheel(
         "outputs": json.dumps(outputs),
         "gear": json.dumps({"type": "wheel"}),
         "together": json.dumps(NO_POOLING),
-        "set": json.dumps(metadata_of(posterior, spec.noise, alone=True)),
+        "set": json.dumps(metadata_of(posterior, spec.noise, sets_only=True)),
         "probe": json.dumps(probe_of_sets(posterior)),
         "spec": spec.text,
         "spec_sha256": hashlib.sha256(spec.text.encode()).hexdigest(),

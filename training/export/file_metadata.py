@@ -111,4 +111,4 @@ def _set_metadata(posterior: SetPosteriorGraph | None, recipe: str) -> dict[str,
     bias = content.bias.get(column("torque"))
     if bias is not None:
         noise["torque_bias"] = [bias.constant, bias.share]
-    return {"set": json.dumps(metadata_of(posterior, noise, alone=False))}
+    return {"set": json.dumps(metadata_of(posterior, noise, sets_only=False))}

@@ -1,7 +1,10 @@
-"""A small builder of ONNX graphs: names in, names out, float64 inside.
+"""Nodes and constants of ONNX graphs, addressed by name.
 
-The operator set and file version are pinned low enough for every onnxruntime since 1.14; onnx's own
-defaults are newer than the runtime reads.
+`training.onnx_graph.value` adds operators to it. Bytes of a file depend on the order of nodes and
+constants, which are numbered as they are added.
+
+The operator set and file version are readable by every onnxruntime since 1.14; the defaults of the
+onnx package are newer than that.
 """
 
 from __future__ import annotations
@@ -12,19 +15,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.onboard.set_contract import SET_SWITCH
+
 Floats = NDArray[np.float64]
 #: Element type and shape of a graph's output.
 Output = tuple[int, list[Any]]
 
-#: Element types of inputs.
-_FLOAT, _BOOL = 1, 9
+#: ONNX's numbers of the element types of inputs and outputs (onnx.TensorProto.DataType).
+FLOAT, BOOL = 1, 9
 
 OPSET = 18
 IR_VERSION = 9
 
 
 class Graph:
-    """Nodes and constants of a graph under construction; values are addressed by name."""
+    """Nodes and constants of a graph under construction.
+
+    Parameters
+    ----------
+    prefix : str
+        Prefix of the names of all its nodes and constants; branches of one graph need different
+        ones.
+    """
 
     def __init__(self, prefix: str = "") -> None:
         self._prefix = prefix
@@ -32,7 +44,7 @@ class Graph:
         self._constants: list[Any] = []
 
     def constant(self, value: Any, exact: bool = False) -> str:
-        """A constant array; numbers become float64, unless they are to stay as they are."""
+        """The name of a constant array; floating-point numbers become float64 unless `exact`."""
         from onnx import numpy_helper
 
         array = np.asarray(value)
@@ -43,7 +55,7 @@ class Graph:
         return name
 
     def op(self, kind: str, *inputs: str, out: str | None = None, **attributes: Any) -> str:
-        """One node with one output; its name."""
+        """Add a node with one output, and return the name of the output."""
         return self.ops(kind, 1, *inputs, out=out, **attributes)[0]
 
     def ops(
@@ -55,7 +67,7 @@ class Graph:
         outs: list[str] | None = None,
         **attributes: Any,
     ) -> list[str]:
-        """One node with several outputs; their names, which are new unless `outs` gives them."""
+        """Add a node with several outputs, and return their names: new ones, or `outs`."""
         from onnx import helper
 
         name = out or f"{self._prefix}v{len(self._nodes)}"
@@ -76,11 +88,11 @@ class Graph:
         self._nodes[-1].output[0] = new
 
     def double(self, name: str) -> str:
-        """As float64."""
+        """A value cast to float64."""
         return self.op("Cast", name, to=11)
 
     def single(self, name: str, out: str) -> str:
-        """As float32, under the name of an output."""
+        """A value cast to float32, under the name of an output."""
         return self.op("Cast", name, out=out, to=1)
 
     def scaled(self, x: str, mean: Floats, scale: Floats) -> str:
@@ -111,11 +123,11 @@ class Graph:
         return self.constant(np.asarray([axis], dtype=np.int64))
 
     def reshaped(self, x: str, *shape: int, out: str | None = None) -> str:
-        """A new shape; 0 keeps a dimension, -1 fits."""
+        """A value in a new shape; 0 keeps a dimension, one -1 is computed."""
         return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)), out=out)
 
     def default(self, name: str, value: Any) -> None:
-        """What an input is where nobody gives it."""
+        """Give an input of the graph a default value, for callers that do not feed it."""
         from onnx import numpy_helper
 
         self._constants.append(numpy_helper.from_array(np.asarray(value), name))
@@ -123,10 +135,10 @@ class Graph:
     def either(
         self, condition: str, first: Graph, second: Graph, outputs: Mapping[str, Output]
     ) -> None:
-        """Outputs of the first graph where the condition holds, else of the second.
+        """Add an If node: outputs of the first graph if the condition is true, else of the second.
 
-        Only that one is run. Each graph names what it gives `<prefix><output>`; outputs that it
-        does not give are empty.
+        Only that branch is run. Each branch names its outputs `<prefix><output>`; outputs that it
+        lacks are empty.
         """
         self.ops(
             "If",
@@ -140,11 +152,11 @@ class Graph:
     def _branch(self, outputs: Mapping[str, Output]) -> Any:
         from onnx import helper
 
-        given = {name for node in self._nodes for name in node.output}
+        computed = {name for node in self._nodes for name in node.output}
         infos = []
         for name, (kind, shape) in outputs.items():
             own = self._prefix + name
-            if own not in given:
+            if own not in computed:
                 empty = np.zeros([0] * len(shape), helper.tensor_dtype_to_np_dtype(kind))
                 self.op("Identity", self.constant(empty, exact=True), out=own)
             infos.append(helper.make_tensor_value_info(own, kind, [None] * len(shape)))
@@ -155,9 +167,14 @@ class Graph:
         inputs: Sequence[str] | Mapping[str, list[Any]],
         outputs: Mapping[str, Output],
     ) -> Any:
-        """The finished ONNX model: float32 inputs; outputs name -> (element type, shape).
+        """The finished and checked ONNX model.
 
-        Inputs have the shapes that are given, or [rows].
+        Parameters
+        ----------
+        inputs : sequence or mapping
+            Names of float32 inputs of shape [rows], or name -> shape. `SET_SWITCH` is boolean.
+        outputs : mapping
+            Name -> element type and shape.
         """
         from onnx import checker, helper
 
@@ -167,7 +184,7 @@ class Graph:
             self._nodes,
             "soilml",
             [
-                helper.make_tensor_value_info(n, _BOOL if n == "joint" else _FLOAT, s)
+                helper.make_tensor_value_info(n, BOOL if n == SET_SWITCH else FLOAT, s)
                 for n, s in inputs.items()
             ],
             [helper.make_tensor_value_info(n, k, shape) for n, (k, shape) in outputs.items()],

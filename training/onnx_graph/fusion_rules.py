@@ -90,9 +90,9 @@ def add_rowwise_fusion(
 def _pairwise_fusion(std: Value, m: int) -> tuple[Value, Value]:
     """Weights (n, m, q) and variance (n, 1, q) of the mean of all pairs' best combinations."""
     variance = std * std
-    own = variance.node("Unsqueeze", variance.indices([2]))
-    other = variance.node("Unsqueeze", variance.indices([1]))
-    shares = other / (own + other)  # (n, i, j, q)
+    first = variance.node("Unsqueeze", variance.indices([2]))
+    second = variance.node("Unsqueeze", variance.indices([1]))
+    shares = second / (first + second)  # (n, i, j, q)
     # each estimate is paired with itself as well, with a share of one half, which is taken off
     weights = (shares.sum(axis=2, keepdims=False) - 0.5) * (2.0 / (m * (m - 1)))
     return weights, (weights * weights * variance).sum(axis=1, keepdims=True)

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from training.onnx_graph.builder import Graph
+from training.onnx_graph.builder import BOOL, FLOAT, Graph
 
 #: ONNX's numbers of element types (onnx.TensorProto.DataType).
 _ELEMENT_TYPES: dict[type, int] = {
-    np.float32: 1,
+    np.float32: FLOAT,
     np.int32: 6,
-    np.bool_: 9,
+    np.bool_: BOOL,
     np.float64: 11,
 }
 
@@ -41,7 +41,7 @@ class Value:
 
     Examples
     --------
-    >>> from training.onnx_graph.builder import Graph
+    >>> from training.onnx_graph.builder import BOOL, FLOAT, Graph
     >>> graph = Graph()
     >>> x = Value(graph, "x")
     >>> (2.0 * exp(-x) + 1.0).name

@@ -12,12 +12,14 @@ from soilml.numerics.prior import Prior
 
 Floats = NDArray[np.float64]
 
-#: A range that reaches down to less than this share of its upper end is taken to begin at zero.
-FROM_ZERO = 0.1
-#: Ends of a range that begins at zero count as this far apart.
-SPREAD = 4.0
-#: Ends further apart than this have a logarithmic coordinate.
-WIDE = 1.5
+#: A range whose lower end is below this share of its upper end is treated as one from zero, where
+#: the logarithm is unbounded: its coordinate is the logarithm of the value plus an offset.
+ZERO_SHARE = 0.1
+#: Ratio of both ends of such a range after the offset was added: enough curvature for cohesion.
+OFFSET_RATIO = 4.0
+#: A range with a larger ratio of its ends than this has a logarithmic coordinate: in a narrower one
+#: the logarithm is nearly linear.
+LOGARITHMIC_RATIO = 1.5
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,17 @@ class Coordinate:
 
     .. math:: \theta = \alpha + \beta e^{\gamma x} + \delta x, \qquad \log p(x) = \lambda x + const
 
-    Torque bends with shear modulus and cohesion as logarithms do: along these coordinates a
-    polynomial of low degree follows it closely.
+    Torque is nearly linear in the logarithms of shear modulus and cohesion, so that a polynomial of
+    low degree in these coordinates approximates it closely.
+
+    Parameters
+    ----------
+    name : str
+        The parameter.
+    shift, factor, rate, slope : float
+        alpha, beta, gamma and delta of the value.
+    tilt : float
+        lambda of the prior, nil where the prior is uniform in x.
     """
 
     name: str
@@ -41,13 +52,15 @@ class Coordinate:
     def of(name: str, prior: Prior) -> Coordinate:
         """The coordinate for a prior, uniform in the value or in its logarithm."""
         lower, upper = prior.lower, prior.upper
-        if prior.log or (lower > 0.0 and upper / lower > WIDE and lower > FROM_ZERO * upper):
+        if prior.log or (
+            lower > 0.0 and upper / lower > LOGARITHMIC_RATIO and lower > ZERO_SHARE * upper
+        ):
             rate = 0.5 * math.log(upper / lower)
             middle = math.sqrt(lower * upper)
             return Coordinate(name, 0.0, middle, rate, 0.0, 0.0 if prior.log else rate)
-        if 0.0 <= lower <= FROM_ZERO * upper:
-            rate, size = 0.5 * math.log(SPREAD), (upper - lower) / (SPREAD - 1.0)
-            return Coordinate(name, lower - size, size * math.sqrt(SPREAD), rate, 0.0, rate)
+        if 0.0 <= lower <= ZERO_SHARE * upper:
+            rate, size = 0.5 * math.log(OFFSET_RATIO), (upper - lower) / (OFFSET_RATIO - 1.0)
+            return Coordinate(name, lower - size, size * math.sqrt(OFFSET_RATIO), rate, 0.0, rate)
         return Coordinate(name, 0.5 * (lower + upper), 0.0, 0.0, 0.5 * (upper - lower), 0.0)
 
     def value(self, x: Floats) -> Floats:
@@ -55,7 +68,7 @@ class Coordinate:
         return np.asarray(self.shift + self.factor * np.exp(self.rate * x) + self.slope * x)
 
     def quantile(self, u: Floats) -> Floats:
-        """Coordinates below which fractions u of the prior lie."""
+        """Quantiles of the prior at probabilities u: coordinates, of the shape of u."""
         if self.tilt == 0.0:
             return np.asarray(2.0 * u - 1.0)
         low, high = math.exp(-self.tilt), math.exp(self.tilt)

@@ -1,4 +1,4 @@
-"""Rigid wheels of any size under any load: how they are driven, and on which soils."""
+"""Rigid wheels of any size under any load, on soils whose bearing values are context inputs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from scipy.stats import qmc
 from soilml.config.prior import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.contact import Force
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
@@ -20,48 +19,47 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
 from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.response_surface import NORMAL_TRUNCATION
-from training.set_posterior.run_patterns import run_patterns
+from training.set_posterior.dimensionless_design import (
+    BEARING_RANGE,
+    COHESION_SHARE,
+    EXPONENT_RANGE,
+    LEAST_NORMAL_STD,
+    LOAD,
+    MOST_BEARING_STD,
+    RADIUS,
+    REFERENCE_DEPTH,
+    SHEAR_MODULUS_SHARE,
+)
+from training.set_posterior.dimensionless_sets import simulate_sets
 from training.set_posterior.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
-    Origin,
     SimulatedSets,
     add_log_torque,
 )
 
 Floats = NDArray[np.float64]
 
-#: Estimated axes, as shares of the largest cohesion and shear modulus; and the friction angle.
-COHESION, SHEAR_MODULUS = Prior(0.0, 1.0), Prior(1.0 / 6.0, 1.0)
-#: The bearing curve is given, and strays from what is given: its logarithm at the pivot by up to
-#: this much, and its exponent by up to that; the widest standard deviation is 1 / 2.5 of it.
-BEARING_RANGE, EXPONENT_RANGE = 1.0, 0.25
-MOST_BEARING_STD = 0.4
-LEAST_NORMAL_STD = 1e-3
-#: The curve pivots at this share of the radius.
-REFERENCE_DEPTH = 0.05
-#: Margin of every range in which designs are drawn, as a share of its width.
+#: Designs are drawn beyond the ends of every range by this share of its width, so that readings at
+#: the ends are not extrapolated.
 RANGE_MARGIN = 0.02
-#: Loads of one set differ by up to this much in their logarithm.
-LOAD_SPREAD = 1.2
-#: Order of a design's numbers.
-SLIP, RADIUS, WIDTH, LOAD, EXPONENT, BEARING, MOST_COHESION, MOST_SHEAR_MODULUS = range(8)
+#: Designs that are drawn and tested at a time; a power of two keeps the Sobol sequence balanced.
+CANDIDATES = 1 << 13
 
 
 @dataclass(frozen=True)
 class DimensionlessFamily:
     """Ranges of wheels, loads and bearing values; a design is (s, r, b, W, n, k, c max, K max).
 
-    Everything is learned without dimensions. With k the bearing modulus k_c / b + k_phi, torque
-    over load and radius depends on slip, W / (k b r^(n+1)), c r b / W, phi, K / r and n alone
-    (Wong and Reece 1967 written over r, W and k): one response serves wheels of all sizes.
+    The response surface has no dimensions. With k the bearing modulus k_c / b + k_phi, torque over
+    load and radius depends on slip, W / (k b r^(n+1)), c r b / W, phi, K / r and n alone (Wong and
+    Reece 1967, divided by r, W and k): one response surface serves wheels of all sizes.
     """
 
     ranges: dict[str, Prior]
-    sinkage: tuple[float, float]  # over radius, of what is learned from
-    pressure: tuple[float, float]  # load / (radius width), Pa, likewise
+    sinkage: tuple[float, float]  # range of sinkage over radius of the designs
+    pressure: tuple[float, float]  # range of load / (radius width) of the designs, Pa
     axes: tuple[Coordinate, ...]
     targets: int = 3
     free: int = 3
@@ -92,132 +90,82 @@ class DimensionlessFamily:
             (sinkage.lower, sinkage.upper),
             (pressure.lower, pressure.upper),
             (
-                Coordinate.of("cohesion", COHESION),
+                Coordinate.of("cohesion", COHESION_SHARE),
                 Coordinate.of("friction_angle", angle),
-                Coordinate.of("shear_modulus", SHEAR_MODULUS),
-                Coordinate.of("bearing", Prior(-BEARING_RANGE, BEARING_RANGE)),
-                Coordinate.of("bend", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
+                Coordinate.of("shear_modulus", SHEAR_MODULUS_SHARE),
+                Coordinate.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
+                Coordinate.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
             ),
         )
 
     def designs(self, count: int, seed: int) -> Floats:
-        """Ways to drive (count, 8) whose load the middle of the soils carries, as asked for."""
+        """Operating conditions (count, 8) whose sinkage and ground pressure are in range.
+
+        Sinkage is that on soil in the middle of the prior.
+        """
         sequence = qmc.Sobol(len(self.ranges), rng=seed)
-        found: list[Floats] = []
-        have = 0
-        while have < count:
-            u = sequence.random(1 << 13) * (1.0 + 2.0 * RANGE_MARGIN) - RANGE_MARGIN
-            named = {name: prior.at(u[:, i]) for i, (name, prior) in enumerate(self.ranges.items())}
-            radius, load, n = named["wheel_radius"], named["load"], named["n"]
-            width = radius * named["width_over_radius"]
-            bearing = named["pressure_at_1cm"] / 0.01**n
-            prior = (named["cohesion_max"], named["shear_modulus_max"])
-            drawn = np.stack([named["slip"], radius, width, load, n, bearing, *prior], axis=1)
-            pressure = load / (radius * width)
-            drawn = drawn[(pressure > self.pressure[0]) & (pressure < self.pressure[1])]
-            middle = np.zeros((len(drawn), 1, len(self.axes)))
-            depth = np.exp(self.responses(drawn, middle)[:, 0, 1])
-            held = (depth > self.sinkage[0]) & (depth < self.sinkage[1])
-            found.append(drawn[held])
-            have += int(held.sum())
-        return np.concatenate(found)[:count]
+        accepted: list[Floats] = []
+        while sum(map(len, accepted)) < count:
+            u = sequence.random(CANDIDATES) * (1.0 + 2.0 * RANGE_MARGIN) - RANGE_MARGIN
+            designs = self._designs_at(u)
+            middle = np.zeros((len(designs), 1, len(self.axes)))
+            sinkage = np.exp(self.responses(designs, middle)[:, 0, 1])
+            accepted.append(designs[(sinkage > self.sinkage[0]) & (sinkage < self.sinkage[1])])
+        return np.concatenate(accepted)[:count]
+
+    def _designs_at(self, u: Floats) -> Floats:
+        """Designs at fractions u (n, ranges) of the ranges whose ground pressure is in range."""
+        named = {name: prior.at(u[:, i]) for i, (name, prior) in enumerate(self.ranges.items())}
+        radius, load, n = named["wheel_radius"], named["load"], named["n"]
+        width = radius * named["width_over_radius"]
+        bearing = named["pressure_at_1cm"] / 0.01**n
+        prior = (named["cohesion_max"], named["shear_modulus_max"])
+        designs = np.stack([named["slip"], radius, width, load, n, bearing, *prior], axis=1)
+        pressure = load / (radius * width)
+        return designs[(pressure > self.pressure[0]) & (pressure < self.pressure[1])]
 
     def features(self, designs: Floats) -> Floats:
         """Logarithms of slip, load number, largest cohesion and shear modulus; and n."""
-        slip, r, b, load, n, k, most_c, most_shear = designs.T
+        slip, r, b, load, n, k, c_max, shear_max = designs.T
         return np.stack(
             [
                 np.log(slip),
                 np.log(load / (k * b)) - (n + 1.0) * np.log(r),
-                np.log(most_c * r * b / load),
-                np.log(most_shear / r),
+                np.log(c_max * r * b / load),
+                np.log(shear_max / r),
                 n,
             ],
             axis=1,
         )
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
-        """See `Family`; bearing, wheel, noise and the torque sensor's bias differ from set to set.
-
-        Torque strays by 1 to 8 %, in a third of the sets by up to 4 % more that all rows share; the
-        bearing curve is known in a third, and known up to a factor of 1.1 to 1.5 in the others.
-        """
-        rng = np.random.default_rng((seed, rows))
-        base = self.designs(count, seed + rows)
-        designs = np.repeat(base[:, None], rows, axis=1)
-        designs[..., SLIP] = self.ranges["slip"].at(run_patterns(count, rows, rng))
-        designs[..., LOAD] *= np.exp(LOAD_SPREAD * (run_patterns(count, rows, rng) - 0.5))
-        near = np.where(
-            rng.random(count) < 1.0 / 3.0, 0.0, rng.uniform(0.1, MOST_BEARING_STD, count)
-        )
-        x = np.stack([a.quantile(rng.random(count)) for a in self.axes[: self.free]], axis=1)
-        stray = (
-            np.clip(rng.standard_normal((count, 2)), -NORMAL_TRUNCATION, NORMAL_TRUNCATION)
-            * near[:, None]
-            / BEARING_RANGE
-        )
-        x = np.concatenate([x, stray], axis=1)
-        flat = designs.reshape(-1, base.shape[1])
-        y = self.responses(flat, np.repeat(x, rows, axis=0)[:, None]).reshape(count, rows, 3)
-        z = self.features(flat).reshape(count, rows, -1)
-        lower, upper = (end(self.features(base), axis=0) for end in (np.min, np.max))
-        kept = np.isfinite(y).all(axis=(1, 2)) & ((z > lower) & (z < upper)).all(axis=(1, 2))
-        designs, y, x, near = designs[kept], y[kept], x[kept], near[kept]
-        n, load, radius = len(x), designs[..., LOAD], designs[..., RADIUS]
-        torque, sinkage = np.exp(y[..., 0]) * load * radius, np.exp(y[..., 1]) * radius
-        share = np.exp(rng.uniform(np.log(0.01), np.log(0.08), (n, 1)))
-        bias = np.where(rng.random((n, 1)) < 1.0 / 3.0, rng.uniform(0.0, 0.04, (n, 1)), 0.0)
-        told = rng.random((n, 1)) < 0.3
-        stds = {"torque": share * torque, "sinkage": 0.05 * sinkage, "drawbar_pull": 0.03 * load}
-        readings = {"slip": designs[..., SLIP], "load": load, "torque_bias": bias * torque}
-        for name, value in zip(stds, (torque, sinkage, y[..., 2] * load), strict=True):
-            read = told | (name == "torque")
-            noisy = value + stds[name] * rng.standard_normal(value.shape)
-            readings[name] = np.where(read, noisy, 1.0)
-            readings[f"{name}_std"] = np.where(read, stds[name], ABSENT_STD)
-        readings["torque"] += readings["torque_bias"] * rng.standard_normal((n, 1))
-        scale = (designs[:, 0, MOST_COHESION], np.ones(n), designs[:, 0, MOST_SHEAR_MODULUS])
-        names = ("wheel_radius", "wheel_width", "bearing_modulus", "n")
-        places = (RADIUS, WIDTH, BEARING, EXPONENT)
-        context = {k: designs[:, 0, i] for k, i in zip(names, places, strict=True)}
-        context |= {"bearing_std": near, "cohesion_max": scale[0], "shear_modulus_max": scale[2]}
-        truth = [
-            s * a.value(x[:, i]) for i, (a, s) in enumerate(zip(self.axes, scale, strict=False))
-        ]
-        none = np.zeros_like(load)
-        noise = {
-            "torque": (none, share + none),
-            "sinkage": (none, 0.05 + none),
-            "drawbar_pull": (0.03 * load, none),
-            "torque_bias": (none, bias + none),
-        }
-        origin = Origin(designs, x, near / BEARING_RANGE, radius[:, 0], noise)
-        return SimulatedSets(readings, context, np.stack(truth, axis=1), origin)
+        """See `WheelFamily` and `simulate_sets`."""
+        return simulate_sets(self, count, rows, seed)
 
     def force(self, designs: Floats, x: Floats) -> Force:
-        """What the wheel does (n, m) on soils at coordinates x (n, m, p)."""
-        slip, r, b, load, n, k, most_c, most_shear = designs[:, None, :].transpose(2, 0, 1)
-        c, phi, shear, stray, bend = (a.value(x[..., i]) for i, a in enumerate(self.axes))
+        """Forces of the wheel (n, m) on soils at coordinates x (n, m, p)."""
+        slip, r, b, load, n, k, c_max, shear_max = designs[:, None, :].transpose(2, 0, 1)
+        c, phi, shear, log_bearing, exponent = (a.value(x[..., i]) for i, a in enumerate(self.axes))
         soil = Soil(
-            cohesion=most_c * c,
+            cohesion=c_max * c,
             friction_angle=phi,
-            shear_modulus=most_shear * shear,
+            shear_modulus=shear_max * shear,
             kc=0.0,
-            kphi=k * np.exp(stray) * (REFERENCE_DEPTH * r) ** -bend,
-            n=n + bend,
+            kphi=k * np.exp(log_bearing) * (REFERENCE_DEPTH * r) ** -exponent,
+            n=n + exponent,
         )
         return Model(Wheel(radius=r, width=b))(soil, Operating(slip=slip, load=load))
 
     def responses(self, designs: Floats, x: Floats) -> Floats:
-        """See `Family`; torque as the logarithm of T / (W r), and the length is the radius."""
+        """See `WheelFamily`; torque as the logarithm of T / (W r), and the length is the radius."""
         force = self.force(designs, x)
         r, load = designs[:, RADIUS, None], designs[:, LOAD, None]
         with np.errstate(invalid="ignore", divide="ignore"):
-            torque, depth = np.log(force.torque / (load * r)), np.log(force.sinkage / r)
-        return np.stack([torque, depth, force.drawbar_pull / load], axis=-1)
+            torque, sinkage = np.log(force.torque / (load * r)), np.log(force.sinkage / r)
+        return np.stack([torque, sinkage, force.drawbar_pull / load], axis=-1)
 
     def inputs(self) -> dict[str, str]:
-        """What holds for all rows of a set."""
+        """Context inputs and their units."""
         return {
             "wheel_radius": "m",
             "wheel_width": "m",
@@ -229,7 +177,7 @@ class DimensionlessFamily:
         }
 
     def limits(self) -> dict[str, list[float]]:
-        """Least and most of each of `inputs`; together they may be outside of what is learned."""
+        """See `WheelFamily`; combinations of values within them may still be out of range."""
         r, share, n, p1, c, shear = (
             (self.ranges[name].lower, self.ranges[name].upper)
             for name in (
@@ -284,7 +232,7 @@ class DimensionlessFamily:
         )
 
     def metadata(self) -> dict[str, Any]:
-        """See `Family`."""
+        """See `WheelFamily`."""
         return {
             "kind": "any wheel",
             **{name: prior.as_setting() for name, prior in self.ranges.items()},

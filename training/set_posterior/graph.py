@@ -17,7 +17,7 @@ from soilml.onboard.set_contract import (
     STD_INPUTS,
     empty_memory,
 )
-from training.onnx_graph.builder import Graph, Output
+from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value, concat
 from training.set_posterior.importance_sampler import add_importance_sampler
 from training.set_posterior.misfit_test import MisfitLimits
@@ -26,14 +26,10 @@ from training.set_posterior.residual_system import add_residual_system, integrat
 from training.set_posterior.response_surface import Response
 from training.set_posterior.wheel_family import WheelFamily
 
-#: ONNX's numbers of the element types of outputs.
-_FLOAT, _BOOL = 1, 9
-
 
 @dataclass(frozen=True)
 class SetPosteriorGraph:
-    """A family of wheels, its response surface, and the largest misfit of a set that is
-    accepted."""
+    """A family of wheels, its response surface, and the largest accepted misfits."""
 
     family: WheelFamily
     response: Response
@@ -52,20 +48,20 @@ class SetPosteriorGraph:
         """Outputs of the graph."""
         q, terms = self.family.targets, len(self.response.terms)
         of_set: dict[str, Output] = {
-            "mean": (_FLOAT, [q]),
-            "std": (_FLOAT, [q]),
-            "low": (_FLOAT, [q]),
-            "high": (_FLOAT, [q]),
-            "covariance": (_FLOAT, [q, q]),
-            "in_range": (_BOOL, [1]),
-            "abstains": (_BOOL, [q]),
-            "misfit": (_FLOAT, [1]),
+            "mean": (FLOAT, [q]),
+            "std": (FLOAT, [q]),
+            "low": (FLOAT, [q]),
+            "high": (FLOAT, [q]),
+            "covariance": (FLOAT, [q, q]),
+            "in_range": (BOOL, [1]),
+            "abstains": (BOOL, [q]),
+            "misfit": (FLOAT, [1]),
         }
-        memory: tuple[Output, ...] = ((_FLOAT, ["kept_out", terms + 1]), (_FLOAT, [3]))
+        memory: tuple[Output, ...] = ((FLOAT, ["kept_out", terms + 1]), (FLOAT, [3]))
         return {
             **{SET_PREFIX + name: output for name, output in of_set.items()},
             **dict(zip(MEMORY_OUTPUTS, memory, strict=True)),
-            ROW_IN_RANGE: (_BOOL, ["rows"]),
+            ROW_IN_RANGE: (BOOL, ["rows"]),
         }
 
     def defaults(self) -> dict[str, Any]:

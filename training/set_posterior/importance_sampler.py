@@ -66,9 +66,8 @@ def add_importance_sampler(
 
     1. In the first round the other unknowns are drawn from the prior.
     2. In each adapted round their inverse hyperbolic tangents, which are unbounded, are drawn from
-    a t
-       distribution with the mean and covariance of the previous round. These moments are those of
-       the highest power of the density that enough samples share (`tempering_power`).
+       a t distribution with the mean and covariance of the previous round. These moments are those
+       of the highest power of the density that enough samples share (`tempering_power`).
     3. Rounds are pooled in proportion to their effective sample sizes.
 
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
@@ -98,7 +97,8 @@ def add_importance_sampler(
     draws = adapted_draws(unknowns, sizes.adapted)
     prior = prior_draws(family, residuals.order, sizes.prior)
     current = _prior_round(family, residuals, prior)
-    unbounded = constant(graph, np.arctanh(np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)))
+    bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
+    unbounded = constant(graph, np.arctanh(bounded))
     count, rounds, pooled_weights = sizes.prior, [current], []
     for _ in range(sizes.rounds):
         power = tempering_power(current.boxed_log_weight)
@@ -111,15 +111,15 @@ def add_importance_sampler(
         unbounded, current = _adapted_round(family, residuals, proposal, draws)
         count = sizes.adapted
         rounds.append(current)
-    # The last round keeps its weight if it is tempered: an interval that is too wide is on the safe
-    # side of one that rests on a few samples.
+    # The last round keeps its weight even if it had to be tempered: too wide an interval is safer
+    # than one that rests on a few samples.
     power = tempering_power(current.boxed_log_weight)
     weights = tempered_weights(current.log_weight, power)
     pooled_weights.append(weights_by_effective_size(weights))
     pooled = concat(pooled_weights, axis=1)
-    points = concat([one.points for one in rounds], axis=1)
+    points = concat([r.points for r in rounds], axis=1)
     normalised = pooled / pooled.sum(keepdims=True)
-    misfits = concat([one.misfit for one in rounds], axis=1)
+    misfits = concat([r.misfit for r in rounds], axis=1)
     return WeightedSample(
         points,
         normalised,

@@ -1,5 +1,4 @@
-"""Importance weights of samples: log weights, tempering and effective sample sizes, as graph
-nodes."""
+"""Importance weights as graph nodes: log weights, tempering, effective sample sizes."""
 
 from __future__ import annotations
 
@@ -92,7 +91,7 @@ def sample_round(
     if log_jacobian is not None:
         parts.append((log_jacobian, [1.0] * (len(residuals.order) - 1)))
     stacked = concat([*[part for part, _ in parts], distance], axis=0)
-    coefficients = [coefficient for _, own in parts for coefficient in own]
+    coefficients = [coefficient for _, of_part in parts for coefficient in of_part]
     both = gemm(
         constant(mode.graph, [[*coefficients, 0.0], [*coefficients, -OUTSIDE_PENALTY]]),
         stacked,

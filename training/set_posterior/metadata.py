@@ -1,4 +1,4 @@
-"""What a file says of its set posterior: for the board, for its probe, for its card."""
+"""Metadata, probe and figures of a set posterior, for its file and its card."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from training.set_posterior.credible_interval import INTERVAL
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.validation import SetFigures, graph_outputs, posterior_session
 
-#: Rows of the set that the board tries when it loads a file.
-PROBED = 8
+#: Rows of the probe, and the sets among which the first suitable one is taken.
+PROBE_ROWS, PROBE_CANDIDATES, PROBE_SEED = 8, 16, 5
 
 
 def metadata_of(
-    posterior: SetPosteriorGraph, noise: Mapping[str, Any], alone: bool
+    posterior: SetPosteriorGraph, noise: Mapping[str, Any], sets_only: bool
 ) -> dict[str, Any]:
-    """For the board: terms of the system, noise by channel, what must be given, and its range."""
+    """The entry `set` of the metadata; the runtime reads terms, noise, context and alone."""
     return {
         "terms": len(posterior.response.terms),
         "noise": dict(noise),
         "context": posterior.family.limits(),
-        "alone": alone,
+        "alone": sets_only,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),
         "interval": list(INTERVAL),
         "misfit": {
@@ -36,49 +36,52 @@ def metadata_of(
 
 
 def probe_of_sets(posterior: SetPosteriorGraph | None) -> list[dict[str, Any]]:
-    """A set with the answer that it must get; nothing where the file has no set posterior."""
+    """A simulated set of torque readings with its estimate; none without a set posterior.
+
+    The runtime repeats the estimate when it loads the file.
+    """
     if posterior is None:
         return []
-    sets = posterior.family.sets(16, PROBED, 5)
+    sets = posterior.family.sets(PROBE_CANDIDATES, PROBE_ROWS, PROBE_SEED)
     session = posterior_session(posterior)
     for index in range(len(sets.truth)):
         rows = {k: v.astype(np.float32).astype(np.float64) for k, v in sets.rows(index).items()}
-        found = graph_outputs(session, posterior.response, sets, index)
-        if found["set_in_range"][0] and (rows["sinkage_std"] == ABSENT_STD).all():
+        outputs = graph_outputs(session, posterior.response, sets, index)
+        if outputs["set_in_range"][0] and (rows["sinkage_std"] == ABSENT_STD).all():
             break
     names = ("slip", "torque", "load", "torque_std", "torque_bias")
     return [
         {
             "readings": {name: rows[name].tolist() for name in names},
             "given": sets.context_of(index),
-            "mean": found["set_mean"].tolist(),
-            "std": found["set_std"].tolist(),
+            "mean": outputs["set_mean"].tolist(),
+            "std": outputs["set_std"].tolist(),
             "in_range": True,
         }
     ]
 
 
 def figures_of(figures: Mapping[int, SetFigures]) -> dict[str, Any]:
-    """Figures by rows of a set."""
+    """Accuracy by rows of a set, as the metadata have it."""
     return {
         str(rows): {
-            "sets": own.sets,
-            "rmse_share_of_prior": own.relative.tolist(),
-            "cover90": own.cover90.tolist(),
-            "joint90": own.joint90,
-            "refused": own.refused,
+            "sets": accuracy.sets,
+            "rmse_share_of_prior": accuracy.relative.tolist(),
+            "cover90": accuracy.cover90.tolist(),
+            "joint90": accuracy.joint90,
+            "refused": accuracy.refused,
         }
-        for rows, own in figures.items()
+        for rows, accuracy in figures.items()
     }
 
 
 def table_of(figures: Mapping[int, SetFigures], names: list[str]) -> list[str]:
-    """The same as a table for the card."""
+    """Accuracy by rows of a set as a Markdown table, for the card."""
     head = " | ".join(f"{what} {n}" for what in ("error", "90 %") for n in names)
     lines = [f"| rows | sets | {head} | joint 90 % | refused |"]
     lines.append("|---:|---:|" + "---:|" * (2 * len(names) + 2))
-    for rows, own in figures.items():
-        cells = [f"{v:.3f}" for v in own.relative] + [f"{v:.1%}" for v in own.cover90]
-        cells += [f"{own.joint90:.1%}", f"{own.refused:.1%}"]
-        lines.append(f"| {rows} | {own.sets} | {' | '.join(cells)} |")
+    for rows, accuracy in figures.items():
+        columns = [f"{v:.3f}" for v in accuracy.relative] + [f"{v:.1%}" for v in accuracy.cover90]
+        columns += [f"{accuracy.joint90:.1%}", f"{accuracy.refused:.1%}"]
+        lines.append(f"| {rows} | {accuracy.sets} | {' | '.join(columns)} |")
     return [*lines, ""]

@@ -23,8 +23,7 @@ CHI_SQUARED_MARGIN = 3.0
 
 @dataclass(frozen=True)
 class MisfitLimits:
-    """Largest accepted misfit of a set, calibrated on simulated sets by number of readings,
-    rising."""
+    """Largest accepted misfit of a set by number of readings, both rising."""
 
     readings: Floats
     misfit: Floats

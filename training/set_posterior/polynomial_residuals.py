@@ -1,5 +1,4 @@
-"""Residuals of a set at sample points, and Gauss-Newton steps along one unknown, as nodes of a
-graph."""
+"""Residuals of a set at sample points, and Gauss-Newton steps, as nodes of a graph."""
 
 from __future__ import annotations
 
@@ -17,18 +16,18 @@ from training.set_posterior.wheel_family import ContextValues, WheelFamily
 
 Floats = NDArray[np.float64]
 
-#: Standard deviation of a normal prior that regularises the step where readings do not constrain
-#: the solved coordinate: a little more than that of the uniform prior on [-1, 1], 0.58, so that it
-#: matters there only.
-REGULARISING_STD = 0.7
+#: Its inverse square is added to the curvature along the solved coordinate: it damps the step, and
+#: is the width of the proposal, where readings do not constrain the coordinate. A little more than
+#: the standard deviation of the uniform prior on [-1, 1], 0.58.
+DAMPING_STD = 0.7
 
 
 @dataclass(frozen=True)
 class PolynomialResiduals:
-    """Residuals A b(x) (m, n) at points x, with the axes in an order in which the solved one is
-    last.
+    """Residuals A b(x) (m, n) of a set at points x.
 
-    A point is a column of (1 + p, n): 1, and the coordinates in this order, each within [-1, 1].
+    A point is a column of (1 + p, n): 1, and the coordinates within [-1, 1], in an order of the
+    axes in which the one that is solved for is last.
     """
 
     system: Value  # A, (m, terms)
@@ -86,15 +85,15 @@ def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, V
 
     .. math:: \kappa = |r'|^2 + \sigma_0^{-2}, \qquad s \leftarrow s - \frac{r^T r'}{\kappa}
 
-    with r the residuals and r' their derivative (1, m, n), and the regularising standard deviation
-    :math:`\sigma_0`. Steps stay within the box.
+    with r the residuals and r' their derivative (1, m, n), and the damping :math:`\sigma_0`.
+    Steps stay within the box.
 
     Returns
     -------
     tuple of Value
         The new s and the precision kappa of its conditional posterior, (1, n) each.
     """
-    precision = slope.sum_of_squares(axis=1, keepdims=False) + REGULARISING_STD**-2
+    precision = slope.sum_of_squares(axis=1, keepdims=False) + DAMPING_STD**-2
     gradient = (residual * slope).sum(axis=1, keepdims=False)
     return within_box(solved - gradient / precision), precision
 
@@ -107,13 +106,11 @@ def within_box(x: Value) -> Value:
 def standardised_system(
     family: WheelFamily, response: Response, context: ContextValues, system: Value
 ) -> Value:
-    r"""The system (m, terms) with nearly known coordinates standardised, and their prior as rows of
-    it.
+    r"""The system (m, terms) in standardised coordinates, with their normal prior as further rows.
 
     With :math:`z = x / (c \sigma)`, c the truncation in standard deviations, the coefficient of a
     monomial is multiplied by :math:`(c \sigma)^k` for its power k of the coordinate, and the prior
-    is the residual
-    :math:`c z`. All coordinates then lie between -1 and 1.
+    is the residual :math:`c z`. All coordinates then lie between -1 and 1.
     """
     unknowns, free, terms = len(family.axes), family.free, response.terms
     if free == unknowns:

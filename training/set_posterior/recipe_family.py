@@ -1,4 +1,4 @@
-"""One wheel, or another gear, as a recipe has it: how it is driven, and which soils there are."""
+"""The wheel, or another gear, of a recipe: its operating conditions and the soils of its prior."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from datagen.recipe import Recipe
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD, RESPONSE_CHANNELS
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
@@ -30,23 +30,25 @@ from training.set_posterior.wheel_family import (
 
 Floats = NDArray[np.float64]
 
-#: Unknowns that polynomials of the third degree can still follow.
+#: Up to this many unknowns the terms of a polynomial of the third degree (84) can be fitted.
 MOST_UNKNOWNS = 6
-#: Slips and loads are learned a little beyond the recipe's ends, for sensors stray.
+#: Designs are drawn beyond the ends of both ranges by this share of their width, so that readings
+#: at the ends are not extrapolated.
 RANGE_MARGIN = 0.02
-#: Share of simulated sets in which sinkage and drawbar pull are measured beside torque.
+#: Share of simulated sets in which sinkage and drawbar pull are measured as well as torque.
 SHARE_ALL_CHANNELS = 0.3
-#: Up to so many unknowns are followed to the fourth degree, and the estimated ones always.
+#: Up to this many unknowns all terms have a degree of up to four; beyond, those of the estimated
+#: unknowns alone.
 FEW_UNKNOWNS = 4
-#: Least share of noise for which torque is answered, where its noise is constant.
+#: Least relative noise in the scale of torque where its noise is constant.
 LEAST_SHARE = 0.2
-#: Without a logarithm a torque may have any noise.
+#: Without a logarithm, a torque is used whatever its noise; that of an absent reading is larger.
 ANY_NOISE = 1e5
 
 
 @dataclass(frozen=True)
 class RecipeFamily:
-    """A recipe's gear and effects on soils of its prior; a design is (slip, load)."""
+    """Gear and effects of a recipe on soils of its prior; a design is (slip, load)."""
 
     recipe: Recipe
     axes: tuple[Coordinate, ...]
@@ -57,19 +59,28 @@ class RecipeFamily:
 
     @staticmethod
     def of(recipe: Recipe, targets: Sequence[str]) -> RecipeFamily:
-        """Raises `InputError` for a recipe that has braking, covariates or too many unknowns."""
+        """The family of a recipe.
+
+        Raises
+        ------
+        InputError
+            If the recipe has braking, covariates, stick-slip, too many unknowns, or no prior of a
+            target.
+        """
         prior = recipe.case.prior
         names = [*targets, *(name for name in prior if name not in targets)]
         if missing := [name for name in targets if name not in prior]:
             raise InputError(f"set_posterior: the recipe has no prior of {missing[0]}")
         if len(names) > MOST_UNKNOWNS:
             raise InputError(
-                f"set_posterior: the recipe has {len(names)} unknowns, more than {MOST_UNKNOWNS}"
+                f"set_posterior: the recipe has {len(names)} unknowns; needed are {MOST_UNKNOWNS} "
+                "or fewer"
             )
         if recipe.slip.lower <= 0.0 or recipe.covariates or recipe.gear_sensors:
             raise InputError(
-                "set_posterior: it is for driving wheels (slip above 0) whose torque follows from "
-                "slip, load and soil alone; leave it out of the spec"
+                "set_posterior: the recipe has slip of 0 or less, covariates or stick-slip; needed "
+                "are slip above 0 and torque that depends on slip, load and soil alone; remove "
+                "[set_posterior] from the spec"
             )
         axes = tuple(Coordinate.of(name, prior[name]) for name in names)
         degree = (4, 4) if len(axes) <= FEW_UNKNOWNS else (3, 4)
@@ -93,15 +104,17 @@ class RecipeFamily:
         return np.log(designs)
 
     def responses(self, designs: Floats, x: Floats) -> Floats:
-        r"""See `Family`; the length is 1 m.
+        r"""See `WheelFamily`; the length is 1 m.
 
-        Torque is answered as its logarithm over load where its noise is a share of it, and else as
+        Torque is on a logarithmic scale, log(T / W), if its noise is relative, and else on the
+        scale
 
         .. math:: \mathrm{asinh}(T / 2 T_0), \qquad T_0 = \sigma_{constant} / \sigma_{share}
 
-        along which the noise is nearly the same at all torques (Bartlett 1947). Constant noise is
-        taken for noise with a share of a fifth: a straight line in torque would bend too much along
-        the unknowns, and so the noise of a reading still tells that of the truth within 5 %.
+        which stabilises the variance of noise with a constant and a relative part (Bartlett 1947).
+        A relative part of at least a fifth is assumed: on a linear scale, torque is too far from a
+        polynomial of the unknowns; and the noise computed from a reading is then within 5 % of
+        that computed from the true torque.
         """
         case = self.recipe.case.with_values(
             {axis.name: axis.value(x[..., i]) for i, axis in enumerate(self.axes)}
@@ -116,11 +129,11 @@ class RecipeFamily:
             return np.stack([torque, np.log(force.sinkage), force.drawbar_pull / load], axis=-1)
 
     def inputs(self) -> dict[str, str]:
-        """Nothing beside the readings."""
+        """None: all context is fixed by the recipe."""
         return {}
 
     def limits(self) -> dict[str, list[float]]:
-        """None, for there are no inputs."""
+        """None, as there are no context inputs."""
         return {}
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
@@ -148,7 +161,7 @@ class RecipeFamily:
         return response, 1.0 / sqrt(torque * torque + 4.0 * self.linear_torque**2)
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
-        """See `Family`; the noise is the recipe's, and channels without noise are not read."""
+        """See `WheelFamily`; the noise is the recipe's, and channels without noise are absent."""
         rng = np.random.default_rng((seed, rows))
         slip = self.recipe.slip.at(run_patterns(count, rows, rng))
         load = self.recipe.load.at(run_patterns(count, rows, rng))
@@ -156,39 +169,44 @@ class RecipeFamily:
         y = self.responses(
             np.stack([slip, load], axis=-1).reshape(-1, 2), np.repeat(x, rows, axis=0)[:, None]
         ).reshape(count, rows, 3)
-        kept = np.isfinite(y).all(axis=(1, 2))
-        slip, load, y, x = slip[kept], load[kept], y[kept], x[kept]
+        feasible = np.isfinite(y).all(axis=(1, 2))
+        slip, load, y, x = slip[feasible], load[feasible], y[feasible], x[feasible]
+        asinh_torque = 2.0 * self.linear_torque * np.sinh(y[..., 0])
+        torque = asinh_torque if self.linear_torque else np.exp(y[..., 0]) * load
+        values = (torque, np.exp(y[..., 1]), y[..., 2] * load)
         readings = {"slip": slip, "load": load}
-        bent = 2.0 * self.linear_torque * np.sinh(y[..., 0])
-        torque = bent if self.linear_torque else np.exp(y[..., 0]) * load
-        true = (torque, np.exp(y[..., 1]), y[..., 2] * load)
-        told = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
-        for name, value in zip(RESPONSE_CHANNELS, true, strict=True):
+        all_channels = rng.random((len(x), 1)) < SHARE_ALL_CHANNELS
+        for name, value in zip(RESPONSE_CHANNELS, values, strict=True):
             noise = self.recipe.case.noise.get(column(name))
-            read = (noise is not None) & (told | (name == "torque"))
+            measured = (noise is not None) & (all_channels | (name == "torque"))
             std = np.full_like(value, ABSENT_STD) if noise is None else noise.std(value)
-            readings[name] = np.where(read, value + std * rng.standard_normal(std.shape), 1.0)
-            readings[f"{name}_std"] = np.where(read, std, ABSENT_STD)
+            noisy = value + std * rng.standard_normal(std.shape)
+            readings[name] = np.where(measured, noisy, ABSENT_READING)
+            readings[f"{name}_std"] = np.where(measured, std, ABSENT_STD)
         bias = self.recipe.bias.get(column("torque"), Noise())
-        readings["torque_bias"] = bias.std(true[0])
+        readings["torque_bias"] = bias.std(torque)
         readings["torque"] += readings["torque_bias"] * rng.standard_normal((len(x), 1))
         truth = [axis.value(x[:, i]) for i, axis in enumerate(self.axes[: self.targets])]
-        sources = self.recipe.case.noise | {"torque_bias": bias}
         origin = Origin(
             designs=np.stack([slip, load], axis=-1),
             x=x,
             normal_std=np.zeros(len(x)),
             length=np.ones(len(x)),
-            noise={
-                name: (np.full_like(slip, own.constant), np.full_like(slip, own.share))
-                for name in (*RESPONSE_CHANNELS, "torque_bias")
-                if (own := sources.get(name if name == "torque_bias" else column(name)))
-            },
+            noise=self._noise(bias, slip.shape),
         )
         return SimulatedSets(readings, {}, np.stack(truth, axis=1), origin)
 
+    def _noise(self, bias: Noise, shape: tuple[int, ...]) -> dict[str, tuple[Floats, Floats]]:
+        """Noise as in `Origin`, of the channels that the recipe has noise for, and of the bias."""
+        named = {name: self.recipe.case.noise.get(column(name)) for name in RESPONSE_CHANNELS}
+        return {
+            name: (np.full(shape, float(noise.constant)), np.full(shape, float(noise.share)))
+            for name, noise in (named | {"torque_bias": bias}).items()
+            if noise
+        }
+
     def metadata(self) -> dict[str, Any]:
-        """See `Family`."""
+        """See `WheelFamily`."""
         return {
             "kind": "one wheel",
             "slip": [self.recipe.slip.lower, self.recipe.slip.upper],

@@ -1,9 +1,9 @@
-"""How a wheel answers, learned: coefficients of polynomials in the unknowns, by design."""
+"""The response surface of a wheel: polynomials in the unknowns with learned coefficients."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -23,17 +23,25 @@ Progress = Callable[[str, int, int], None]
 
 #: Points of the unknowns at which each design is simulated, for each term of the polynomial.
 POINTS_PER_TERM = 2.5
-#: Nearly known axes are simulated within this many standard deviations of their widest.
+#: Nearly known axes have a normal prior that is truncated at this many standard deviations.
 NORMAL_TRUNCATION = 2.5
-#: Designs simulated in one piece; batch of the descent; share held out.
-PIECE, BATCH, HELD_OUT = 512, 256, 0.08
-#: Weight of each channel's error in the fit.
-WEIGHTS = np.asarray([1.0, 0.4, 1.0])
+#: Designs simulated at a time, which bounds the memory needed.
+SIMULATED_AT_A_TIME = 512
+#: Designs of a step of the training, and the share held out to measure the error.
+BATCH, HELD_OUT = 256, 0.08
+#: Learning rates of the one-cycle schedule: the optimiser's own, which the schedule overrides, and
+#: the largest, which is reached after a tenth of the steps.
+FIRST_RATE, LARGEST_RATE, WARM_UP = 4e-3, 6e-3, 0.1
+#: Least standard deviation to which an output is scaled: nearly constant coefficients are not
+#: magnified.
+LEAST_OUTPUT_STD = 2e-3
+#: Weight of each channel's error in the loss; readings of sinkage have more noise.
+CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
 
 
 @dataclass(frozen=True)
 class ResponseSettings:
-    """How much is learned: designs simulated, width of the two hidden layers, epochs, seed."""
+    """Effort of the fit: designs simulated, width of the two hidden layers, epochs, seed."""
 
     designs: int
     hidden: int
@@ -43,20 +51,21 @@ class ResponseSettings:
 
 @dataclass(frozen=True)
 class Response:
-    r"""Channels of a row as polynomials whose coefficients a small network gives.
+    r"""Channels of a row as polynomials whose coefficients a small network computes.
 
     .. math:: y_k(d, x) = \sum_j a_{kj}(d)\, b_j(x)
 
-    With b monomials of the unknowns x and a(d) two tanh layers of the design's features. Rows of
-    one soil share x: what they say of it adds up row by row, whatever their number and order.
+    with b the monomials of the unknowns x, and a(d) a network with two tanh layers of the features
+    of the design d. Rows of one soil have the same x: their log likelihoods add up, whatever their
+    number and order.
     """
 
     terms: Terms
     scaling: Standardisation
     layers: tuple[Floats, ...]  # weights and biases in turn; the last gives (terms * channels)
-    lower: Floats  # (f,) ends of the features that were learned from
+    lower: Floats  # (f,) ends of the features of the designs
     upper: Floats
-    error: Floats  # (channels,) rms over designs not learned from, as the answers are
+    error: Floats  # (channels,) rms over held-out designs, on the scales of the responses
 
     def coefficients(self, features: Floats) -> Floats:
         """Coefficients (n, terms, channels) at features (n, f)."""
@@ -89,113 +98,137 @@ class Response:
 def _by_channel(layer: Floats, count: int) -> Floats:
     """The last layer with its outputs by channel first, then by term, and a term that is 0."""
     shape = layer.shape[:-1]
-    own = layer.reshape(*shape, count, -1).swapaxes(-1, -2)
-    return np.concatenate([own, np.zeros_like(own[..., :1])], axis=-1).reshape(*shape, -1)
+    by_channel = layer.reshape(*shape, count, -1).swapaxes(-1, -2)
+    return np.concatenate([by_channel, np.zeros_like(by_channel[..., :1])], axis=-1).reshape(
+        *shape, -1
+    )
 
 
-def fit_response(family: WheelFamily, size: ResponseSettings, progress: Progress) -> Response:
-    """Simulate designs at points of the unknowns, fit each by a polynomial, and learn terms.
+def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:
+    """The response surface of a family, fitted to simulated designs.
 
-    Raises `InputError` where fewer than half of the designs carry their load on all soils.
+    Each design is simulated at points of the unknowns, and a polynomial is fitted to its responses;
+    a network then learns the coefficients of the polynomials from the features of the designs.
+
+    Raises
+    ------
+    InputError
+        If fewer than half of the designs carry their load on all soils of the prior.
     """
     terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
-    x = _points(family, int(POINTS_PER_TERM * len(terms)), size.seed)
+    x = _points(family, int(POINTS_PER_TERM * len(terms)), settings.seed)
     basis = monomials(x, terms)
-    project = np.linalg.pinv(basis)
-    designs = family.designs(size.designs, size.seed)
-    found, left, answered = [], [], []
-    for first in range(0, len(designs), PIECE):
-        progress("simulating", first, len(designs))
-        y = family.responses(designs[first : first + PIECE], x[None])
-        whole = np.isfinite(y).all(axis=(1, 2))
-        a = np.einsum("rp,npk->nrk", project, y[whole])
-        found.append(a)
-        left.append(np.mean((basis @ a - y[whole]) ** 2, axis=1))
-        answered.append(whole)
-    progress("simulating", len(designs), len(designs))
-    kept = np.concatenate(answered)
-    if kept.mean() < 0.5:
+    designs = family.designs(settings.designs, settings.seed)
+    coefficients, squared_error, feasible = _fit_polynomials(family, designs, x, basis, progress)
+    if feasible.mean() < 0.5:
         raise InputError(
-            f"only {kept.mean():.0%} of the ways to drive have an equilibrium on all soils of the "
-            "prior: lower the loads, or raise the bearing values"
+            f"only {feasible.mean():.0%} of the operating conditions have an equilibrium on all "
+            "soils of the prior; needed is half of them: lower the loads, or raise the bearing "
+            "values"
         )
-    features = family.features(designs[kept])
-    weigh = np.sqrt(np.mean(basis**2, axis=0))[:, None] * WEIGHTS
-    wanted = np.concatenate(found)
-    response = _fitted(terms, features, wanted, weigh, size, progress)
-    unseen = slice(0, int(HELD_OUT * len(features)))
-    off = basis @ (response.coefficients(features[unseen]) - wanted[unseen])
-    surplus = np.concatenate(left)[unseen] * len(x) / (len(x) - len(terms))
-    error = np.sqrt(np.mean(off**2, axis=(0, 1)) + surplus.mean(axis=0))
-    return Response(terms, response.scaling, response.layers, response.lower, response.upper, error)
+    features = family.features(designs[feasible])
+    # the error of a coefficient counts by the rms of its monomial
+    error_weights = np.sqrt(np.mean(basis**2, axis=0))[:, None] * CHANNEL_WEIGHTS
+    response = _train_network(terms, features, coefficients, error_weights, settings, progress)
+    held_out = slice(0, int(HELD_OUT * len(features)))
+    network_error = basis @ (response.coefficients(features[held_out]) - coefficients[held_out])
+    # residuals of a least-squares fit are too small by the degrees of freedom of the fit
+    fit_error = squared_error[held_out] * len(x) / (len(x) - len(terms))
+    error = np.sqrt(np.mean(network_error**2, axis=(0, 1)) + fit_error.mean(axis=0))
+    return replace(response, error=error)
+
+
+def _fit_polynomials(
+    family: WheelFamily, designs: Floats, x: Floats, basis: Floats, progress: Progress
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Least-squares polynomials of designs at points x (m, p), whose monomials are the basis.
+
+    Coefficients (feasible, terms, channels), mean squared residuals (feasible, channels), and which
+    designs (n,) are feasible: those with an equilibrium at all points.
+    """
+    pseudo_inverse = np.linalg.pinv(basis)
+    coefficients, squared_error, feasible = [], [], []
+    for first in range(0, len(designs), SIMULATED_AT_A_TIME):
+        progress("simulating", first, len(designs))
+        y = family.responses(designs[first : first + SIMULATED_AT_A_TIME], x[None])
+        finite = np.isfinite(y).all(axis=(1, 2))
+        a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
+        coefficients.append(a)
+        squared_error.append(np.mean((basis @ a - y[finite]) ** 2, axis=1))
+        feasible.append(finite)
+    progress("simulating", len(designs), len(designs))
+    return (
+        np.concatenate(coefficients),
+        np.concatenate(squared_error),
+        np.concatenate(feasible),
+    )
 
 
 def _points(family: WheelFamily, count: int, seed: int) -> Floats:
-    """Coordinates (count, p): spread over the prior, closer where an axis is nearly known."""
+    """Coordinates (count, p): quantiles of the prior, truncated normal where nearly known."""
     from scipy.special import ndtri
 
     u = qmc.Sobol(len(family.axes), rng=seed).random(1 << (count - 1).bit_length())[:count]
     columns = [axis.quantile(u[:, i]) for i, axis in enumerate(family.axes[: family.free])]
-    near = (
-        np.clip(
-            ndtri(np.clip(u[:, family.free :], 1e-9, 1.0 - 1e-9)),
-            -NORMAL_TRUNCATION,
-            NORMAL_TRUNCATION,
-        )
-        / NORMAL_TRUNCATION
-    )
-    return np.concatenate([np.stack(columns, axis=1), near], axis=1)
+    normal = ndtri(np.clip(u[:, family.free :], 1e-9, 1.0 - 1e-9))
+    truncated = np.clip(normal, -NORMAL_TRUNCATION, NORMAL_TRUNCATION) / NORMAL_TRUNCATION
+    return np.concatenate([np.stack(columns, axis=1), truncated], axis=1)
 
 
-def _fitted(
+def _train_network(
     terms: Terms,
     features: Floats,
-    wanted: Floats,
-    weigh: Floats,
-    size: ResponseSettings,
+    coefficients: Floats,
+    error_weights: Floats,
+    settings: ResponseSettings,
     progress: Progress,
 ) -> Response:
-    """The network, by Adam with one rising and falling rate, on all but the held-out designs."""
+    """Train the network on all but the held-out designs: Adam with a one-cycle learning rate.
+
+    The loss is the squared error of coefficients times their weights (terms, channels).
+    """
     import torch
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
-        generator = torch.Generator().manual_seed(size.seed)
+        generator = torch.Generator().manual_seed(settings.seed)
         start = int(HELD_OUT * len(features))
         scaling = Standardisation.of(features)
-        y = (wanted * weigh).reshape(len(wanted), -1)
-        middle = y.mean(axis=0)
-        spread = np.maximum(y.std(axis=0), 2e-3)
+        y = (coefficients * error_weights).reshape(len(coefficients), -1)
+        y_mean = y.mean(axis=0)
+        y_std = np.maximum(y.std(axis=0), LEAST_OUTPUT_STD)
         x_train = torch.tensor(scaling.apply(features[start:]), dtype=torch.float32)
-        y_train = torch.tensor((y[start:] - middle), dtype=torch.float32)
-        gain = torch.tensor(spread, dtype=torch.float32)
-        layers = _initial([features.shape[1], size.hidden, size.hidden, y.shape[1]], generator)
+        y_train = torch.tensor((y[start:] - y_mean), dtype=torch.float32)
+        output_scale = torch.tensor(y_std, dtype=torch.float32)
+        widths = [features.shape[1], settings.hidden, settings.hidden, y.shape[1]]
+        layers = _initial(widths, generator)
         steps = max(len(x_train) // BATCH, 1)
-        optimiser = torch.optim.Adam(layers, lr=4e-3)
+        optimiser = torch.optim.Adam(layers, lr=FIRST_RATE)
         rate = torch.optim.lr_scheduler.OneCycleLR(
-            optimiser, 6e-3, total_steps=size.epochs * steps, pct_start=0.1
+            optimiser, LARGEST_RATE, total_steps=settings.epochs * steps, pct_start=WARM_UP
         )
-        for epoch in range(size.epochs):
-            progress("learning how wheels answer", epoch, size.epochs)
+        for epoch in range(settings.epochs):
+            progress("training the response surface", epoch, settings.epochs)
             order = torch.randperm(len(x_train), generator=generator)
-            pieces: Any = torch.split(order[: steps * BATCH], BATCH)
-            for rows in pieces:
+            batches: Any = torch.split(order[: steps * BATCH], BATCH)
+            for rows in batches:
                 h = torch.tanh(x_train[rows] @ layers[0] + layers[1])
                 h = torch.tanh(h @ layers[2] + layers[3])
-                off = (h @ layers[4] + layers[5]) * gain - y_train[rows]
-                loss: Any = (off**2).sum(dim=1).mean()
+                error = (h @ layers[4] + layers[5]) * output_scale - y_train[rows]
+                loss: Any = (error**2).sum(dim=1).mean()
                 optimiser.zero_grad()
                 loss.backward()
                 optimiser.step()
                 rate.step()
-        progress("learning how wheels answer", size.epochs, size.epochs)
+        progress("training the response surface", settings.epochs, settings.epochs)
         arrays = [layer.detach().numpy().astype(np.float64) for layer in layers]
     finally:
         torch.set_num_threads(threads)
-    flat = weigh.reshape(-1)
-    arrays[-2] = arrays[-2] * spread / flat
-    arrays[-1] = (arrays[-1] * spread + middle) / flat
+    # the last layer takes over the scaling of the outputs
+    flat = error_weights.reshape(-1)
+    arrays[-2] = arrays[-2] * y_std / flat
+    arrays[-1] = (arrays[-1] * y_std + y_mean) / flat
     ends = features.min(axis=0), features.max(axis=0)
     return Response(terms, scaling, tuple(arrays), *ends, np.zeros(len(RESPONSE_CHANNELS)))
 

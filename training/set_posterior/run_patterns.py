@@ -1,4 +1,4 @@
-"""How a rover varies slip or load from row to row of a set."""
+"""Patterns in which slip or load varies from row to row of a set."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ Floats = NDArray[np.float64]
 
 
 def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
-    """Shares of the range (count, rows): anywhere, at three levels, or steady, by chance."""
-    anywhere = rng.random((count, rows))
+    """Random fractions of the range (count, rows).
+
+    Half of the sets vary independently from row to row, a quarter takes three levels, and a quarter
+    is constant.
+    """
+    independent = rng.random((count, rows))
     levels = rng.random((count, 3))[np.arange(count)[:, None], rng.integers(3, size=(count, rows))]
-    steady = np.repeat(rng.random((count, 1)), rows, axis=1)
-    kind = rng.integers(4, size=(count, 1))
-    return np.where(kind < 2, anywhere, np.where(kind == 2, levels, steady))
+    constant = np.repeat(rng.random((count, 1)), rows, axis=1)
+    pattern = rng.integers(4, size=(count, 1))
+    return np.where(pattern < 2, independent, np.where(pattern == 2, levels, constant))

@@ -78,13 +78,19 @@ class SimulatedSets:
 
     def select(self, index: int) -> SimulatedSets:
         """One of the sets."""
-        own, part = self.origin, slice(index, index + 1)
-        noise = {name: (a[part], b[part]) for name, (a, b) in own.noise.items()}
+        origin, part = self.origin, slice(index, index + 1)
+        noise = {name: (a[part], b[part]) for name, (a, b) in origin.noise.items()}
         return SimulatedSets(
             {name: values[part] for name, values in self.readings.items()},
             {name: values[part] for name, values in self.context.items()},
             self.truth[part],
-            Origin(own.designs[part], own.x[part], own.normal_std[part], own.length[part], noise),
+            Origin(
+                origin.designs[part],
+                origin.x[part],
+                origin.normal_std[part],
+                origin.length[part],
+                noise,
+            ),
         )
 
 

@@ -1,4 +1,4 @@
-"""Readings of one soil together, on board."""
+"""Estimates from sets of readings of one soil, onboard."""
 
 import json
 import re
@@ -33,7 +33,7 @@ def any_wheel(any_set_file):
     return Estimator.load(any_set_file)
 
 
-def driven(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):
+def simulated_run(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):
     """Readings (rows,) of a soil in the middle of the prior, with 2 % of noise."""
     rng = np.random.default_rng(seed)
     recipe = posterior.family.recipe
@@ -45,15 +45,15 @@ def driven(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):
     return {"slip": slip, "load": load, "torque": torque}, np.exp(answers[:, 1])
 
 
-def same(a, b, tolerance=0.05):
-    """Whether two estimates differ by little of their standard deviation."""
+def assert_similar(a, b, tolerance=0.05):
+    """Assert that two estimates differ by a small share of their standard deviation."""
     assert a.in_range == b.in_range
     assert (np.abs(a.mean - b.mean) < tolerance * b.std).all()
     assert (np.abs(np.log(a.std / b.std)) < tolerance).all()
 
 
 def test_the_soil_is_inside_the_interval(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 24)
+    run, _ = simulated_run(wheel_posterior, 24)
     found = estimator.run(**run)
     axes, x = wheel_posterior.family.axes, (0.2, -0.3, 0.1)
     truth = np.asarray([axis.value(np.asarray(v)) for axis, v in zip(axes, x, strict=True)])
@@ -63,32 +63,32 @@ def test_the_soil_is_inside_the_interval(estimator, wheel_posterior):
 
 
 def test_the_order_of_rows_changes_nothing(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 16)
+    run, _ = simulated_run(wheel_posterior, 16)
     order = np.random.default_rng(1).permutation(16)
-    same(estimator.run(**{k: v[order] for k, v in run.items()}), estimator.run(**run))
+    assert_similar(estimator.run(**{k: v[order] for k, v in run.items()}), estimator.run(**run))
 
 
-def test_row_by_row_is_all_at_once(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 12)
+def test_steps_by_row_give_the_estimate_of_the_whole_run(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 12)
     memory = estimator.start()
     for i in range(12):
         found, memory = estimator.step(memory, **{k: v[i] for k, v in run.items()})
     assert memory.rows == 12
-    same(found, estimator.run(**run))
+    assert_similar(found, estimator.run(**run))
 
 
-def test_hundreds_of_rows_are_kept_in_a_bounded_memory(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 700)
+def test_the_memory_of_hundreds_of_rows_is_bounded(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 700)
     memory = estimator.start()
     for first in range(0, 700, 50):
         piece = {k: v[first : first + 50] for k, v in run.items()}
         found, memory = estimator.step(memory, **piece)
         assert len(memory.system) <= MOST_SYSTEM_ROWS + 50
     assert memory.rows == 700
-    same(found, estimator.run(**run), 0.2)
+    assert_similar(found, estimator.run(**run), 0.2)
 
 
-def test_a_packed_memory_says_what_the_whole_said():
+def test_a_packed_memory_has_the_same_normal_matrix():
     rng = np.random.default_rng(0)
     system = rng.normal(size=(500, 36)).astype(np.float32)
     packed = Memory(system, np.asarray([500.0, 500.0, 500.0], np.float32)).packed()
@@ -97,13 +97,13 @@ def test_a_packed_memory_says_what_the_whole_said():
 
 
 def test_copies_of_a_row_count_once(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 6)
+    run, _ = simulated_run(wheel_posterior, 6)
     copied = {k: np.concatenate([v, v[:3], v]) for k, v in run.items()}
-    same(estimator.run(**copied), estimator.run(**run), 1e-5)
+    assert_similar(estimator.run(**copied), estimator.run(**run), 1e-5)
 
 
 def test_more_rows_narrow_the_posterior(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 64)
+    run, _ = simulated_run(wheel_posterior, 64)
     spreads = [
         np.log(estimator.run(**{k: v[:rows] for k, v in run.items()}).std / estimator.prior.std)
         for rows in (1, 4, 16, 64)
@@ -111,30 +111,30 @@ def test_more_rows_narrow_the_posterior(estimator, wheel_posterior):
     assert (np.diff([s.sum() for s in spreads]) < 0.0).all()
 
 
-def test_sinkage_beside_torque_narrows_it_or_says_nothing_new(estimator, wheel_posterior):
-    run, sinkage = driven(wheel_posterior, 8)
-    alone, beside = estimator.run(**run), estimator.run(**run, sinkage=sinkage)
-    assert np.linalg.det(beside.covariance) < np.linalg.det(alone.covariance)
+def test_sinkage_in_addition_to_torque_reduces_the_covariance(estimator, wheel_posterior):
+    run, sinkage = simulated_run(wheel_posterior, 8)
+    torque_only, both = estimator.run(**run), estimator.run(**run, sinkage=sinkage)
+    assert np.linalg.det(both.covariance) < np.linalg.det(torque_only.covariance)
 
 
-def test_a_sinkage_that_is_missing_is_one_not_given(estimator, wheel_posterior):
-    run, sinkage = driven(wheel_posterior, 8)
-    alone = estimator.run(**run)
-    same(estimator.run(**run, sinkage=np.full(8, np.nan)), alone, 1e-5)
+def test_a_missing_sinkage_is_ignored(estimator, wheel_posterior):
+    run, sinkage = simulated_run(wheel_posterior, 8)
+    torque_only = estimator.run(**run)
+    assert_similar(estimator.run(**run, sinkage=np.full(8, np.nan)), torque_only, 1e-5)
     half = np.where(np.arange(8) < 4, sinkage, np.nan)
-    given, memory = estimator.step(estimator.start(), **run, sinkage=half)
-    assert given.in_range and memory.counts.tolist() == [12.0, 8.0, 8.0]
+    partial, memory = estimator.step(estimator.start(), **run, sinkage=half)
+    assert partial.in_range and memory.counts.tolist() == [12.0, 8.0, 8.0]
 
 
-def test_less_noise_narrows_it(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 8)
+def test_less_noise_reduces_the_covariance(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 8)
     coarse = estimator.run(**run, torque_std=0.10 * run["torque"])
     assert (estimator.run(**run).std < coarse.std).any()
     assert np.linalg.det(estimator.run(**run).covariance) < np.linalg.det(coarse.covariance)
 
 
-def test_a_bias_of_the_sensor_widens_it(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 16)
+def test_a_sensor_bias_increases_the_covariance(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 16)
     biased = estimator.run(**run, torque_bias=0.05 * run["torque"])
     assert np.linalg.det(estimator.run(**run).covariance) < np.linalg.det(biased.covariance)
 
@@ -150,7 +150,7 @@ def test_the_ends_of_the_range_are_in_range(estimator, wheel_posterior):
             assert estimator.run(slip=slip, load=load, torque=torque).in_range
 
 
-def test_beyond_the_range_the_prior_is_answered(estimator, wheel_posterior):
+def test_the_estimate_out_of_range_is_the_prior(estimator, wheel_posterior):
     upper = wheel_posterior.family.recipe.load.upper
     found = estimator.run(slip=0.3, load=3.0 * upper, torque=0.05 * upper)
     assert not found.in_range
@@ -158,15 +158,15 @@ def test_beyond_the_range_the_prior_is_answered(estimator, wheel_posterior):
     assert found.std == pytest.approx(estimator.prior.std, rel=1e-5)
 
 
-def test_one_row_in_twenty_beyond_the_range_is_left_out(estimator, wheel_posterior):
-    run, _ = driven(wheel_posterior, 20)
+def test_one_row_in_twenty_out_of_range_is_left_out(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 20)
     kept = {k: v[:19] for k, v in run.items()}
     run["load"][19] *= 10.0
-    same(estimator.run(**run), estimator.run(**kept))
+    assert_similar(estimator.run(**run), estimator.run(**kept))
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"slip": [], "torque": [], "load": []}, "no reading given"),
         ({"slip": [0.3, np.nan], "torque": [2.0, 2.0], "load": [60.0, 60.0]}, "slip is nan"),
@@ -180,22 +180,22 @@ def test_one_row_in_twenty_beyond_the_range_is_left_out(estimator, wheel_posteri
         ({"sinkage": [0.01, 0.02]}, "sinkage has shape"),
     ],
 )
-def test_a_reading_that_cannot_be_is_named(estimator, change, said):
+def test_an_impossible_reading_is_named(estimator, change, message):
     run = {"slip": 0.3, "torque": 2.0, "load": 60.0} | change
-    with pytest.raises(InputError, match=re.escape(said)) as error:
+    with pytest.raises(InputError, match=re.escape(message)) as error:
         estimator.run(**run)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("missing", ["slip", "torque", "load"])
-def test_a_reading_that_is_missing_is_named(estimator, missing):
+def test_a_missing_reading_is_named(estimator, missing):
     run = {"slip": 0.3, "torque": 2.0, "load": 60.0}
     del run[missing]
     with pytest.raises(InputError, match=f"{missing} is missing"):
         estimator.run(**run)
 
 
-def test_the_wheel_must_be_given_where_the_file_is_of_many(any_wheel):
+def test_a_file_for_any_wheel_requires_its_context(any_wheel):
     with pytest.raises(InputError, match="wheel_radius"):
         any_wheel.run(slip=0.3, torque=2.0, load=60.0)
     with pytest.raises(InputError, match=r"give bearing_std first"):
@@ -203,27 +203,27 @@ def test_the_wheel_must_be_given_where_the_file_is_of_many(any_wheel):
 
 
 @pytest.mark.parametrize("name", ANY)
-def test_a_wheel_that_the_file_is_not_for_is_refused(any_wheel, name):
+def test_a_context_out_of_range_is_refused(any_wheel, name):
     for value in (1e9, -1.0, np.nan):
         with pytest.raises(InputError, match=name):
             any_wheel.on(**ANY | {name: value})
 
 
-def test_what_is_no_part_of_a_wheel_is_refused(any_wheel, estimator):
+def test_an_unknown_context_input_is_refused(any_wheel, estimator):
     with pytest.raises(InputError, match="'mass' is not a context input"):
         any_wheel.on(**ANY, mass=3.0)
     with pytest.raises(InputError, match="it was trained for one wheel"):
         estimator.on(wheel_radius=0.2)
 
 
-def test_a_wider_prior_is_answered_in_its_own_units(any_wheel):
+def test_estimates_scale_with_the_prior(any_wheel):
     small, large = any_wheel.on(**ANY), any_wheel.on(**ANY | {"cohesion_max": 4500.0})
     assert large.prior.std[0] == pytest.approx(1.5 * small.prior.std[0])
     far = {"slip": 0.3, "torque": 2.0, "load": 1e6}
     assert large.run(**far).mean[0] == pytest.approx(1.5 * small.run(**far).mean[0], rel=1e-4)
 
 
-def test_a_file_without_set_posterior_says_so(small_model):
+def test_a_file_without_set_posterior_is_refused_by_start(small_model):
     estimator = Estimator.load(small_model)
     with pytest.raises(InputError, match=r"no set posterior; train it with \[set_posterior\]"):
         estimator.start()
@@ -236,8 +236,8 @@ def changed(source, folder, change):
     change(metadata)
     metadata["metadata_sha256"] = metadata_checksum(metadata)
     del model.metadata_props[:]
-    told = serialise_metadata({e.key: e.value for e in onnx.load(source).metadata_props})
-    graph = source.read_bytes().removesuffix(told)
+    trailer = serialise_metadata({e.key: e.value for e in onnx.load(source).metadata_props})
+    graph = source.read_bytes().removesuffix(trailer)
     path = folder / "changed.onnx"
     path.write_bytes(graph + serialise_metadata(metadata))
     return path
@@ -249,28 +249,28 @@ def test_an_unchanged_copy_loads(wheel_set_file, tmp_path):
 
 @pytest.mark.parametrize("damage", ["{}", "[]", "null", '{"terms": "many"}', "not json"])
 def test_a_damaged_set_is_refused(wheel_set_file, tmp_path, damage):
-    path = changed(wheel_set_file, tmp_path, lambda told: told.update(set=damage))
+    path = changed(wheel_set_file, tmp_path, lambda metadata: metadata.update(set=damage))
     with pytest.raises(ModelFileError):
         Estimator.load(path)
 
 
 @pytest.mark.parametrize("key", ["terms", "noise", "context", "alone"])
 def test_a_set_that_lacks_a_key_is_refused(wheel_set_file, tmp_path, key):
-    def without(told):
-        own = json.loads(told["set"])
-        del own[key]
-        told["set"] = json.dumps(own)
+    def without(metadata):
+        of_set = json.loads(metadata["set"])
+        del of_set[key]
+        metadata["set"] = json.dumps(of_set)
 
     with pytest.raises(ModelFileError, match="metadata is damaged"):
         Estimator.load(changed(wheel_set_file, tmp_path, without))
 
 
 @pytest.mark.parametrize("name", ["mean", "std"])
-def test_a_probe_that_answers_otherwise_is_refused(wheel_set_file, tmp_path, name):
-    def tampered(told):
-        probe = json.loads(told["probe"])
+def test_a_probe_with_other_estimates_is_refused(wheel_set_file, tmp_path, name):
+    def tampered(metadata):
+        probe = json.loads(metadata["probe"])
         probe[0][name] = [1.3 * value for value in probe[0][name]]
-        told["probe"] = json.dumps(probe)
+        metadata["probe"] = json.dumps(probe)
 
     with pytest.raises(ModelFileError, match="fails its own probe"):
         Estimator.load(changed(wheel_set_file, tmp_path, tampered))

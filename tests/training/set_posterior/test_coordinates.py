@@ -24,7 +24,7 @@ def test_values_run_from_one_end_of_the_range_to_the_other(prior):
 
 
 @pytest.mark.parametrize("prior", PRIORS.values(), ids=PRIORS)
-def test_fractions_of_the_prior_lie_below_what_is_drawn(prior):
+def test_quantiles_are_those_of_the_prior(prior):
     u = np.linspace(0.0, 1.0, 101)
     axis = Coordinate.of("x", prior)
     assert axis.value(axis.quantile(u)) == pytest.approx(prior.at(u), abs=1e-12 * prior.upper)

@@ -1,4 +1,4 @@
-"""The graph's short sampling finds the posterior that long sampling finds."""
+"""The short sampling of the graph agrees with a long sampling."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from training.set_posterior.credible_interval import INTERVAL
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 
-def compared(posterior, sets, index, session):
-    """The answer of the graph, and mean, standard deviation and ends of a long sampling."""
+def compare(posterior, sets, index, session):
+    """Outputs of the graph, and mean, standard deviation and interval of a long sampling."""
     answer = graph_outputs(session, posterior.response, sets, index)
     found = posterior_of_memory(
         posterior.family, answer["memory_out"].astype(np.float64), sets, index
@@ -25,7 +25,7 @@ def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior
     session, sets = posterior_session(wheel_posterior), wheel_posterior.family.sets(8, rows, 9)
     apart, ratios, ends = [], [], []
     for index in range(len(sets.truth)):
-        answer, mean, std, both = compared(wheel_posterior, sets, index, session)
+        answer, mean, std, both = compare(wheel_posterior, sets, index, session)
         if not answer["set_in_range"][0]:
             continue
         apart.append((answer["set_mean"] - mean) / std)
@@ -37,7 +37,7 @@ def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior
     assert np.abs(np.median(ends)) < 0.1
 
 
-def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
+def test_the_thin_posterior_of_constant_operating_conditions_is_sampled(wheel_posterior):
     family, session = wheel_posterior.family, posterior_session(wheel_posterior)
     drawn = family.sets(60, 16, 2)
     steady = np.flatnonzero(
@@ -46,7 +46,7 @@ def test_the_thin_sheet_of_steady_driving_is_not_missed(wheel_posterior):
     )
     assert len(steady)
     for index in steady[:3]:
-        answer, mean, std, _ = compared(wheel_posterior, drawn, index, session)
+        answer, mean, std, _ = compare(wheel_posterior, drawn, index, session)
         if answer["set_in_range"][0]:
             assert (np.abs(answer["set_mean"] - mean) < 0.3 * std).all()
             assert (np.abs(np.log(answer["set_std"] / std)) < 0.25).all()
@@ -65,7 +65,7 @@ def test_a_soil_in_a_corner_of_the_prior_is_found(wheel_posterior, corner):
         sets.readings["torque"][index] = torque * (1.0 + 0.02 * rng.standard_normal(16))
         for name in ("sinkage", "drawbar_pull"):
             sets.readings[name][index], sets.readings[f"{name}_std"][index] = 1.0, ABSENT_STD
-        answer, mean, std, _ = compared(wheel_posterior, sets, index, session)
+        answer, mean, std, _ = compare(wheel_posterior, sets, index, session)
         if answer["set_in_range"][0]:
             apart.append((answer["set_mean"] - mean) / std)
     assert len(apart) >= 2

@@ -1,4 +1,4 @@
-"""What is answered where readings say nothing, too little, or too much at once."""
+"""Moments of the posterior, and the prior where readings are inconsistent."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 
-def test_the_prior_is_answered_where_no_soil_explains_the_readings(wheel_posterior):
+def test_the_estimate_is_the_prior_if_no_soil_explains_the_readings(wheel_posterior):
     sets = wheel_posterior.family.sets(4, 8, 1)
     sets.readings["torque"][0, ::2] *= 2.0
     answer = graph_outputs(posterior_session(wheel_posterior), wheel_posterior.response, sets, 0)
@@ -18,7 +18,7 @@ def test_the_prior_is_answered_where_no_soil_explains_the_readings(wheel_posteri
     assert answer["set_covariance"] == pytest.approx(np.diag(prior["std"] ** 2), rel=1e-5)
 
 
-def test_the_prior_holds_nine_tenths_between_its_ends(wheel_posterior):
+def test_the_interval_of_the_prior_covers_nine_tenths(wheel_posterior):
     prior, axes = prior_summary(wheel_posterior.family), wheel_posterior.family.axes
     u = np.random.default_rng(0).random(100_000)
     for k, axis in enumerate(axes):
@@ -28,7 +28,7 @@ def test_the_prior_holds_nine_tenths_between_its_ends(wheel_posterior):
         assert inside.mean() == pytest.approx(0.9, abs=0.005)
 
 
-def test_mean_and_covariance_belong_together(wheel_posterior):
+def test_mean_interval_and_covariance_are_consistent(wheel_posterior):
     sets, session = wheel_posterior.family.sets(6, 8, 1), posterior_session(wheel_posterior)
     for index in range(6):
         answer = graph_outputs(session, wheel_posterior.response, sets, index)

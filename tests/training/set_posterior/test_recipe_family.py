@@ -1,4 +1,4 @@
-"""Which recipes have a set posterior, and that its noise is the recipe's."""
+"""Recipes that a set posterior supports, and the noise of simulated sets."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_braking_is_refused(tmp_path):
     from conftest import RECIPE
 
     text = RECIPE.format(rows=64, seed=1).replace("slip = [0.05, 0.6]", "slip = [-0.3, 0.6]")
-    with pytest.raises(InputError, match="driving wheels"):
+    with pytest.raises(InputError, match="needed are slip above 0"):
         RecipeFamily.of(recipe_of(tmp_path, text), SHEAR)
 
 
@@ -31,7 +31,7 @@ def test_a_target_without_a_prior_is_refused(tmp_path):
         RecipeFamily.of(recipe, ("n",))
 
 
-def test_simulated_torque_strays_by_the_noise_of_the_recipe(wheel_posterior):
+def test_simulated_torque_has_the_noise_of_the_recipe(wheel_posterior):
     family = wheel_posterior.family
     sets = family.sets(400, 8, 4)
     true = np.exp(

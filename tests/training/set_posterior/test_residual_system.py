@@ -20,11 +20,11 @@ def sets(wheel_posterior):
     return wheel_posterior.family.sets(40, 6, 3)
 
 
-def test_the_system_is_misfit_over_noise_row_by_row(wheel_posterior, session, sets):
+def test_the_system_has_residuals_over_noise(wheel_posterior, session, sets):
     response, x = wheel_posterior.response, np.asarray([0.2, -0.4, 0.6])
-    told = int(np.argmax(sets.readings["sinkage_std"][:, 0] < 1.0))
-    system = graph_outputs(session, response, sets, told)["memory_out"].astype(np.float64)
-    own = sets.rows(told)
+    index = int(np.argmax(sets.readings["sinkage_std"][:, 0] < 1.0))
+    system = graph_outputs(session, response, sets, index)["memory_out"].astype(np.float64)
+    own = sets.rows(index)
     y = response.predict(np.log(np.stack([own["slip"], own["load"]], axis=1)), x)
     share = own["torque_std"] / own["torque"]
     off = {
@@ -32,15 +32,15 @@ def test_the_system_is_misfit_over_noise_row_by_row(wheel_posterior, session, se
         "sinkage": y[:, 1] - np.log(own["sinkage"]),
         "drawbar_pull": y[:, 2] - own["drawbar_pull"] / own["load"],
     }
-    stray = (share, own["sinkage_std"] / own["sinkage"], own["drawbar_pull_std"] / own["load"])
-    for k, (values, std) in enumerate(zip(off.values(), stray, strict=True)):
+    noise = (share, own["sinkage_std"] / own["sinkage"], own["drawbar_pull_std"] / own["load"])
+    for k, (values, std) in enumerate(zip(off.values(), noise, strict=True)):
         found = system[6 * k : 6 * k + 6, :-1] @ monomials(x, response.terms)
         assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
 
 
 def test_a_channel_that_was_not_measured_has_no_row(wheel_posterior, session, sets):
-    alone = int(np.argmax(sets.readings["sinkage_std"][:, 0] > 1e5))
-    found = graph_outputs(session, wheel_posterior.response, sets, alone)
+    torque_only = int(np.argmax(sets.readings["sinkage_std"][:, 0] > 1e5))
+    found = graph_outputs(session, wheel_posterior.response, sets, torque_only)
     assert len(found["memory_out"]) == 6
     assert found["counted_out"].tolist() == [6.0, 6.0, 6.0]
 

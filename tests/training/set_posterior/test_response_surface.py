@@ -1,4 +1,4 @@
-"""A learned response answers as the wheel does."""
+"""The response surface approximates the wheel."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 
 
-def test_the_response_is_off_by_the_error_that_it_states(wheel_posterior):
+def test_the_error_of_the_response_is_as_declared(wheel_posterior):
     family, response = wheel_posterior.family, wheel_posterior.response
     designs = family.designs(200, 99)
     rng = np.random.default_rng(1)
@@ -18,7 +18,7 @@ def test_the_response_is_off_by_the_error_that_it_states(wheel_posterior):
     assert (response.error < 0.05).all()
 
 
-def test_what_the_response_learns_is_the_wheel_of_the_recipe(wheel_posterior):
+def test_the_simulated_wheel_is_that_of_the_recipe(wheel_posterior):
     family = wheel_posterior.family
     design, x = np.asarray([[0.3, 60.0]]), np.zeros((1, 1, 3))
     values = {axis.name: float(axis.value(np.zeros(1))[0]) for axis in family.axes}
