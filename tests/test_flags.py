@@ -1,4 +1,4 @@
-"""What the released wheel flags of whole sets, and what it cannot."""
+"""Which faults of a set the released wheel file flags, and which it cannot."""
 
 from pathlib import Path
 
@@ -26,8 +26,8 @@ def wheel():
     return Estimator.load(Path(__file__).parents[1] / "exported" / "wheel.onnx")
 
 
-def driven(soil, seed=0, slip=SLIP, load=LOAD):
-    """What the sensors read on a soil (cohesion, friction angle, shear modulus)."""
+def simulate(soil, seed=0, slip=SLIP, load=LOAD):
+    """Noisy readings on a soil (cohesion, friction angle, shear modulus)."""
     case = CASE.with_values(dict(zip(SHEAR, soil, strict=True)))
     force = case.model(case.soil, Operating(slip=slip, load=load))
     rng = np.random.default_rng(seed)
@@ -45,20 +45,20 @@ def soils(count, seed=1):
     return np.stack([prior.at(rng.random(count)) for prior in ranges], axis=1)
 
 
-def torque_alone(rows):
+def torque_only(rows):
     return {name: rows[name] for name in ("slip", "load", "torque")}
 
 
 def flagged(wheel, rows):
-    """Whether the set is refused; its answer is then the prior."""
+    """Whether the set is flagged or refused; a flagged set must return the prior."""
     try:
-        found = wheel.run(**rows)
+        estimate = wheel.run(**rows)
     except InputError:
         return True
-    if not found.in_range:
-        np.testing.assert_allclose(found.mean, wheel.prior.mean, rtol=1e-2)
-        np.testing.assert_allclose(found.std, wheel.prior.std, rtol=1e-2)
-    return not bool(found.in_range)
+    if not estimate.in_range:
+        np.testing.assert_allclose(estimate.mean, wheel.prior.mean, rtol=1e-2)
+        np.testing.assert_allclose(estimate.std, wheel.prior.std, rtol=1e-2)
+    return not bool(estimate.in_range)
 
 
 @pytest.mark.parametrize(
@@ -78,22 +78,22 @@ def flagged(wheel, rows):
 )
 def test_a_wrong_unit_is_flagged(wheel, name, factor):
     for k, soil in enumerate(soils(SETS)):
-        rows = driven(soil, k)
-        rows = rows if name == "sinkage" else torque_alone(rows)
+        rows = simulate(soil, k)
+        rows = rows if name == "sinkage" else torque_only(rows)
         assert flagged(wheel, rows | {name: factor * rows[name]})
 
 
-def test_rows_of_two_soils_far_apart_are_flagged(wheel):
-    weak, strong = driven((200.0, 0.47, 0.02), 1), driven((2500.0, 0.75, 0.01), 2)
+def test_rows_of_two_different_soils_are_flagged(wheel):
+    weak, strong = simulate((200.0, 0.47, 0.02), 1), simulate((2500.0, 0.75, 0.01), 2)
     half = np.arange(len(SLIP)) % 2 == 0
     rows = {name: np.where(half, weak[name], strong[name]) for name in CHANNELS}
-    assert flagged(wheel, torque_alone(rows)) and flagged(wheel, rows)
+    assert flagged(wheel, torque_only(rows)) and flagged(wheel, rows)
     assert not flagged(wheel, weak) and not flagged(wheel, strong)
 
 
-def test_one_glitch_among_rows_is_flagged(wheel):
+def test_one_outlier_is_flagged(wheel):
     for k, soil in enumerate(soils(SETS)):
-        rows = torque_alone(driven(soil, k))
+        rows = torque_only(simulate(soil, k))
         rows["torque"][k] *= 2.0
         assert flagged(wheel, rows)
 
@@ -104,14 +104,14 @@ def test_another_wheel_is_flagged_where_sinkage_and_pull_are_read(wheel, factor)
     for k, soil in enumerate(soils(SETS)):
         case = other.with_values(dict(zip(SHEAR, soil, strict=True)))
         force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
-        rows = driven(soil, k) | {
+        rows = simulate(soil, k) | {
             name: getattr(force, name) for name in ("torque", "sinkage", "drawbar_pull")
         }
         assert flagged(wheel, rows)
 
 
 @pytest.mark.parametrize("rows", [1, 3, 6, 16])
-def test_one_sound_set_in_a_hundred_is_flagged(wheel, rows):
+def test_one_valid_set_in_a_hundred_is_flagged(wheel, rows):
     sets = RecipeFamily.of(read_recipe("wheel"), SHEAR).sets(300, rows, 991)
     count = 0
     for k in range(len(sets.truth)):
@@ -122,59 +122,59 @@ def test_one_sound_set_in_a_hundred_is_flagged(wheel, rows):
     assert count <= binom.ppf(0.9995, len(sets.truth), 0.01)
 
 
-def test_slip_read_a_tenth_too_large_looks_like_a_soil_that_yields_later(wheel):
-    """Stress depends on slip over shear modulus: nobody can flag it, but the error is bounded."""
+def test_a_slip_scale_error_mimics_a_larger_shear_modulus(wheel):
+    """Stress depends on slip over shear modulus: the error cannot be flagged, but is bounded."""
     ratios = []
     for k, soil in enumerate(((800.0, 0.6, 0.012), (1500.0, 0.55, 0.015), (400.0, 0.65, 0.01))):
-        rows = torque_alone(driven(soil, k))
-        found = wheel.run(**rows | {"slip": 1.1 * rows["slip"]})
-        assert found.in_range
-        ratios.append(found.mean[2] / wheel.run(**rows).mean[2])
+        rows = torque_only(simulate(soil, k))
+        estimate = wheel.run(**rows | {"slip": 1.1 * rows["slip"]})
+        assert estimate.in_range
+        ratios.append(estimate.mean[2] / wheel.run(**rows).mean[2])
     assert 1.03 < np.mean(ratios) < 1.2
 
 
-def test_rows_sent_again_tell_nothing_new(wheel):
-    rows = driven((900.0, 0.6, 0.012))
+def test_repeated_rows_count_once(wheel):
+    rows = simulate((900.0, 0.6, 0.012))
     again = {name: np.tile(value, 25) for name, value in rows.items()}
     once, often = wheel.run(**rows), wheel.run(**again)
     np.testing.assert_array_equal(once.mean, often.mean)
     np.testing.assert_array_equal(once.std, often.std)
 
 
-def test_hundreds_of_rows_of_one_soil_are_sure_and_right(wheel):
+def test_hundreds_of_rows_narrow_the_posterior_around_the_truth(wheel):
     rng, soil = np.random.default_rng(5), np.asarray((900.0, 0.6, 0.012))
-    many = driven(soil, 6, rng.uniform(0.06, 0.58, 500), rng.uniform(32.0, 118.0, 500))
-    found = wheel.run(**many)
-    assert found.in_range
-    assert (np.abs(found.mean - soil) < 4.0 * found.std).all()
-    assert (found.std < wheel.run(**driven(soil)).std).all()
+    many = simulate(soil, 6, rng.uniform(0.06, 0.58, 500), rng.uniform(32.0, 118.0, 500))
+    estimate = wheel.run(**many)
+    assert estimate.in_range
+    assert (np.abs(estimate.mean - soil) < 4.0 * estimate.std).all()
+    assert (estimate.std < wheel.run(**simulate(soil)).std).all()
 
 
-def test_one_row_cannot_fix_three_unknowns(wheel):
-    """Only soils at the ends of the prior are known by one row, and the intervals hold."""
-    inside, open_ = [], []
+def test_one_row_does_not_determine_three_unknowns(wheel):
+    """One row narrows the prior at its ends only, and the intervals keep their coverage."""
+    inside, widths = [], []
     for k, soil in enumerate(soils(60, 3)):
-        one = {name: value[k % 12 : k % 12 + 1] for name, value in driven(soil, k).items()}
-        found = wheel.run(**torque_alone(one))
-        if found.in_range:
-            assert np.abs((soil - found.mean) / found.std).max() < 4.0
-            inside.append((found.low <= soil) & (soil <= found.high))
-            open_.append(np.mean(found.std / wheel.prior.std))
+        one = {name: value[k % 12 : k % 12 + 1] for name, value in simulate(soil, k).items()}
+        estimate = wheel.run(**torque_only(one))
+        if estimate.in_range:
+            assert np.abs((soil - estimate.mean) / estimate.std).max() < 4.0
+            inside.append((estimate.low <= soil) & (soil <= estimate.high))
+            widths.append(np.mean(estimate.std / wheel.prior.std))
     assert len(inside) >= 57
     assert np.mean(inside) > 0.85
-    assert np.quantile(open_, 0.1) > 0.5 and np.median(open_) > 0.8
+    assert np.quantile(widths, 0.1) > 0.5 and np.median(widths) > 0.8
 
 
 def test_channels_may_be_missing_in_some_rows(wheel):
-    rows = driven((900.0, 0.6, 0.012))
+    rows = simulate((900.0, 0.6, 0.012))
     half = {
         name: np.where((np.arange(12) % 2 == 0) & (name in CHANNELS[3:]), np.nan, value)
         for name, value in rows.items()
     }
-    found, all_of_them = wheel.run(**half), wheel.run(**rows)
-    assert found.in_range
-    assert (found.std < 1.02 * wheel.run(**torque_alone(rows)).std).all()
-    assert np.prod(found.std) > np.prod(all_of_them.std)
+    estimate, all_of_them = wheel.run(**half), wheel.run(**rows)
+    assert estimate.in_range
+    assert (estimate.std < 1.02 * wheel.run(**torque_only(rows)).std).all()
+    assert np.prod(estimate.std) > np.prod(all_of_them.std)
 
 
 def test_a_wheel_beyond_the_range_of_a_file_is_refused():

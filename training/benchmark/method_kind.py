@@ -25,8 +25,8 @@ class MethodKind(Enum):
 def classify_estimator(estimator: Estimator) -> MethodKind:
     """The kind of a model file, from its metadata; its file name plays no part.
 
-    A file with a set posterior, for one wheel or for any wheel, answers by it. All others are told
-    apart by the regressors of the training spec that the file holds.
+    A file with a set posterior, for one wheel or for any wheel, answers by it. All others are
+    distinguished by the regressors of the training spec that the file holds.
     """
     if estimator.sets is not None:
         return MethodKind.SET_POSTERIOR

@@ -146,7 +146,7 @@ def _scorable_rows(table: Table, names: Sequence[str]) -> Table:
     for name in names:
         if column(name) not in table:
             raise InputError(
-                f"{table.source}: column {column(name)} is missing; compare needs the true value"
+                f"{table.source}: column {column(name)} is missing: no truth to score estimates against"
             )
     return table.rows(np.isfinite(table["torque_Nm"]) & table.answered)
 

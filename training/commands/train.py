@@ -132,8 +132,12 @@ def _from_data(args: argparse.Namespace) -> int:
         for name, s in trained.scores.items()
     ]
     labels = [name.replace("_", " ") for name in spec.targets]
-    head = ("", *[f"RMSE/prior std, {n}" for n in labels], *[f"90 % coverage, {n}" for n in labels])
-    print(f"On {trained.scores['estimator'].rows} held-out rows:\n", file=sys.stderr)
+    head = ("", *[f"RMSE/prior {n}" for n in labels], *[f"cover90 {n}" for n in labels])
+    print(
+        f"On {trained.scores['estimator'].rows} held-out rows: RMSE over the prior's standard "
+        "deviation, and coverage of 90 % intervals\n",
+        file=sys.stderr,
+    )
     print(format_table(head, rows), file=sys.stderr)
     print(
         f"\nwritten: {out} ({out.stat().st_size / 1e3:.0f} kB; largest difference of the float32 "

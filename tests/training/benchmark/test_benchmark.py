@@ -45,24 +45,24 @@ def recipe():
 
 @pytest.fixture(scope="module")
 def results(recipe):
-    found = benchmark_sets(recipe, SHEAR, 12)
-    limit = load_limit(packaged_limit(), found)
-    positions = {job.table["torque_Nm"].tobytes(): i for i, job in enumerate(found)}
+    sets = benchmark_sets(recipe, SHEAR, 12)
+    limit = load_limit(packaged_limit(), sets)
+    positions = {one.table["torque_Nm"].tobytes(): i for i, one in enumerate(sets)}
 
-    def again(slip, torque, load):
+    def exact(slip, torque, load):
         i = positions[torque.tobytes()]
         return limit.mean[i], limit.covariance[i]
 
-    def astray(slip, torque, load):
+    def noisy(slip, torque, load):
         i = positions[torque.tobytes()]
         std = np.sqrt(np.diag(limit.covariance[i]))
         return limit.mean[i] + 0.8 * std * np.random.default_rng(i).normal(size=3), std
 
-    def cheat(slip, torque, load):
-        truth = found[positions[torque.tobytes()]].truth
+    def oracle(slip, torque, load):
+        truth = sets[positions[torque.tobytes()]].truth
         return 1.0000001 * truth, 1e-6 * truth
 
-    functions = {"limit again": again, "astray": astray, "cheat": cheat}
+    functions = {"exact": exact, "noisy": noisy, "oracle": oracle}
     return benchmark(functions=functions, max_sets=12, analytic=())
 
 
@@ -70,7 +70,7 @@ def select(results, method, effect=""):
     return [r for r in results if r.method == method and r.effect == effect]
 
 
-def test_the_recipe_drives_the_sizes_and_loads_that_it_says(recipe):
+def test_the_recipe_has_the_designs_of_the_benchmark(recipe):
     designs = [design_of(block) for block in recipe.blocks]
     assert [d.rows for d in designs] == [1, 3, 6, 8, 16, 3, 6, 8, 16, 18]
     for sets in generate_design_sets(recipe, SHEAR, FEW):
@@ -88,51 +88,51 @@ def test_no_released_model_was_trained_on_the_benchmark(recipe):
     assert files and recipe.seed not in [*seeds, read_recipe("wheel_test").seed]
 
 
-def test_the_first_sets_stay_the_same_however_many_are_made(recipe):
+def test_the_first_sets_do_not_depend_on_their_number(recipe):
     few, more = generate_design_sets(recipe, SHEAR, 2), generate_design_sets(recipe, SHEAR, 5)
     for one, other in zip(few, more, strict=True):
         for a, b in zip(one.tables, other.tables, strict=False):
             assert set_hash(a, recipe.case) == set_hash(b, recipe.case)
 
 
-def test_the_limit_that_comes_with_the_package_is_the_exact_posterior(recipe):
-    """A handful of sets again, by the model itself and not by its polynomial."""
+def test_the_packaged_limit_is_the_exact_posterior(recipe):
+    """Some sets again, by the model itself and not by its surrogate."""
     every = benchmark_sets(recipe, SHEAR)
     stored = load_limit(packaged_limit(), every)
     for i in np.flatnonzero([j.number == 7 and not j.effect for j in every])[[0, 1, 6, 9]]:
-        job = every[i]
+        one = every[i]
         fit = identify(
-            recipe.case, select_channels(job.table, ["torque"]), list(SHEAR), "posterior"
+            recipe.case, select_channels(one.table, ["torque"]), list(SHEAR), "posterior"
         )
         np.testing.assert_allclose((stored.mean[i] - fit.values) / fit.std, 0.0, atol=0.12)
         std = np.sqrt(np.diag(stored.covariance[i]))
         np.testing.assert_allclose(std / fit.std, 1.0, atol=0.1)
         np.testing.assert_allclose((stored.quantiles[i, 0] - fit.low) / fit.std, 0.0, atol=0.25)
         np.testing.assert_allclose((stored.quantiles[i, 3] - fit.high) / fit.std, 0.0, atol=0.25)
-        again = exact_posterior(recipe.case, job.table, job.truth, SHEAR)
+        again = exact_posterior(recipe.case, one.table, one.truth, SHEAR)
         assert stored.log_densities[i] == pytest.approx(again.log_density, abs=0.1)
 
 
-def test_the_density_at_the_truth_is_the_integral_s_share(recipe):
-    """One row: likelihood at the truth over its mean on a lattice of the whole prior."""
+def test_the_log_density_at_the_truth_agrees_with_a_grid(recipe):
+    """One row: likelihood at the truth over its mean on a grid over the prior."""
     from soilml.identification.free_parameters import select_free
     from soilml.identification.observations import read_observations
     from soilml.identification.predictions import predict_channels
 
-    job = benchmark_sets(recipe, SHEAR, 1)[0]
-    data = read_observations(recipe.case, select_channels(job.table, ["torque"]))
+    one = benchmark_sets(recipe, SHEAR, 1)[0]
+    data = read_observations(recipe.case, select_channels(one.table, ["torque"]))
     free = select_free(recipe.case, SHEAR)
     side = (np.arange(24) + 0.5) / 24
     u = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
-    truth = [f.prior.fraction(t) for f, t in zip(free, job.truth, strict=True)]
+    truth = [f.prior.fraction(t) for f, t in zip(free, one.truth, strict=True)]
     y = predict_channels(recipe.case, free, np.vstack([truth, u]), data.at)["torque"][:, 0]
     std = 0.02 * y
-    density = np.exp(-0.5 * ((job.table["torque_Nm"][0] - y) / std) ** 2) / std
-    found = exact_posterior(recipe.case, job.table, job.truth, SHEAR).log_density
+    density = np.exp(-0.5 * ((one.table["torque_Nm"][0] - y) / std) ** 2) / std
+    found = exact_posterior(recipe.case, one.table, one.truth, SHEAR).log_density
     assert found == pytest.approx(np.log(density[0] / density[1:].mean()), abs=0.05)
 
 
-def test_the_limit_holds_what_it_claims(recipe):
+def test_the_limit_is_calibrated(recipe):
     every = [j for j in benchmark_sets(recipe, SHEAR) if not j.effect]
     stored = load_limit(packaged_limit(), every)
     truth = np.stack([j.truth for j in every])
@@ -142,7 +142,7 @@ def test_the_limit_holds_what_it_claims(recipe):
     assert np.mean(stored.flagged) < 0.01
 
 
-def test_a_stale_limit_is_refused_with_the_way_out(recipe, tmp_path, capsys, monkeypatch):
+def test_a_stale_limit_is_refused_with_a_hint(recipe, tmp_path, capsys, monkeypatch):
     wanted = benchmark_sets(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
     with pytest.raises(InputError, match=r"stale.*soilml compare --limit FILE\.parquet"):
         load_limit(packaged_limit(), wanted)
@@ -159,41 +159,39 @@ def test_a_stale_limit_is_refused_with_the_way_out(recipe, tmp_path, capsys, mon
         load_limit(tmp_path / "none.parquet", some)
 
 
-def test_what_answers_as_the_limit_scores_as_the_limit(results):
-    for again, least in zip(
-        select(results, "limit again"), select(results, LIMIT_LABEL), strict=True
-    ):
-        np.testing.assert_allclose(again.rmse_ratio, 1.0, rtol=1e-6)
-        np.testing.assert_allclose(again.rmse_ratio_std, 0.0, atol=1e-6)
-        assert again.joint_coverage90 == pytest.approx(least.joint_coverage90)
+def test_the_exact_posterior_scores_as_the_limit(results):
+    for exact, limit in zip(select(results, "exact"), select(results, LIMIT_LABEL), strict=True):
+        np.testing.assert_allclose(exact.rmse_ratio, 1.0, rtol=1e-6)
+        np.testing.assert_allclose(exact.rmse_ratio_std, 0.0, atol=1e-6)
+        assert exact.joint_coverage90 == pytest.approx(limit.joint_coverage90)
 
 
-def test_what_knows_the_soil_is_better_than_the_limit_and_what_knows_nothing_is_worse(results):
-    for cheat, prior in zip(select(results, "cheat"), select(results, "prior"), strict=True):
-        assert (cheat.rmse_ratio < 1e-4).all()
+def test_an_oracle_beats_the_limit_and_the_prior_does_not(results):
+    for oracle, prior in zip(select(results, "oracle"), select(results, "prior"), strict=True):
+        assert (oracle.rmse_ratio < 1e-4).all()
         assert prior.log_score == 0.0
         if prior.design.rows > 3:
             assert prior.rmse_ratio[2] > 1.0
 
 
-def test_no_claim_gives_the_truth_more_density_than_the_limit_but_one_that_knows_it(results):
-    for name in ("prior", "astray"):
-        for other, least in zip(select(results, name), select(results, LIMIT_LABEL), strict=True):
-            assert other.log_score < least.log_score
-    for cheat, least in zip(select(results, "cheat"), select(results, LIMIT_LABEL), strict=True):
-        assert cheat.log_score > least.log_score > 0.0
+def test_only_an_oracle_has_a_higher_log_score_than_the_limit(results):
+    for name in ("prior", "noisy"):
+        for other, limit in zip(select(results, name), select(results, LIMIT_LABEL), strict=True):
+            assert other.log_score < limit.log_score
+    for oracle, limit in zip(select(results, "oracle"), select(results, LIMIT_LABEL), strict=True):
+        assert oracle.log_score > limit.log_score > 0.0
 
 
-def test_the_standard_error_of_the_ratio_is_that_of_resampled_sets(results):
-    result = select(results, "astray")[-1]
+def test_the_jackknife_agrees_with_the_bootstrap(results):
+    result = select(results, "noisy")[-1]
     rng = np.random.default_rng(0)
-    own, least = result.error**2, (result.limit_mean - result.truth) ** 2
-    drawn = rng.integers(0, result.sets, (4000, result.sets))
-    ratios = np.sqrt(own[drawn].sum(axis=1) / least[drawn].sum(axis=1))
+    own, limit = result.error**2, (result.limit_mean - result.truth) ** 2
+    resampled = rng.integers(0, result.sets, (4000, result.sets))
+    ratios = np.sqrt(own[resampled].sum(axis=1) / limit[resampled].sum(axis=1))
     np.testing.assert_allclose(result.rmse_ratio_std, ratios.std(axis=0), rtol=0.6)
 
 
-def test_an_effect_that_no_method_knows_is_seen_in_the_figures(results):
+def test_an_unmodelled_effect_raises_rmse_and_flags(results):
     for effect in UNMODELLED_EFFECTS:
         known, lacking = (
             select(results, LIMIT_LABEL)[-1],
@@ -204,8 +202,8 @@ def test_an_effect_that_no_method_knows_is_seen_in_the_figures(results):
         assert lacking.flagged_fraction > known.flagged_fraction
 
 
-def test_goals_are_met_by_the_limit_s_equal_and_missed_by_the_prior_s(results):
-    by_criterion = {g.criterion: g for g in goals(results) if g.method == "limit again"}
+def test_the_exact_posterior_meets_the_goals_and_the_prior_misses_them(results):
+    by_criterion = {g.criterion: g for g in goals(results) if g.method == "exact"}
     assert by_criterion["every size: RMSE / limit <= 1.05"].met
     function = {"method": "mine", "kind": MethodKind.USER_FUNCTION}
     prior = [replace(r, **function) if r.kind is MethodKind.PRIOR else r for r in results]
@@ -262,7 +260,7 @@ def test_two_methods_of_one_name_are_refused():
         benchmark({"prior": Estimator.load(EXPORTED / "wheel_linear.onnx")}, max_sets=1)
 
 
-def test_a_gaussian_s_intervals_hold_what_they_say():
+def test_gaussian_intervals_have_nominal_coverage():
     estimate = gaussian_estimate(np.zeros(2), np.diag([1.0, 4.0]))
     draws = np.random.default_rng(1).normal(size=(20000, 2)) * [1.0, 2.0]
     for ends, share in ((estimate.interval50, 0.5), (estimate.interval90, 0.9)):
@@ -270,8 +268,8 @@ def test_a_gaussian_s_intervals_hold_what_they_say():
         np.testing.assert_allclose(inside.mean(axis=0), share, atol=0.01)
 
 
-def test_the_command_writes_tables_picture_and_goals(small_model, tmp_path, capsys):
-    out = tmp_path / "found"
+def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
+    out = tmp_path / "results"
     assert main(["compare", str(small_model), "--sets", "3", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
@@ -288,7 +286,7 @@ def test_the_command_writes_tables_picture_and_goals(small_model, tmp_path, caps
     assert "## Acceptance goals" in (out / "benchmark.md").read_text()
 
 
-def test_without_the_released_models_the_command_says_where_they_are(tmp_path, monkeypatch, capsys):
+def test_without_released_models_the_command_names_the_clone(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["compare"]) == 2
     assert "run it in a clone of the repository" in capsys.readouterr().err
@@ -299,8 +297,8 @@ def test_without_the_released_models_the_command_says_where_they_are(tmp_path, m
     assert not list(tmp_path.iterdir())
 
 
-def test_the_limit_is_computed_anew_over_what_was_there_and_used(small_model, tmp_path, capsys):
-    file, out = tmp_path / "limit.parquet", tmp_path / "found"
+def test_a_recomputed_limit_replaces_the_file_and_is_used(small_model, tmp_path, capsys):
+    file, out = tmp_path / "limit.parquet", tmp_path / "results"
     file.write_text("old")
     assert main(["compare", "--limit", str(file), "--sets", "1"]) == 0
     command = ["compare", str(small_model), "--out", str(out), "--against", str(file), "--sets"]
