@@ -146,7 +146,7 @@ def _scorable_rows(table: Table, names: Sequence[str]) -> Table:
     for name in names:
         if column(name) not in table:
             raise InputError(
-                f"{table.source}: column {column(name)} is missing: no truth to score estimates against"
+                f"{table.source}: column {column(name)} is missing: no truth to score against"
             )
     return table.rows(np.isfinite(table["torque_Nm"]) & table.answered)
 
