@@ -128,6 +128,7 @@ def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
     case, converted = own.recipe.case, []
     gear = case.model.gear
     assert isinstance(gear, Wheel)
+    # the ends of the coordinates, not of the prior: they differ in the last bit
     upper = {axis.name: axis.ends[1] for axis in own.axes}
     values = {
         "wheel_radius": gear.radius,
