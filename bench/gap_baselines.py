@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.gap.data.observations import cells_of
-from soilml.gap.statistics.coordinates import linearised, predicted, soil_axis
-from soilml.gap.statistics.signatures import signatures
+from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.statistics.coordinates import linearise, predict_readings, soil_coordinate
+from soilml.gap.statistics.signatures import effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
@@ -18,17 +18,17 @@ from soilml.quantities import CHANNELS, column
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     """The effect that each baseline names, '' where it sees no gap."""
-    cells = cells_of(case, table)
+    cells = stack_readings(case, table)
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-    known, _ = signatures(soil_only, cells, effects)
-    y = predicted(soil_only, [], np.zeros((1, 0)), cells)[0]
+    known, _ = effect_signatures(soil_only, cells, effects)
+    y = predict_readings(soil_only, [], np.zeros((1, 0)), cells)[0]
     r = (cells.reading - y) / cells.std
     g = np.stack([s.column for s in known], axis=1) / cells.std[:, None]
     labels = [s.name for s in known]
     free = select_free(case, None)
-    axes = [soil_axis(f) for f in free]
+    axes = [soil_coordinate(f) for f in free]
     at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
-    j = linearised(case, axes, at, cells)[1] / cells.std[:, None]
+    j = linearise(case, axes, at, cells)[1] / cells.std[:, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return {

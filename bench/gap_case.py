@@ -106,7 +106,9 @@ def _others(
         own = {name: EFFECTS[name] for name in truth if name in EFFECTS}
         oracle = gap(case, table, effects=own, seed=0)
         found["oracle"] = _distance(case, oracle.model, region, target)
-    rejected = [t for t in report.tried if t.verdict.startswith("rejected") and len(t.names) == 1]
+    rejected = [
+        t for t in report.candidates if t.verdict.startswith("rejected") and len(t.names) == 1
+    ]
     if rejected:
         name = rejected[0].names[0]
         wrong = gap(case, table, effects={name: EFFECTS[name]}, seed=0)

@@ -12,7 +12,7 @@ from pathlib import Path
 from soilml.cli import main
 from soilml.config.case import read_case
 from soilml.config.measurement_noise import Noise
-from soilml.gap.search.updated_case import model_text
+from soilml.config.write_case import case_as_toml
 from soilml.io.atomic_files import save_text
 
 HERE = Path(__file__).parent
@@ -41,7 +41,7 @@ def lugged(table: Path) -> None:
     soil = json.loads(found.read_text())["parameters"]
     case = read_case(KLS1).with_values({name: entry["value"] for name, entry in soil.items()})
     case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
-    save_text(smooth, model_text(case, ["the soil as the smooth wheel shows it"]))
+    save_text(smooth, case_as_toml(case, ["the soil as the smooth wheel shows it"]))
     rows = _rows(table, lambda row: row["run"] == "kls1_lug10_w59")
     runs = OUT / "kls1_lugged.csv"
     _written(runs, rows)

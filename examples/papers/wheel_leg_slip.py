@@ -257,7 +257,7 @@ def own_gap(seed: int = 0) -> None:
     print(f"  mean squared residual (1 is the noise) {shrink.before:.1f} -> {shrink.after:.1f};"
           f" friction angle fitted {angle:.0f} degrees, {np.rad2deg(ground.friction_angle):.0f}"
           " measured")  # fmt: skip
-    print(f"  fits best, but is not claimed: {' + '.join(report.stand_in) or 'nothing'}")
+    print(f"  fits best, but is not claimed: {' + '.join(report.best_unclaimed) or 'nothing'}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""The answer of a gap analysis."""
+"""The result of a gap analysis."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,46 +13,47 @@ from soilml.config.case import Case
 
 Floats = NDArray[np.float64]
 
-#: What a report may say, and what it means.
+#: Status of a report, and its meaning.
 STATUSES = {
-    "no-gap": "model and measurements agree within their noise",
-    "named": "one effect of the catalogue explains the gap, and no other does",
-    "class": "several effects explain the gap equally well; these runs cannot tell them apart",
-    "form-open": "one effect explains the gap, by another law than the catalogue's",
-    "unknown": "there is a gap, and nothing in the catalogue explains it",
-    "not-testable": "there is a gap, but these runs cannot tell causes apart",
+    "no-gap": "model and measurements agree within the noise",
+    "named": "exactly one effect of the catalogue explains the gap",
+    "class": "several effects explain the gap equally well; these runs cannot distinguish them",
+    "form-open": "one effect explains the gap, with a law that differs from the catalogue's",
+    "unknown": "there is a gap, and no effect of the catalogue explains it",
+    "not-testable": "there is a gap, but these runs cannot identify its cause",
     "bad-data": "the data cannot be analysed",
 }
 
 
 @dataclass(frozen=True)
-class Value:
-    """A parameter with its standard deviation."""
+class EstimatedValue:
+    """An estimated parameter with its standard deviation."""
 
     value: float
     std: float
     unit: str
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in gap.json."""
+        """Its entry in gap.json."""
         return {"value": self.value, "std": self.std, "unit": self.unit}
 
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was added: its parameters, what explains the data as well, how well apart."""
+    """An effect that was added to the model, with its parameters and its alternatives."""
 
     name: str
-    parameters: dict[str, Value]
+    parameters: dict[str, EstimatedValue]
+    #: effects of the other explanations that the data do not reject
     alternatives: tuple[str, ...]
-    #: sigma by which its signature at this size stands out from soil and its nearest rival
+    #: sigma that distinguish the effect, at its size, from the soil and its nearest rival
     separating_snr: float
     nearest_rival: str
 
 
 @dataclass(frozen=True)
-class Where:
-    """A corner of the data, its score against the soil alone, and its family-wise p value."""
+class Discrepancy:
+    """A region of the data with its score against the soil alone and its family-wise p value."""
 
     channel: str
     slip: tuple[float, float]
@@ -61,59 +63,59 @@ class Where:
 
 
 @dataclass(frozen=True)
-class Shrink:
-    """Mean squared whitened residual before and after, in all and by channel; 1 is the noise."""
+class GapReduction:
+    """Mean squared standardised residual before and after, in all and by channel; noise gives 1."""
 
     before: float
     after: float
     channels: dict[str, tuple[float, float]]
-    cells: int
-    what: str
+    readings: int
+    description: str
 
-    def unchanged(self) -> Shrink:
+    def unchanged(self) -> GapReduction:
         """The figures of a model to which nothing was added."""
         same = {name: (before, before) for name, (before, _) in self.channels.items()}
         return replace(self, after=self.before, channels=same)
 
     def as_json(self) -> dict[str, Any]:
-        """As it stands in gap.json."""
+        """Its entry in gap.json."""
         return {
             "before": self.before,
             "after": self.after,
             "channels": {k: {"before": b, "after": a} for k, (b, a) in self.channels.items()},
-            "cells": self.cells,
-            "what": self.what,
+            "cells": self.readings,
+            "what": self.description,
         }
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A candidate: how much lower the objective should, and did, become, and what came of it."""
+class CandidateSummary:
+    """A candidate: predicted and achieved decrease of the objective, and its verdict."""
 
     names: tuple[str, ...]
     predicted_gain: float
-    realised_gain: float
-    behind: float  # objective above the best one's
+    achieved_gain: float
+    excess: float  # objective above that of the best candidate
     verdict: str
 
 
 @dataclass(frozen=True)
 class NextRun:
-    """A run worth driving: how it would separate what is left, and what it should measure."""
+    """A proposed run or check, with the predictions of each explanation."""
 
     kind: str
     text: str
-    separates: float  # sigma between the explanations that are left
+    discrimination: float  # expected, in sigma, between the remaining explanations
     rows: tuple[dict[str, float], ...]  # operating points and predictions of each explanation
 
 
 @dataclass(frozen=True)
-class Curves:
-    """Measured cells with the predictions before and after, for pictures."""
+class ReadingsAndPredictions:
+    """Readings (m,) with the predictions before and after, for figures."""
 
     channels: tuple[str, ...]
     channel: NDArray[np.int64]
-    run: tuple[str, ...]  # of each cell
+    run: tuple[str, ...]  # of each reading
     slip: Floats
     load: Floats
     reading: Floats
@@ -126,32 +128,71 @@ class Curves:
 
 @dataclass(frozen=True)
 class GapReport:
-    """What a gap analysis found; see `STATUSES` for what it may say."""
+    """The result of a gap analysis, made by `soilml.gap.gap`.
+
+    Attributes
+    ----------
+    status : str
+        One of `STATUSES`.
+    sentence : str
+        The verdict in one sentence.
+    model : Case
+        The fitted model; it contains an effect only where one is claimed.
+    effects : tuple of NamedEffect
+        The effects that were added.
+    cause_set : tuple of tuple of str
+        The explanations that the data do not reject, as sets of effect names, the best first.
+    best_unclaimed : tuple of str
+        The candidate that fits best where no cause is claimed; it is not in `model`.
+    reasons : tuple of str
+        Why no cause can be named, or why the data cannot be analysed.
+    where : tuple of Discrepancy
+        Regions of the data, the largest disagreement first.
+    gap : dict of GapReduction
+        Figures of the fitted rows (`train`) and of held-out runs and regions.
+    soil_before, soil_after : dict of EstimatedValue
+        Soil parameters without and with the added effects.
+    mimic_radius : float
+        Largest cosine between the signature of an added effect and that of another one.
+    next_runs : tuple of NextRun
+        Proposed runs and checks, the most discriminating first.
+    candidates : tuple of CandidateSummary
+        All fitted candidates, the best first.
+    untestable : dict of str
+        Effects that these runs cannot test, with the reason.
+    not_claimed : tuple of str
+        Conclusions that the report does not support.
+    variance_components : dict of float
+        Estimated noise scales, run-to-run standard deviations and autocorrelation.
+    residual_trend : dict of float
+        Unexplained smooth trend by channel, in sigma.
+    p_gap, p_residual : float
+        Family-wise p values of the soil alone and of the best candidate.
+    """
 
     status: str
     sentence: str
     model: Case
     effects: tuple[NamedEffect, ...] = ()
     cause_set: tuple[tuple[str, ...], ...] = ()
-    #: what fits best where nothing is claimed; it is not in `model`
-    stand_in: tuple[str, ...] = ()
+    best_unclaimed: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
-    where: tuple[Where, ...] = ()
-    gap: dict[str, Shrink] = field(default_factory=dict)
-    soil_before: dict[str, Value] = field(default_factory=dict)
-    soil_after: dict[str, Value] = field(default_factory=dict)
+    where: tuple[Discrepancy, ...] = ()
+    gap: dict[str, GapReduction] = field(default_factory=dict)
+    soil_before: dict[str, EstimatedValue] = field(default_factory=dict)
+    soil_after: dict[str, EstimatedValue] = field(default_factory=dict)
     mimic_radius: float = 0.0
     next_runs: tuple[NextRun, ...] = ()
-    tried: tuple[Tried, ...] = ()
+    candidates: tuple[CandidateSummary, ...] = ()
     untestable: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     not_claimed: tuple[str, ...] = ()
-    scatter: dict[str, float] = field(default_factory=dict)
-    remainder: dict[str, float] = field(default_factory=dict)
+    variance_components: dict[str, float] = field(default_factory=dict)
+    residual_trend: dict[str, float] = field(default_factory=dict)
     p_gap: float = 1.0
-    p_left: float = 1.0
+    p_residual: float = 1.0
     seed: int = 0
-    curves: Curves | None = None
+    curves: ReadingsAndPredictions | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
@@ -171,7 +212,7 @@ class GapReport:
                 for e in self.effects
             ],
             "cause_set": [list(names) for names in self.cause_set],
-            "fits_best_but_not_claimed": list(self.stand_in),
+            "fits_best_but_not_claimed": list(self.best_unclaimed),
             "reasons": list(self.reasons),
             "where": [
                 {
@@ -183,9 +224,9 @@ class GapReport:
                 }
                 for w in self.where
             ],
-            "gap": {name: shrink.as_json() for name, shrink in self.gap.items()},
+            "gap": {name: figures.as_json() for name, figures in self.gap.items()},
             "p_gap": self.p_gap,
-            "p_left": self.p_left,
+            "p_left": self.p_residual,
             "soil": {
                 "before": {k: v.as_json() for k, v in self.soil_before.items()},
                 "after": {k: v.as_json() for k, v in self.soil_after.items()},
@@ -195,21 +236,29 @@ class GapReport:
                 {
                     "effects": list(t.names),
                     "predicted_gain": t.predicted_gain,
-                    "realised_gain": t.realised_gain,
-                    "behind_best": t.behind,
+                    "realised_gain": t.achieved_gain,
+                    "behind_best": t.excess,
                     "verdict": t.verdict,
                 }
-                for t in self.tried
+                for t in self.candidates
             ],
             "next_runs": [
-                {"kind": n.kind, "text": n.text, "separates_sigma": n.separates}
+                {"kind": n.kind, "text": n.text, "separates_sigma": n.discrimination}
                 for n in self.next_runs
             ],
-            "unnamed_remainder": self.remainder,
+            "unnamed_remainder": self.residual_trend,
             "not_testable": self.untestable,
-            "scatter": self.scatter,
+            "scatter": self.variance_components,
             "notes": list(self.notes),
             "not_claimed": list(self.not_claimed),
             "seed": self.seed,
             "soilml_version": __version__,
         }
+
+
+def decimal(value: float, digits: int = 3) -> str:
+    """A number with this many significant digits, never with a power of ten."""
+    if not math.isfinite(value):
+        return f"{value:g}"
+    exponent = 0 if value == 0.0 else math.floor(math.log10(abs(value)))
+    return f"{value:.{max(0, digits - 1 - exponent)}f}"

@@ -1,4 +1,4 @@
-"""The whole of a gap analysis, from a table to a report."""
+"""The gap analysis, from a case and a table to a report."""
 
 from __future__ import annotations
 
@@ -6,31 +6,49 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.checks import Gate, examined, repeated_noise, without_repeats
-from soilml.gap.data.observations import Cells, cells_of
+from soilml.gap.data.checks import (
+    DataCheckResult,
+    check_readings,
+    estimate_repeat_noise,
+    without_duplicate_rows,
+)
+from soilml.gap.data.holdout import HoldoutSplit, split_holdout
+from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
 from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.messages import not_claimed, sentence
-from soilml.gap.results import Curves, GapReport, Shrink, Tried
-from soilml.gap.search.candidate_fits import Candidate
-from soilml.gap.search.cross_validation import held_out_region, held_out_runs, shrink, unseen
-from soilml.gap.search.iteration import Analysis, analysed
-from soilml.gap.search.residual_trend import remainder
-from soilml.gap.search.stepwise import REJECTED
-from soilml.gap.search.updated_case import grown_case
-from soilml.gap.search.verdict import likeness, map_of, named, status_of, values_of
-from soilml.gap.statistics.coordinates import predicted
+from soilml.gap.messages import unsupported_conclusions, verdict_sentence
+from soilml.gap.results import GapReport
+from soilml.gap.search.cross_validation import predict_held_out
+from soilml.gap.search.iteration import Analysis, analyse
+from soilml.gap.search.report_entries import (
+    analysis_notes,
+    candidate_summaries,
+    competing_explanations,
+    gap_reductions,
+    readings_and_predictions,
+    variance_component_entries,
+)
+from soilml.gap.search.residual_trend import residual_trend
+from soilml.gap.search.updated_case import updated_case
+from soilml.gap.search.verdict import (
+    decide_status,
+    discrepancy_map,
+    named_effects,
+    signature_similarity,
+    soil_estimates,
+)
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.quantities import SHEAR, column
+from soilml.quantities import SHEAR
+
+#: Statuses of a report that claims a cause; the model then contains it.
+CLAIMING = ("named", "form-open", "class")
 
 
 def gap(
@@ -43,248 +61,201 @@ def gap(
     calibration: Mapping[str, float] | None = None,
     seed: int = 0,
 ) -> GapReport:
-    """Find where a model and measured rows disagree, and name what is missing from the model.
+    """Find where a model disagrees with measured rows, and the effect that the model lacks.
 
-    `free` names the soil parameters that may differ from the case's; without it, those that have a
-    prior. `holdout` is `run` (a quarter of the runs) or `COLUMN=VALUE`: rows that take no part in
-    anything but the last figures. `calibration` gives the spread of a sensor's fault by effect name
-    where it was checked, in the unit of its size. Same input, same answer.
+    The soil alone is fitted by generalised least squares. Where a family-wise score test rejects
+    that fit, the effects of the catalogue are fitted jointly with the soil, and the report states
+    which of them the data do not reject.
 
-    Raises `InputError` and `TableError` for names, columns and rows that make no sense; data that
-    cannot be analysed give a report of status `bad-data`.
+    Parameters
+    ----------
+    case : Case
+        Model, soil, priors and measurement noise.
+    table : Table
+        Rows with `run`, `slip`, `load_N` and measured channels.
+    free : sequence of str, optional
+        Soil parameters to fit; by default those with a prior.
+    holdout : str, optional
+        `run` (a quarter of the runs) or `COLUMN=VALUE`: rows that take no part in the analysis and
+        are predicted afterwards.
+    effects : mapping, optional
+        The catalogue of effects by name; those that do not suit the gear are ignored.
+    calibration : mapping, optional
+        Standard deviation of the remaining error of a calibrated sensor, by effect name, in the
+        unit of the effect's size.
+    seed : int
+        Of all random draws; the same input gives the same report.
+
+    Returns
+    -------
+    GapReport
+        Its status is `bad-data` where the data cannot be analysed.
+
+    Raises
+    ------
+    InputError
+        For unknown names, an unusable `holdout`, or a table without usable rows.
+    TableError
+        For columns that contradict the case, such as another wheel radius.
+
+    Examples
+    --------
+    Rows that the model itself predicts contain no gap:
+
+    >>> import numpy as np
+    >>> from soilml import Model, Operating, Wheel, soil
+    >>> from soilml.config.case import Case
+    >>> from soilml.config.measurement_noise import Noise
+    >>> from soilml.gap import gap
+    >>> from soilml.io.table import Table
+    >>> from soilml.numerics.prior import Prior
+    >>> model, sand = Model(Wheel(radius=0.15, width=0.12)), soil("wong1989/dry_sand")
+    >>> slip, load = np.tile(np.linspace(0.1, 0.6, 6), 3), np.repeat([40.0, 60.0, 90.0], 6)
+    >>> force = model(sand, Operating(slip=slip, load=load))
+    >>> columns = {"run": np.repeat(["a", "b", "c"], 6), "slip": slip, "load_N": load}
+    >>> columns |= {"torque_Nm": force.torque, "drawbar_pull_N": force.drawbar_pull}
+    >>> noise = {"torque_Nm": Noise(share=0.01), "drawbar_pull_N": Noise(constant=0.2)}
+    >>> case = Case(model, sand, {"friction_angle": Prior(0.3, 0.8)}, noise)
+    >>> gap(case, Table(columns)).status
+    'no-gap'
     """
     effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
     check_wheel_size(case, table)
-    answered = table.answered
-    if not answered.any():
+    usable = table.answered
+    if not usable.any():
         raise InputError(f"{table.source}: no row has the status ok")
-    table, unanswered = table.rows(answered), int(np.count_nonzero(~answered))
-    table, repeats = without_repeats(table)
-    seen, kept_back, what = _split(table, holdout, seed)
-    wanted = select_free(case, free if free is not None or case.prior else SHEAR)
-    for f in wanted:
-        if free is not None and "." in f.path:
-            raise InputError(f"--free {f.path} is no soil parameter; only those may differ here")
-    soil = [f for f in wanted if "." not in f.path]
-    cells = cells_of(case, seen)
-    noise, notes = repeated_noise(cells)
-    cells, left_out = cells.with_noise(noise).declared()
-    notes += left_out
-    gate = examined(cells, seen, repeats, len(soil))
-    if gate.refused:
-        return _refused(case, (*gate.refused, *gate.unnameable), gate.notes, seed)
-    if unanswered:
-        notes.append(
-            "1 row is left out: its status is not ok"
-            if unanswered == 1
-            else f"{unanswered} rows are left out: their status is not ok"
-        )
-    gate = replace(gate, notes=(*notes, *gate.notes))
-    found = analysed(case, soil, cells, effects, calibration or {}, seed, seen.place)
-    if found.refused:
-        return _refused(case, (found.refused,), gate.notes, seed)
-    beyond = None if kept_back is None else cells_of(case, kept_back).with_noise(noise)
-    if beyond is not None:
-        beyond = beyond.keeping(np.isfinite(beyond.std))
-    return _reported(case, found, gate, soil, beyond, what, seed)
+    table, unusable_rows = table.rows(usable), int(np.count_nonzero(~usable))
+    table, duplicate_rows = without_duplicate_rows(table)
+    split = split_holdout(table, holdout, seed)
+    soil = _free_soil_parameters(case, free)
+
+    readings = stack_readings(case, split.analysed)
+    repeat_noise, notes = estimate_repeat_noise(readings)
+    readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
+    notes += exclusions
+    checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
+    if checks.errors:
+        reasons = (*checks.errors, *checks.naming_obstacles)
+        return _bad_data_report(case, reasons, checks.notes, seed)
+    if unusable_rows:
+        rows = "1 row is" if unusable_rows == 1 else f"{unusable_rows} rows are"
+        notes.append(f"{rows} excluded: the status is not ok")
+    checks = replace(checks, notes=(*notes, *checks.notes))
+
+    place = split.analysed.place
+    analysis = analyse(case, soil, readings, effects, calibration or {}, seed, place)
+    if analysis.error:
+        return _bad_data_report(case, (analysis.error,), checks.notes, seed)
+    held_out = None
+    if split.held_out is not None:
+        held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
+        held_out = held_out.subset(np.isfinite(held_out.std))
+    return _build_report(case, analysis, checks, soil, split, held_out, seed)
 
 
-def _refused(case: Case, reasons: Sequence[str], notes: tuple[str, ...], seed: int) -> GapReport:
+def _free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[FreeParameter]:
+    """The soil parameters to fit: those named, else those with a prior, else the shear parameters.
+
+    Raises `InputError` where a named parameter is one of the gear or of an effect.
+    """
+    selected = select_free(case, free if free is not None or case.prior else SHEAR)
+    other = [f.path for f in selected if "." in f.path]
+    if free is not None and other:
+        raise InputError(f"--free {other[0]} is not a soil parameter; only those can be freed here")
+    return [f for f in selected if "." not in f.path]
+
+
+def _bad_data_report(
+    case: Case, reasons: Sequence[str], notes: tuple[str, ...], seed: int
+) -> GapReport:
     """The report on data that cannot be analysed."""
     return GapReport(
         "bad-data", "; ".join(reasons), case, reasons=tuple(reasons), notes=notes, seed=seed
     )
 
 
-def _split(table: Table, holdout: str | None, seed: int) -> tuple[Table, Table | None, str]:
-    """The rows to analyse, those kept back, and what those are."""
-    if holdout is None:
-        return table, None, ""
-    if holdout == "run":
-        runs = np.unique(table["run"])
-        if runs.size < 4:
-            raise InputError(f"--holdout run needs four runs or more; the table has {runs.size}")
-        out = np.random.default_rng(seed).permutation(runs)[: max(1, runs.size // 4)]
-        back = np.isin(table["run"], out)
-        what = f"runs {', '.join(sorted(map(str, out)))}, kept back"
-    else:
-        name, equals, value = holdout.partition("=")
-        if not equals:
-            raise InputError(f"--holdout is {holdout!r}; needed is run, or COLUMN=VALUE")
-        kept = table.where(name, value)
-        back = np.isin(np.arange(len(table)), _positions(table, kept))
-        what = f"{holdout}, kept back"
-    if back.all():
-        raise InputError(f"--holdout {holdout} keeps every row back; nothing is left to analyse")
-    return table.rows(~back), table.rows(back), what
-
-
-def _positions(table: Table, rows: Table) -> NDArray[np.int64]:
-    """Where the rows of a part stand in the whole: by line where there are lines."""
-    if len(table.line):
-        return np.flatnonzero(np.isin(table.line, rows.line))
-    keys = [tuple(str(table[n][i]) for n in table.columns) for i in range(len(table))]
-    own = {tuple(str(rows[n][i]) for n in rows.columns) for i in range(len(rows))}
-    return np.asarray([i for i, key in enumerate(keys) if key in own], dtype=np.int64)
-
-
-def _reported(
+def _build_report(
     case: Case,
     analysis: Analysis,
-    gate: Gate,
+    checks: DataCheckResult,
     free: Sequence[FreeParameter],
-    beyond: Cells | None,
-    what: str,
+    split: HoldoutSplit,
+    held_out: StackedReadings | None,
     seed: int,
 ) -> GapReport:
-    bench, found = analysis.bench, analysis.found
-    after = found.causes[0].fit if found.causes else found.soil
-    gaps = _gaps(analysis, after, seed)
-    status = status_of(found, gate.unnameable, gaps.get("held_out_runs"))
-    if beyond is not None and len(beyond):  # after the verdict, in which they take no part
-        name = "held_out_runs" if what.startswith("runs") else "held_out_region"
-        gaps[name] = unseen(bench, found.soil, after, beyond, what)
-    claimed = status in ("named", "form-open", "class")
-    if not claimed:  # the figures are those of the model that is handed over
-        after, gaps = found.soil, {name: s.unchanged() for name, s in gaps.items()}
-    alike = likeness(bench, after) if claimed else None
-    rivals = _rivals(found.causes, found.tried)
+    """Decide the status and collect the entries of the report."""
+    problem, result = analysis.problem, analysis.result
+    obstacles = checks.naming_obstacles
+    best = result.accepted[0].fit if result.accepted else result.soil
+    figures = gap_reductions(analysis, best, seed)
+    status = decide_status(result, obstacles, figures.get("held_out_runs"))
+    if held_out is not None and len(held_out):  # after the verdict, which must not depend on it
+        description = split.description
+        figures[split.name] = predict_held_out(problem, result.soil, best, held_out, description)
+
+    claimed = status in CLAIMING
+    after = best if claimed else result.soil
+    if not claimed:  # the figures are those of the model in the report
+        figures = {name: entry.unchanged() for name, entry in figures.items()}
     report = GapReport(
         status=status,
         sentence="",
-        model=grown_case(after),
-        effects=() if alike is None else tuple(named(found.causes, alike)),
-        cause_set=tuple(c.names for c in found.causes) if claimed else (),
-        stand_in=() if claimed or not found.causes else found.causes[0].names,
-        reasons=gate.unnameable if status == "not-testable" else (),
-        where=tuple(map_of(bench, found.soil, seed)) if found.gap else (),
-        gap=gaps,
-        soil_before=values_of(found.soil, soil=True),
-        soil_after=values_of(after, soil=True),
-        mimic_radius=0.0 if alike is None else alike.mimicry(found.causes[0].names),
-        next_runs=tuple(next_runs(bench, rivals)) if found.gap else (),
-        tried=tuple(_tried(analysis, claimed=claimed)),
-        untestable={u.name: u.reason for u in found.cannot},
-        notes=_notes(analysis, gate, after),
-        scatter=_scatter(analysis),
-        remainder=remainder(bench, after) if found.gap else {},
-        p_gap=found.first.p,
-        p_left=found.left.p,
+        model=updated_case(after),
+        cause_set=tuple(c.names for c in result.accepted) if claimed else (),
+        best_unclaimed=() if claimed or not result.accepted else result.accepted[0].names,
+        reasons=obstacles if status == "not-testable" else (),
+        gap=figures,
+        soil_before=soil_estimates(result.soil),
+        soil_after=soil_estimates(after),
+        candidates=tuple(candidate_summaries(analysis, claimed=claimed)),
+        untestable={u.name: u.reason for u in result.untestable},
+        notes=(*checks.notes, *analysis_notes(analysis, after)),
+        variance_components=variance_component_entries(analysis),
+        p_gap=result.soil_test.p_value,
+        p_residual=result.final_test.p_value,
         seed=seed,
-        curves=_curves(analysis, after),
+        curves=readings_and_predictions(analysis, after),
     )
+    if claimed:
+        report = _with_effects(report, analysis, after)
+    if result.has_gap:
+        report = _with_disagreement(report, analysis, after, seed)
+    effects_before = [e.name for e in case.model.effects]
     return replace(
         report,
-        sentence=sentence(report, gate.unnameable, [e.name for e in case.model.effects]),
-        not_claimed=tuple(not_claimed(report, gate.unnameable, _held(case, free))),
+        sentence=verdict_sentence(report, obstacles, effects_before),
+        not_claimed=tuple(
+            unsupported_conclusions(report, obstacles, _fixed_parameters(case, free))
+        ),
     )
 
 
-def _held(case: Case, free: Sequence[FreeParameter]) -> list[str]:
-    """Soil and gear parameters that were believed as the model file has them."""
+def _with_effects(report: GapReport, analysis: Analysis, after: GapFit) -> GapReport:
+    """The report with the effects that it claims and their similarity to other effects."""
+    accepted = analysis.result.accepted
+    similarity = signature_similarity(analysis.problem, after)
+    return replace(
+        report,
+        effects=tuple(named_effects(accepted, similarity)),
+        mimic_radius=similarity.largest_cosine(accepted[0].names),
+    )
+
+
+def _with_disagreement(
+    report: GapReport, analysis: Analysis, after: GapFit, seed: int
+) -> GapReport:
+    """The report with the map of the gap, the remaining trend and the runs to make next."""
+    problem = analysis.problem
+    return replace(
+        report,
+        where=tuple(discrepancy_map(problem, analysis.result.soil, seed)),
+        residual_trend=residual_trend(problem, after),
+        next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
+    )
+
+
+def _fixed_parameters(case: Case, free: Sequence[FreeParameter]) -> list[str]:
+    """Soil and gear parameters that were fixed at the values of the model file."""
     freed = {f.path for f in free}
     soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
     return [*soil, *(f"gear.{name}" for name in declared(type(case.model.gear)))]
-
-
-def _rivals(causes: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Candidate]:
-    """The explanations to tell apart: those left, or the one left and the next best of its size."""
-    if len(causes) != 1:
-        return list(causes)
-    others = [c for c in tried if len(c.names) == len(causes[0].names) and c != causes[0]]
-    return [causes[0], *sorted(others, key=lambda c: c.cost)[:1]]
-
-
-def _gaps(analysis: Analysis, after: GapFit, seed: int) -> dict[str, Shrink]:
-    bench, soil = analysis.bench, analysis.found.soil
-    std = bench.covariance.std
-    gaps = {"train": shrink(bench.cells, std, soil.prediction, after.prediction, "all rows fitted")}
-    runs, region = held_out_runs(bench, soil, after, seed), held_out_region(bench, soil, after)
-    if runs is not None:
-        gaps["held_out_runs"] = runs
-    if region is not None:
-        gaps["held_out_region"] = region
-    return gaps
-
-
-def _tried(analysis: Analysis, *, claimed: bool) -> list[Tried]:
-    found = analysis.found
-    if not found.tried:
-        return []
-    lowest = min(c.cost for c in found.tried)
-    kept = {c.names for c in found.causes}
-    rows = []
-    for c in sorted(found.tried, key=lambda c: c.cost):
-        gain = found.predicted_gain.get(c.names[0], 0.0) if len(c.names) == 1 else float("nan")
-        if c.names in kept:
-            verdict = "explains the data" if claimed else "fits best, not claimed"
-        elif not c.strict.converged:
-            verdict = "fit failed: no evidence either way"
-        elif c.cost <= lowest + REJECTED:
-            verdict = "more effects than needed"
-        else:
-            verdict = "rejected against the best"
-        rows.append(Tried(c.names, gain, found.soil.cost - c.cost, c.cost - lowest, verdict))
-    return rows
-
-
-def _notes(analysis: Analysis, gate: Gate, after: GapFit) -> tuple[str, ...]:
-    said = list(gate.notes)
-    if analysis.strays:
-        shown = ", ".join(analysis.strays[:6])
-        said.append(
-            f"{len(analysis.strays)} readings stray from all others and are set aside: {shown}"
-        )
-    for axis, x in zip(after.axes, after.x, strict=True):
-        if "." not in axis.path and min(x, 1.0 - x) < 1e-3:
-            said.append(f"{axis.path} stands at the end of its prior")
-        elif "." in axis.path and x > axis.upper - 1e-3 * (axis.upper - axis.lower):
-            said.append(f"{axis.path} stands at the end of what it may be")
-    scatter = analysis.bench.covariance.scatter
-    for name, scale in zip(analysis.bench.cells.channels, scatter.scale, strict=True):
-        if scale > 1.25:
-            said.append(f"{column(name)} scatters {scale:.2g} times as much as declared")
-    if 1 < len(analysis.bench.cells.runs) < FEW_RUNS:
-        said.append(
-            f"fewer than {FEW_RUNS} runs cannot show how the soil scatters between them: "
-            f"{np.degrees(scatter.friction_angle):.2g} deg and {scatter.bearing:.0%} of bearing "
-            "are taken for granted, and residuals may stand below 1"
-        )
-    if scatter.memory > 0.0:
-        said.append(
-            f"neighbouring samples of a run share their noise (correlation {scatter.memory:.2g}): "
-            "they count for fewer"
-        )
-    return tuple(said)
-
-
-def _scatter(analysis: Analysis) -> dict[str, float]:
-    scatter, channels = analysis.bench.covariance.scatter, analysis.bench.cells.channels
-    scales = {
-        f"noise_scale_{column(n)}": float(s) for n, s in zip(channels, scatter.scale, strict=True)
-    }
-    return scales | {
-        "friction_angle_from_run_to_run_rad": scatter.friction_angle,
-        "bearing_from_run_to_run": scatter.bearing,
-        "memory_of_samples": scatter.memory,
-    }
-
-
-def _curves(analysis: Analysis, after: GapFit) -> Curves:
-    bench, soil = analysis.bench, analysis.found.soil
-    cells = bench.cells
-    raw = np.linalg.solve(bench.covariance.whiten, after.slope)
-    model_std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", raw, after.covariance, raw), 0.0))
-    return Curves(
-        channels=tuple(column(n) for n in cells.channels),
-        channel=cells.channel,
-        run=tuple(cells.runs[cells.run[r]] for r in cells.row),
-        slip=cells.slip,
-        load=cells.load,
-        reading=cells.reading,
-        std=bench.covariance.std,
-        before=soil.prediction,
-        after=predicted(after.case, after.axes, after.x[None, :], cells)[0],
-        after_std=model_std,
-        held_out=np.zeros(len(cells), dtype=np.bool_),
-    )

@@ -99,7 +99,7 @@ def read_observations(case: Case, table: Table) -> Observations:
     for name in CHANNELS:
         key = column(name)
         if key in table and np.isfinite(table[key]).any():
-            std, note = _without_zeros(table, key, _declared(case, table, key))
+            std, note = _without_zeros(table, key, declared_std(case, table, key))
             declared = bool(np.isfinite(std[np.isfinite(table[key])]).all())
             found.append(Channel(name, table[key], std, declared))
             notes += note
@@ -109,8 +109,8 @@ def read_observations(case: Case, table: Table) -> Observations:
     excluded = [column(c.name) for c in found if c not in used]
     return Observations(
         at=operating_points(table),
-        slip_std=np.nan_to_num(_declared(case, table, "slip")),
-        load_std=np.nan_to_num(_declared(case, table, "load_N")),
+        slip_std=np.nan_to_num(declared_std(case, table, "slip")),
+        load_std=np.nan_to_num(declared_std(case, table, "load_N")),
         channels=tuple(used),
         excluded_channels=tuple(excluded),
         notes=tuple(notes),
@@ -131,8 +131,8 @@ def _notes(case: Case, table: Table) -> list[str]:
     return notes
 
 
-def _declared(case: Case, table: Table, key: str) -> Floats:
-    """Standard deviation of each reading of a column; NaN where nobody says."""
+def declared_std(case: Case, table: Table, key: str) -> Floats:
+    """Declared standard deviation of a column, (n,): `<column>_std`, else [noise]; else NaN."""
     std = np.full(len(table), np.nan)
     if key in case.noise:
         std = np.broadcast_to(case.noise[key].std(table[key]), std.shape)

@@ -83,9 +83,9 @@ def _text(found: Audit) -> str:
             e.name,
             "yes" if e.separating_snr >= 3.0 else "no",
             f"{e.size:g} {e.unit}".removesuffix(" 1"),
-            f"{e.left:.3g}",
+            f"{e.residual_signal:.3g}",
             f"{e.separating_snr:.3g}",
-            "never" if math.isinf(e.detectable) else f"{e.detectable:.2g}",
+            "never" if math.isinf(e.detectable_size) else f"{e.detectable_size:.2g}",
             f"{e.absorbed:.0%}",
             ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:2]),
         )
@@ -101,7 +101,7 @@ def _text(found: Audit) -> str:
     if found.untestable:
         lines = [f"  {name}: {why}" for name, why in found.untestable.items()]
         parts.append("cannot be tested:\n" + "\n".join(lines))
-    gaining = [entry for entry in found.additions if entry[3]]
+    gaining = [entry for entry in found.added_runs if entry[3]]
     lines = [f"  {kind} ({text}): {', '.join(gained)}" for kind, text, _, gained in gaining[:5]]
     parts.append(
         "runs to add, and the effects that could then be named:\n" + ("\n".join(lines) or "  none")

@@ -96,8 +96,8 @@ def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
+    from soilml.config.write_case import case_as_toml
     from soilml.gap import gap
-    from soilml.gap.search.updated_case import model_text
 
     check_seed(args)
     effects = available_effects(args)
@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     texts = (
         page(report, str(args.model), str(args.runs)),
         json_text(report.as_json()),
-        model_text(report.model, [report.sentence]),
+        case_as_toml(report.model, [report.sentence]),
         csv_text(_next_runs(report)),
     )
     with create_folder(args.out) as folder:
@@ -156,7 +156,7 @@ def _next_runs(report: Any) -> dict[str, list[Any]]:
     lines: list[dict[str, Any]] = []
     for number, option in enumerate(report.next_runs, 1):
         head = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
-        head["separates_sigma"] = option.separates
+        head["separates_sigma"] = option.discrimination
         lines += [head | row for row in option.rows or [{}]]
     names = ["run", "kind", "what", "separates_sigma", "slip", "load_N"]
     names += [name for line in lines for name in line if name not in names]
@@ -167,7 +167,7 @@ def _text(report: Any) -> str:
     parts = [f"{report.status}: {report.sentence}"]
     if report.gap:
         rows = [
-            (name.replace("_", " "), f"{s.before:.3g}", f"{s.after:.3g}", s.what)
+            (name.replace("_", " "), f"{s.before:.3g}", f"{s.after:.3g}", s.description)
             for name, s in report.gap.items()
         ]
         parts.append(format_table(("gap", "before", "after", "rows"), rows, last_left=True))
@@ -180,7 +180,11 @@ def _text(report: Any) -> str:
         parts.append(format_table(("effect", "value", "std", "unit"), rows))
     if report.next_runs:
         best = report.next_runs[0]
-        apart = "10 sigma or more" if best.separates >= 10.0 else f"{best.separates:.2g} sigma"
+        apart = (
+            "10 sigma or more"
+            if best.discrimination >= 10.0
+            else f"{best.discrimination:.2g} sigma"
+        )
         parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}")
     parts += [f"! {note}" for note in report.notes]
     return "\n\n".join(parts)

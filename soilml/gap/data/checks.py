@@ -1,35 +1,145 @@
-"""The gate: which data can be analysed at all, and which readings are set aside."""
+"""Data checks before an analysis: which data can be analysed, and which can identify a cause.
+
+A new check is a function from `CheckedData` to findings, listed in `CHECKS`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.observations import Cells, distinct
+from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
 from soilml.io.table import Table
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Degrees of freedom that repeated rows must give before they speak for the noise.
-LEAST_REPEATS = 6
+#: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
+#: standard error is then 30 %.
+MIN_REPEAT_DEGREES_OF_FREEDOM = 6
+#: Rows are repeats if their slips and the logarithms of their loads agree within these.
+SLIP_TOLERANCE, LOG_LOAD_TOLERANCE = 0.02, 0.05
 #: Readings beyond the number of soil parameters that an analysis needs.
-SPARE = 8
+MIN_RESIDUAL_READINGS = 8
+#: Fraction of duplicate rows above which the table itself is suspect.
+MAX_DUPLICATE_FRACTION = 0.2
 
 
 @dataclass(frozen=True)
-class Gate:
-    """What the gate says: reasons to refuse, reasons to name nothing, and notes."""
+class DataCheckResult:
+    """Errors that prevent an analysis, obstacles to naming a cause, and notes."""
 
-    refused: tuple[str, ...] = ()
-    unnameable: tuple[str, ...] = ()
+    errors: tuple[str, ...] = ()
+    naming_obstacles: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def without_repeats(table: Table) -> tuple[Table, int]:
-    """The table without rows that repeat another one to the last digit, and how many there were."""
+@dataclass(frozen=True)
+class CheckedData:
+    """What the checks look at; `parameters` is the number of free soil parameters."""
+
+    readings: StackedReadings
+    rows: int
+    duplicate_rows: int
+    parameters: int
+
+
+class Severity(Enum):
+    """Consequence of a finding."""
+
+    ERROR = "no analysis"
+    NAMING_OBSTACLE = "no cause can be named"
+    NOTE = "for information"
+
+
+Finding = tuple[Severity, str]
+
+
+def check_readings(
+    readings: StackedReadings, table: Table, duplicate_rows: int, parameters: int
+) -> DataCheckResult:
+    """Run all data checks.
+
+    Parameters
+    ----------
+    duplicate_rows : int
+        Number of duplicate rows that were removed from `table` before.
+    parameters : int
+        Number of free soil parameters.
+    """
+    data = CheckedData(readings, len(table), duplicate_rows, parameters)
+    findings = [finding for check in CHECKS for finding in check(data)]
+    errors, obstacles, notes = (
+        tuple(text for severity, text in findings if severity is wanted)
+        for wanted in (Severity.ERROR, Severity.NAMING_OBSTACLE, Severity.NOTE)
+    )
+    return DataCheckResult(errors, obstacles, notes)
+
+
+def _check_channels(data: CheckedData) -> Iterator[Finding]:
+    readings = data.readings
+    for i, name in enumerate(readings.channels):
+        in_channel, key = readings.channel == i, column(name)
+        if not np.isfinite(readings.std[in_channel]).all():
+            yield (
+                Severity.ERROR,
+                f"the noise of {key} is not declared and there are no repeated rows to estimate "
+                f"it from: give [noise] {key}, or {key}_std",
+            )
+        values = readings.reading[in_channel]
+        if values.size > 3 and np.ptp(values) == 0.0:
+            yield Severity.ERROR, f"{key} is the same in every row: check the sensor"
+
+
+def _check_duplicate_rows(data: CheckedData) -> Iterator[Finding]:
+    if data.duplicate_rows:
+        many = data.duplicate_rows > MAX_DUPLICATE_FRACTION * (data.rows + data.duplicate_rows)
+        severity = Severity.ERROR if many else Severity.NOTE
+        yield severity, f"{data.duplicate_rows} rows are exact duplicates and were excluded"
+
+
+def _check_count(data: CheckedData) -> Iterator[Finding]:
+    count = len(data.readings)
+    if not data.readings.channels:
+        yield Severity.ERROR, "no torque, drawbar pull or sinkage was measured"
+    elif count < data.parameters + MIN_RESIDUAL_READINGS:
+        yield (
+            Severity.ERROR,
+            f"{'1 reading' if count == 1 else f'{count} readings'} for {data.parameters} soil "
+            f"parameters: at least {data.parameters + MIN_RESIDUAL_READINGS} readings are needed",
+        )
+
+
+def _check_variety(data: CheckedData) -> Iterator[Finding]:
+    readings = data.readings
+    if len(readings.runs) < 2:
+        text = "one run only: run-to-run variation of the soil cannot be separated from a gap"
+        yield Severity.NAMING_OBSTACLE, text
+    if not readings.channels:
+        return
+    if count_distinct(np.log(readings.load)) < 2:
+        text = "one load only: soil parameters and effects are confounded"
+        yield Severity.NAMING_OBSTACLE, text
+    if count_distinct(readings.slip) < 3:
+        text = "fewer than three slips: effects that vary with slip cannot be distinguished"
+        yield Severity.NAMING_OBSTACLE, text
+
+
+#: All data checks, in the order in which their findings are reported.
+CHECKS: tuple[Callable[[CheckedData], Iterator[Finding]], ...] = (
+    _check_channels,
+    _check_duplicate_rows,
+    _check_count,
+    _check_variety,
+)
+
+
+def without_duplicate_rows(table: Table) -> tuple[Table, int]:
+    """The table without exact duplicates of earlier rows, and the number of duplicates."""
     names = [n for n in table.columns if n != "source"]
     keys = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
     first = {key: i for i, key in reversed(list(enumerate(keys)))}
@@ -37,56 +147,27 @@ def without_repeats(table: Table) -> tuple[Table, int]:
     return (table, 0) if kept.size == len(table) else (table.rows(kept), len(table) - kept.size)
 
 
-def repeated_noise(cells: Cells) -> tuple[dict[str, float], list[str]]:
-    """Noise of the channels that declare none, from rows driven alike, and notes about it."""
-    found, notes = {}, []
-    for i, name in enumerate(cells.channels):
-        here = np.flatnonzero((cells.channel == i) & ~np.isfinite(cells.std))
-        if here.size == 0:
+def estimate_repeat_noise(readings: StackedReadings) -> tuple[dict[str, float], list[str]]:
+    """Noise of the channels without declared noise, from repeated rows, and notes about it."""
+    noise, notes = {}, []
+    for i, name in enumerate(readings.channels):
+        undeclared = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
+        if undeclared.size == 0:
             continue
-        slip, load = cells.slip[here], cells.load[here]
-        key = np.stack([np.round(slip / 0.02), np.round(np.log(load) / 0.05)], axis=1)
+        slip, load = readings.slip[undeclared], readings.load[undeclared]
+        key = np.stack(
+            [np.round(slip / SLIP_TOLERANCE), np.round(np.log(load) / LOG_LOAD_TOLERANCE)], axis=1
+        )
         _, group = np.unique(key, axis=0, return_inverse=True)
         count = np.bincount(group)
-        mean = np.bincount(group, cells.reading[here]) / count
-        freedom = int((count - 1).sum())
-        if freedom < LEAST_REPEATS:
+        mean = np.bincount(group, readings.reading[undeclared]) / count
+        degrees_of_freedom = int((count - 1).sum())
+        if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
             continue
-        spread = float(np.sum((cells.reading[here] - mean[group]) ** 2))
-        found[name] = float(np.sqrt(spread / freedom))
+        squares = float(np.sum((readings.reading[undeclared] - mean[group]) ** 2))
+        noise[name] = float(np.sqrt(squares / degrees_of_freedom))
         notes.append(
-            f"noise of {column(name)} is not declared: {found[name]:.3g} from rows driven alike"
+            f"noise of {column(name)} is not declared: {noise[name]:.3g} was estimated from "
+            "repeated rows"
         )
-    return found, notes
-
-
-def examined(cells: Cells, table: Table, repeats: int, parameters: int) -> Gate:
-    """What these data allow, before anything is fitted."""
-    refused: list[str] = []
-    unnameable: list[str] = []
-    notes: list[str] = []
-    for i, name in enumerate(cells.channels):
-        here = cells.channel == i
-        if not np.isfinite(cells.std[here]).all():
-            refused.append(
-                f"the noise of {column(name)} is not declared and no rows were driven alike: give "
-                f"[noise] {column(name)}, or {column(name)}_std"
-            )
-        readings = cells.reading[here]
-        if readings.size > 3 and np.ptp(readings) == 0.0:
-            refused.append(f"{column(name)} is the same in every row: is the sensor alive?")
-    if repeats:
-        text = f"{repeats} rows repeat another one to the last digit and are left out"
-        (refused if repeats > 0.2 * (len(table) + repeats) else notes).append(text)
-    if not cells.channels:
-        refused.append("no torque, drawbar pull or sinkage was measured")
-    elif len(cells) < parameters + SPARE:
-        count = "1 reading" if len(cells) == 1 else f"{len(cells)} readings"
-        refused.append(f"{count} for {parameters} soil parameters: nothing is left to show a gap")
-    if len(cells.runs) < 2:
-        unnameable.append("one run only: soil that differs from run to run cannot be told apart")
-    if cells.channels and distinct(np.log(cells.load)) < 2:
-        unnameable.append("one load only: soil parameters and effects trade off")
-    if cells.channels and distinct(cells.slip) < 3:
-        unnameable.append("fewer than three slips: nothing that runs with slip can be told apart")
-    return Gate(tuple(refused), tuple(unnameable), tuple(notes))
+    return noise, notes

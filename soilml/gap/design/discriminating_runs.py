@@ -1,4 +1,4 @@
-"""Which run or check would tell the remaining explanations apart."""
+"""Runs and checks ranked by how well they would discriminate between explanations."""
 
 from __future__ import annotations
 
@@ -8,111 +8,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.data.observations import Cells
-from soilml.gap.design.run_options import CHECKS, cells_at, menu
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.design.run_options import SENSOR_CHECKS, expected_readings, run_options
 from soilml.gap.results import NextRun
-from soilml.gap.search.candidate_fits import Bench, Candidate
-from soilml.gap.search.cross_validation import spread
-from soilml.gap.statistics.coordinates import linearised, predicted
+from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.cross_validation import covariance_at
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Sigma beyond which two explanations are as far apart as anybody needs.
-ENOUGH = 10.0
-#: Suggestions that are listed.
-LISTED = 8
+#: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
+MAX_DISCRIMINATION = 10.0
+#: Explanations that are compared, and proposals that are listed.
+COMPARED, LISTED = 5, 8
+#: Relative singular value below which the rival's parameters cannot be determined by the rows.
+LEAST_SQUARES_TOLERANCE = 1e-10
+
+#: Whitened difference (m,) of two explanations on some rows, and the rival's Jacobian (m, p).
+Difference = tuple[Floats, Floats]
 
 
-def next_runs(bench: Bench, rivals: Sequence[Candidate]) -> list[NextRun]:
-    """Runs and checks, ranked by how well they separate the first explanation from the others.
+def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list[NextRun]:
+    """Runs and checks ranked by how well they discriminate the first explanation from the others.
 
-    With one explanation alone, nothing is left to separate. What a run would say is judged against
-    a rival that adapts all its parameters to old and new rows together.
+    The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all
+    its parameters to the present and the new rows together. With fewer than two explanations there
+    is nothing to discriminate.
     """
-    if len(rivals) < 2:
+    if len(explanations) < 2:
         return []
-    fits = {"+".join(c.names): c.fit for c in rivals[:5]}
-    one, *others = fits.values()
-    known = [_compared(one, other, bench.cells, bench.covariance.whiten) for other in others]
-    found = []
-    for option in menu(bench.cells):
+    fits = {"+".join(c.names): c.fit for c in explanations[:COMPARED]}
+    first, *rivals = fits.values()
+    whiten = problem.covariance.whiten
+    present = [_difference(first, rival, problem.readings, whiten) for rival in rivals]
+    proposals = []
+    for option in run_options(problem.readings):
         try:
-            cells = cells_at(option, bench.cells, one.fitted())
-            whiten = spread(bench, one, cells).whiten
-            apart = [
-                _apart(other, old, _compared(one, other, cells, whiten))
-                for other, old in zip(others, known, strict=True)
+            readings = expected_readings(option, problem.readings, first.fitted())
+            whiten = covariance_at(problem, first, readings).whiten
+            sigmas = [
+                _discrimination(rival, old, _difference(first, rival, readings, whiten))
+                for rival, old in zip(rivals, present, strict=True)
             ]
         except (InputError, np.linalg.LinAlgError):
             continue
-        if not np.isfinite(apart).all():
+        if not np.isfinite(sigmas).all():
             continue
-        found.append(NextRun(option.kind, option.text, _worth(apart), _rows(cells, fits)))
-    for kind, (text, after) in CHECKS.items():
-        apart = [_checked(one, other, after) for other in others]
-        if max(apart) > 0.0:
-            found.append(NextRun(kind, text, _worth(apart), ()))
-    return sorted(found, key=lambda run: -run.separates)[:LISTED]
+        rows = _rows(readings, fits)
+        proposals.append(NextRun(option.kind, option.text, _mean_capped(sigmas), rows))
+    for kind, (text, std_after) in SENSOR_CHECKS.items():
+        sigmas = [_check_discrimination(first, rival, std_after) for rival in rivals]
+        if max(sigmas) > 0.0:
+            proposals.append(NextRun(kind, text, _mean_capped(sigmas), ()))
+    return sorted(proposals, key=lambda run: -run.discrimination)[:LISTED]
 
 
-def _worth(apart: Sequence[float]) -> float:
-    """Sigma between the first explanation and the others, on average, each up to `ENOUGH`."""
-    return float(np.mean([min(sigma, ENOUGH) for sigma in apart]))
+def _mean_capped(sigmas: Sequence[float]) -> float:
+    """Mean discrimination from the rivals, each capped at `MAX_DISCRIMINATION`."""
+    return float(np.mean([min(sigma, MAX_DISCRIMINATION) for sigma in sigmas]))
 
 
-#: Difference and slope, whitened.
-Compared = tuple[Floats, Floats]
+def _difference(
+    first: GapFit, rival: GapFit, readings: StackedReadings, whiten: Floats
+) -> Difference:
+    expected = predict_readings(first.case, first.coordinates, first.x[None, :], readings)[0]
+    rival_expected, jacobian = linearise(rival.case, rival.coordinates, rival.x, readings)
+    return whiten @ (expected - rival_expected), whiten @ jacobian
 
 
-def _compared(one: GapFit, other: GapFit, cells: Cells, whiten: Floats) -> Compared:
-    """Whitened difference (m,) of two explanations on some cells, and the other's slope (m, p)."""
-    mine = predicted(one.case, one.axes, one.x[None, :], cells)[0]
-    theirs, slope = linearised(other.case, other.axes, other.x, cells)
-    return whiten @ (mine - theirs), whiten @ slope
+def _discrimination(rival: GapFit, present: Difference, new: Difference) -> float:
+    """Sigma that new rows add between an explanation and a rival adapted to all rows."""
+    increase = _adapted_misfit(rival, [present, new]) - _adapted_misfit(rival, [present])
+    return float(np.sqrt(max(increase, 0.0)))
 
 
-def _apart(other: GapFit, old: Compared, new: Compared) -> float:
-    """Sigma that a run adds between two explanations, the other one adapting itself to all rows."""
-    return float(np.sqrt(max(_left(other, [old, new]) - _left(other, [old]), 0.0)))
-
-
-def _left(other: GapFit, parts: Sequence[Compared]) -> float:
-    """Squared sigma between one explanation and the best that another can do about it."""
-    held = np.diag([1.0 / axis.std for axis in other.axes])
-    difference = np.concatenate([*[d for d, _ in parts], -other.x * np.diag(held)])
-    slope = np.vstack([*[s for _, s in parts], held])
-    if not (np.isfinite(difference).all() and np.isfinite(slope).all()):
+def _adapted_misfit(rival: GapFit, parts: Sequence[Difference]) -> float:
+    """Squared sigma that remain after the rival has adapted its parameters, prior included."""
+    prior = np.diag([1.0 / c.std for c in rival.coordinates])
+    difference = np.concatenate([*[d for d, _ in parts], -rival.x * np.diag(prior)])
+    jacobian = np.vstack([*[j for _, j in parts], prior])
+    if not (np.isfinite(difference).all() and np.isfinite(jacobian).all()):
         return float("nan")
-    step = np.linalg.lstsq(slope, difference, rcond=1e-10)[0]
-    return float(np.sum((difference - slope @ step) ** 2))
+    step = np.linalg.lstsq(jacobian, difference, rcond=LEAST_SQUARES_TOLERANCE)[0]
+    return float(np.sum((difference - jacobian @ step) ** 2))
 
 
-def _checked(one: GapFit, other: GapFit, after: dict[str, float]) -> float:
+def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, float]) -> float:
     """Sigma by which a check of the sensors would reject one of two explanations."""
-    found = 0.0
-    for fit in (one, other):
-        for axis, value in zip(fit.axes, fit.values().values(), strict=True):
-            name, _, parameter = axis.path.rpartition(".")
-            if name in after and parameter not in ("by_slip", "by_load"):
-                found = max(found, abs(value) / after[name])
-    return found
+    largest = 0.0
+    for fit in (first, rival):
+        for c, value in zip(fit.coordinates, fit.values().values(), strict=True):
+            if isinstance(c, EffectCoordinate) and not c.is_shape and c.effect in std_after:
+                largest = max(largest, abs(value) / std_after[c.effect])
+    return largest
 
 
-def _rows(cells: Cells, fits: dict[str, GapFit]) -> tuple[dict[str, float], ...]:
-    """Operating points of a run and what each explanation expects there."""
-    rows = len(cells.run)
+def _rows(readings: StackedReadings, fits: dict[str, GapFit]) -> tuple[dict[str, float], ...]:
+    """Operating points of a run with the prediction of each explanation."""
+    rows = len(readings.run)
     columns: dict[str, Floats] = {
-        "slip": np.asarray(cells.at.slip),
-        "load_N": np.asarray(cells.at.load),
+        "slip": np.asarray(readings.at.slip),
+        "load_N": np.asarray(readings.at.load),
     }
     for field, key in COVARIATES.items():
-        if getattr(cells.at, field) is not None:
-            columns[key] = np.broadcast_to(getattr(cells.at, field), (rows,))
+        if getattr(readings.at, field) is not None:
+            columns[key] = np.broadcast_to(getattr(readings.at, field), (rows,))
     for name, fit in fits.items():
-        y = predicted(fit.case, fit.axes, fit.x[None, :], cells)[0]
-        for i, channel in enumerate(cells.channels):
-            columns[f"{column(channel)} if {name}"] = y[cells.channel == i]
+        y = predict_readings(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
+        for i, channel in enumerate(readings.channels):
+            columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
     return tuple({key: float(values[r]) for key, values in columns.items()} for r in range(rows))

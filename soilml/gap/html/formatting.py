@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from soilml.gap.results import Value
+from soilml.gap.results import EstimatedValue
 from soilml.quantities import COLUMNS
 
 _SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")
@@ -101,13 +101,13 @@ def written(unit: str) -> str:
     return base + (exponent.translate(_SUPERSCRIPT).replace(" ", "") if caret else "")
 
 
-def shown(value: Value) -> str:
+def shown(value: EstimatedValue) -> str:
     """A value with its standard deviation in a handy unit."""
     factor, unit = handy(value.unit, value.value)
     return joined(spread(factor * value.value, factor * value.std), unit)
 
 
-def in_si(value: Value) -> str:
+def in_si(value: EstimatedValue) -> str:
     """The same in SI, where that is another unit; else nothing."""
     factor, _ = handy(value.unit, value.value)
     if factor == 1.0:

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from soilml.gap.html import formatting
-from soilml.gap.results import STATUSES, Curves, GapReport, Value
+from soilml.gap.results import STATUSES, EstimatedValue, GapReport, ReadingsAndPredictions
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -72,7 +72,7 @@ def page(report: GapReport, model: str, runs: str) -> str:
         maps=_maps(report),
         curves=None if report.curves is None else _curves(report, report.curves, changed),
         soil=_soil(report),
-        scatter=[formatting.scattered(k, v) for k, v in report.scatter.items()],
+        scatter=[formatting.scattered(k, v) for k, v in report.variance_components.items()],
         reasons=report.reasons or (report.sentence,),
         finite=math.isfinite,
     )
@@ -133,14 +133,14 @@ def _bars(report: GapReport, changed: bool) -> list[dict[str, Any]]:
     from soilml.gap.html.plots import Bar, bars
 
     groups = []
-    for key, shrink in report.gap.items():
-        pairs = {"all readings": (shrink.before, shrink.after)}
-        pairs |= {formatting.channel(k): v for k, v in shrink.channels.items()}
-        groups.append((key, shrink, pairs))
+    for key, reduction in report.gap.items():
+        pairs = {"all readings": (reduction.before, reduction.after)}
+        pairs |= {formatting.channel(k): v for k, v in reduction.channels.items()}
+        groups.append((key, reduction, pairs))
     values = [v for _, _, pairs in groups for pair in pairs.values() for v in pair]
     values = [v for v in values if math.isfinite(v)] or [1.0]
     found = []
-    for i, (key, shrink, pairs) in enumerate(groups):
+    for i, (key, reduction, pairs) in enumerate(groups):
         rows = [Bar(k, b, a if changed else math.nan) for k, (b, a) in pairs.items()]
         title = _GROUPS.get(key, key.replace("_", " "))
         told = "; ".join(
@@ -149,7 +149,7 @@ def _bars(report: GapReport, changed: bool) -> list[dict[str, Any]]:
             for k, (b, a) in pairs.items()
         )
         svg = bars(rows, max(values), min(values), f"bars{i}", f"{title}, gap: {told}")
-        found.append({"title": title, "shrink": shrink, "svg": svg})
+        found.append({"title": title, "reduction": reduction, "svg": svg})
     return found
 
 
@@ -190,7 +190,7 @@ def _shade(z: float, p: float) -> dict[str, Any]:
     }
 
 
-def _curves(report: GapReport, curves: Curves, changed: bool) -> dict[str, Any]:
+def _curves(report: GapReport, curves: ReadingsAndPredictions, changed: bool) -> dict[str, Any]:
     from soilml.gap.html.plots import chosen_runs, curve
 
     runs = chosen_runs(curves)
@@ -248,7 +248,7 @@ def _soil(report: GapReport) -> list[dict[str, Any]]:
     return rows
 
 
-def _strip(old: Value, new: Value) -> list[dict[str, str]]:
+def _strip(old: EstimatedValue, new: EstimatedValue) -> list[dict[str, str]]:
     """Where value and 90 % interval lie between the ends of a strip, in percent of its length."""
     ends = [v.value + k * Z_90 * v.std for v in (old, new) for k in (-1, 1)]
     if not all(math.isfinite(e) for e in ends) or max(ends) <= min(ends):

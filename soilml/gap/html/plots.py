@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.html.formatting import channel, channel_unit, figure, joined
-from soilml.gap.results import Curves
+from soilml.gap.results import ReadingsAndPredictions
 from soilml.quantities import Z_90
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class Shown:
     marker: str
 
 
-def chosen_runs(curves: Curves) -> list[Shown]:
+def chosen_runs(curves: ReadingsAndPredictions) -> list[Shown]:
     """Runs spread over the loads that were driven, light first: one a load as long as they last."""
     loads: dict[str, list[float]] = {}
     for run, load in zip(curves.run, curves.load, strict=True):
@@ -124,7 +124,12 @@ def chosen_runs(curves: Curves) -> list[Shown]:
 
 
 def curve(
-    curves: Curves, number: int, runs: Sequence[Shown], changed: bool, name: str, title: str
+    curves: ReadingsAndPredictions,
+    number: int,
+    runs: Sequence[Shown],
+    changed: bool,
+    name: str,
+    title: str,
 ) -> str:
     """One channel: readings and predictions over slip, and below it what is left, in sigma."""
     import matplotlib
@@ -153,7 +158,12 @@ def curve(
 
 
 def _drawn(
-    axes: Axes, curves: Curves, here: NDArray[np.int64], factor: float, run: Shown, changed: bool
+    axes: Axes,
+    curves: ReadingsAndPredictions,
+    here: NDArray[np.int64],
+    factor: float,
+    run: Shown,
+    changed: bool,
 ) -> None:
     slip = curves.slip[here]
     band = Z_90 * np.hypot(curves.after_std[here], curves.std[here])
@@ -175,7 +185,9 @@ def _drawn(
                   ms=4.6, mew=1.0, mfc="white" if hidden else run.colour)  # fmt: skip
 
 
-def _left(axes: Axes, curves: Curves, here: NDArray[np.int64], changed: bool) -> None:
+def _left(
+    axes: Axes, curves: ReadingsAndPredictions, here: NDArray[np.int64], changed: bool
+) -> None:
     axes.axhspan(-Z_90, Z_90, color="#dddddd", lw=0)
     axes.axhline(0.0, color="#555555", lw=0.8)
     most = 3.5

@@ -1,4 +1,4 @@
-"""Fits of the model with effects added: by their own law, and with the law left open."""
+"""Candidate fits: effects by their catalogue law, and with the shape of that law estimated."""
 
 from __future__ import annotations
 
@@ -8,185 +8,119 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.config.case import Case
-from soilml.errors import InputError
-from soilml.gap.data.observations import Cells
-from soilml.gap.statistics.coordinates import SHAPE_STD, Axis, shape_axes, size_axis
-from soilml.gap.statistics.least_squares import GapFit, descend
-from soilml.gap.statistics.reml_covariance import Covariance
-from soilml.gap.statistics.score_test import outside
-from soilml.gap.statistics.signatures import grown, standing
-from soilml.physics.effects.base import Effect
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.coordinates import EffectCoordinate, shape_coordinates
+from soilml.gap.statistics.least_squares import GapFit
+from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
 Floats = NDArray[np.float64]
 
-#: Sizes, in reference sizes, that a fit of a new effect starts from.
-STARTS = (0.7,)
-#: Spread of the fault of a sensor or rig that nobody checked, in reference sizes.
-UNCHECKED = 2.0
-
 
 @dataclass(frozen=True)
-class Candidate:
-    """Effects by name and the two fits with them: by their own laws, and with shapes free."""
+class CandidateFit:
+    """A set of effects with two fits: by their catalogue laws, and with shape coefficients free.
+
+    Both fits are the same one where no shape was estimated.
+    """
 
     names: tuple[str, ...]
-    strict: GapFit
-    shaped: GapFit
+    catalogue_fit: GapFit
+    shape_fit: GapFit
 
     @property
-    def price(self) -> float:
-        r"""What free shapes must gain before they are believed: their Occam factor.
+    def occam_penalty(self) -> float:
+        r"""Improvement that the shape coefficients must exceed: their Occam factor.
 
         .. math:: \sum_k \ln(1 + \sigma_k^2 / s_k^2)
 
-        with the spreads of the prior and of the posterior. References: MacKay, Neural Computation
-        4, 1992.
+        with the standard deviations of prior and posterior.
+
+        References
+        ----------
+        MacKay, Neural Computation 4, 1992.
         """
-        prior = self.shaped.precision
-        shapes = [i for i, a in enumerate(self.shaped.axes) if _is_shape(a)]
-        spread = np.diag(self.shaped.covariance)[shapes]
-        return float(np.sum(np.log1p(1.0 / (prior[shapes] * np.maximum(spread, 1e-12)))))
+        precision = self.shape_fit.precision
+        shapes = _shape_indices(self.shape_fit)
+        variance = np.diag(self.shape_fit.covariance)[shapes]
+        return float(np.sum(np.log1p(1.0 / (precision[shapes] * np.maximum(variance, 1e-12)))))
 
     @property
-    def open(self) -> bool:
-        """Whether the data ask for another law than the catalogue's."""
-        return self.shaped.cost + self.price < self.strict.cost
+    def shape_supported(self) -> bool:
+        """Whether the data support another law than the catalogue's."""
+        return self.shape_fit.objective + self.occam_penalty < self.catalogue_fit.objective
 
     @property
-    def cost(self) -> float:
-        """The objective with form uncertainty included."""
-        return min(self.strict.cost, self.shaped.cost + self.price)
+    def objective(self) -> float:
+        """The lower objective of the two fits, with the Occam penalty for free shapes."""
+        return min(self.catalogue_fit.objective, self.shape_fit.objective + self.occam_penalty)
 
     @property
     def fit(self) -> GapFit:
-        """The fit that stands for the candidate."""
-        return self.shaped if self.open else self.strict
+        """The fit with that objective."""
+        return self.shape_fit if self.shape_supported else self.catalogue_fit
 
     @property
-    def strain(self) -> float:
-        """How far the shapes are from the catalogue's law, in squared prior spreads."""
-        x, prior = self.fit.x, self.fit.precision
-        shapes = [i for i, a in enumerate(self.fit.axes) if _is_shape(a)]
-        return float(np.sum(x[shapes] ** 2 * prior[shapes]))
+    def shape_deviation(self) -> float:
+        """Squared distance of the shapes from the catalogue's law, in prior variances."""
+        x, precision = self.fit.x, self.fit.precision
+        shapes = _shape_indices(self.fit)
+        return float(np.sum(x[shapes] ** 2 * precision[shapes]))
 
 
-@dataclass(frozen=True)
-class Bench:
-    """All that stays the same while candidates are tried."""
-
-    case: Case
-    soil: tuple[Axis, ...]
-    cells: Cells
-    covariance: Covariance
-    effects: Mapping[str, type[Effect]]
-    calibration: Mapping[str, float]
-
-    def others(self, fit: GapFit) -> dict[str, type[Effect]]:
-        """The effects whose size is not among the coordinates of a fit."""
-        fitted = {axis.path.rpartition(".")[0] for axis in fit.axes}
-        return {name: effect for name, effect in self.effects.items() if name not in fitted}
-
-    def with_effects(self, names: Sequence[str]) -> Case:
-        """The case with these effects added."""
-        case = self.case
-        for name in names:
-            case = grown(case, self.effects[name])
-        return case
-
-    def sizes(self, names: Sequence[str]) -> list[Axis]:
-        """The axes of the effects' sizes."""
-        found = []
-        for name in names:
-            about = self.effects[name].about
-            usual = UNCHECKED * about.reference[about.size] if about.calibration else None
-            found.append(size_axis(self.effects[name], self.calibration.get(name, usual)))
-        return found
-
-    def shapes(self, names: Sequence[str]) -> list[Axis]:
-        """The axes of the effects' shapes, as far as slip and load vary."""
-        found = [axis for name in names for axis in shape_axes(self.effects[name])]
-        varies = {"by_slip": np.ptp(self.cells.slip) > 0.05, "by_load": self._loads()}
-        return [axis for axis in found if varies[axis.path.rpartition(".")[2]]]
-
-    def _loads(self) -> bool:
-        return bool(np.ptp(np.log(self.cells.load)) > 0.1)
-
-    def soil_only(self, starts: Sequence[Floats]) -> GapFit:
-        """The best fit of the soil alone."""
-        fits = [
-            descend(self.case, self.soil, self.cells, self.covariance.whiten, start)
-            for start in starts
-        ]
-        return min(fits, key=lambda fit: fit.cost)
-
-    def fit(self, names: Sequence[str], start: Mapping[str, float]) -> Candidate:
-        """The model with these effects, each by its own law; coordinates not given start small."""
-        strict = self._from(self.with_effects(names), [*self.soil, *self.sizes(names)], start)
-        return Candidate(tuple(names), strict, strict)
-
-    def loosened(self, candidate: Candidate) -> Candidate:
-        """The same candidate with the shapes of its effects free as well."""
-        strict = candidate.strict
-        shapes = self.shapes(candidate.names)
-        if not shapes:
-            return candidate
-        loose = self._from(strict.case, [*strict.axes, *shapes], coordinates(strict))
-        return candidate if loose.cost > strict.cost else replace(candidate, shaped=loose)
-
-    def forms(self, fit: GapFit) -> list[Floats]:
-        """What further bends in the laws of a fit's effects would do, whitened, (m, k) each."""
-        raw = [
-            fit.slope[:, i]
-            for i, axis in enumerate(fit.axes)
-            if "." in axis.path
-            and shape_axes(self.effects[axis.path.rpartition(".")[0]])
-            and not _is_shape(axis)
-        ]
-        if not raw:
-            return []
-        s, w = self.cells.slip, np.log(self.cells.load)
-        s, w = s - s.mean(), w - w.mean()
-        plain = np.linalg.solve(self.covariance.whiten, np.stack(raw, axis=1))
-        return [self.covariance.whiten @ (plain * f[:, None]) for f in (s * s, s * w, w * w)]
-
-    def loose_gain(self, candidate: Candidate) -> float:
-        """By how much free shapes should lower the objective at most: linearised, no prior."""
-        fit = candidate.strict
-        forms = (self.cells.slip, np.log(self.cells.load))
-        raw = np.linalg.solve(self.covariance.whiten, fit.slope[:, len(self.soil) :])
-        columns = np.column_stack([raw * form[:, None] for form in forms])
-        beyond = outside(self.covariance.whiten @ columns, fit.slope)
-        u, s, _ = np.linalg.svd(beyond, full_matrices=False)
-        kept = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
-        return float(np.sum((kept.T @ fit.residual) ** 2))
-
-    def _first(self, axis: Axis) -> float:
-        """Where a coordinate starts: where the case has it, else a little off zero."""
-        if axis.path in self.case.parameters() and not _is_shape(axis):
-            return standing(self.case, axis.path, axis.prior.upper)
-        return _small(axis)
-
-    def _from(self, case: Case, axes: Sequence[Axis], start: Mapping[str, float]) -> GapFit:
-        begin = np.asarray([start.get(axis.path, self._first(axis)) for axis in axes])
-        try:
-            return descend(case, axes, self.cells, self.covariance.whiten, begin)
-        except InputError:  # a trial past what the model allows: start from nothing
-            begin = np.asarray([start.get(a.path, 0.0) if "." not in a.path else 0.0 for a in axes])
-            return descend(case, axes, self.cells, self.covariance.whiten, begin)
+def fit_candidate(
+    problem: FitProblem, names: Sequence[str], start: Mapping[str, float]
+) -> CandidateFit:
+    """Fit these effects jointly with the soil, each by its catalogue law."""
+    coordinates = [*problem.soil, *problem.size_coordinates(names)]
+    fit = problem.fit(problem.with_effects(names), coordinates, start)
+    return CandidateFit(tuple(names), fit, fit)
 
 
-def _is_shape(axis: Axis) -> bool:
-    return axis.path.rpartition(".")[2] in SHAPE_STD
+def fit_shapes(problem: FitProblem, candidate: CandidateFit) -> CandidateFit:
+    """The candidate with the shape coefficients of its effects estimated as well."""
+    catalogue = candidate.catalogue_fit
+    shapes = problem.shape_coordinates(candidate.names)
+    if not shapes:
+        return candidate
+    fit = problem.fit(catalogue.case, [*catalogue.coordinates, *shapes], catalogue.start_values())
+    worse = fit.objective > catalogue.objective
+    return candidate if worse else replace(candidate, shape_fit=fit)
 
 
-def _small(axis: Axis) -> float:
-    """Where a new coordinate starts: off zero, where some effects have no slope."""
-    if _is_shape(axis):
-        return 0.0
-    return STARTS[0] if axis.upper > 0.0 else -STARTS[0]
+def shape_directions(problem: FitProblem, fit: GapFit) -> list[Floats]:
+    """Changes of the readings by second-order terms in the laws of a fit's effects, whitened.
+
+    Each is (m, k): the signature of each size times s^2, s w or w^2, with slip s and log load w
+    centred. The estimated shapes cover the first order alone.
+    """
+    signatures = [
+        fit.jacobian[:, i]
+        for i, c in enumerate(fit.coordinates)
+        if isinstance(c, EffectCoordinate)
+        and shape_coordinates(problem.effects[c.effect])
+        and not c.is_shape
+    ]
+    if not signatures:
+        return []
+    whiten = problem.covariance.whiten
+    s, w = problem.readings.slip, np.log(problem.readings.load)
+    s, w = s - s.mean(), w - w.mean()
+    plain = np.linalg.solve(whiten, np.stack(signatures, axis=1))
+    return [whiten @ (plain * term[:, None]) for term in (s * s, s * w, w * w)]
 
 
-def coordinates(fit: GapFit) -> dict[str, float]:
-    """Where a fit stands, by path, for another to start from."""
-    return {axis.path: float(x) for axis, x in zip(fit.axes, fit.x, strict=True)}
+def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
+    """Upper bound of the improvement by free shapes: linearised and without a prior."""
+    fit, whiten = candidate.catalogue_fit, problem.covariance.whiten
+    terms = (problem.readings.slip, np.log(problem.readings.load))
+    signatures = np.linalg.solve(whiten, fit.jacobian[:, len(problem.soil) :])
+    columns = np.column_stack([signatures * term[:, None] for term in terms])
+    projected = project_out(whiten @ columns, fit.jacobian)
+    basis = column_space(projected, relative_tolerance=ROUNDING)
+    return float(np.sum((basis.T @ fit.residual) ** 2))
+
+
+def _shape_indices(fit: GapFit) -> list[int]:
+    return [
+        i for i, c in enumerate(fit.coordinates) if isinstance(c, EffectCoordinate) and c.is_shape
+    ]

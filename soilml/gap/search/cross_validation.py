@@ -1,4 +1,4 @@
-"""How much of a gap an explanation closes: where it was fitted, and where it was not."""
+"""Gap reduction by an explanation: on the rows it was fitted to, and on held-out rows."""
 
 from __future__ import annotations
 
@@ -8,109 +8,139 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.data.observations import Cells, distinct
-from soilml.gap.results import Shrink
-from soilml.gap.search.candidate_fits import Bench
-from soilml.gap.statistics.coordinates import predicted
-from soilml.gap.statistics.least_squares import GapFit, descend
-from soilml.gap.statistics.reml_covariance import Covariance, assembled, scatter_columns
+from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.results import GapReduction
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.coordinates import predict_readings
+from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
+from soilml.gap.statistics.reml_covariance import (
+    Covariance,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FOLDS = 4
-#: Share of the cells, the heaviest or those of highest slip, that make the held-out region.
-REGION = 0.3
+#: Fraction of the readings, those of highest load or of highest slip, in the held-out region.
+REGION_FRACTION = 0.3
+#: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
+INFEASIBLE_SQUARE = 100.0
 
 
-def shrink(cells: Cells, std: Floats, before: Floats, after: Floats, what: str) -> Shrink:
-    """Mean squares of what two predictions leave of the cells, in their standard deviations.
+def gap_reduction(
+    readings: StackedReadings, std: Floats, before: Floats, after: Floats, description: str
+) -> GapReduction:
+    """Mean squared standardised residuals of two predictions, in all and by channel.
 
-    A prediction without equilibrium counts as if it were ten standard deviations off.
+    A prediction without equilibrium counts as ten standard deviations off.
     """
 
     def squares(y: Floats) -> Floats:
-        return np.nan_to_num(((cells.reading - y) / std) ** 2, nan=100.0)
+        return np.nan_to_num(((readings.reading - y) / std) ** 2, nan=INFEASIBLE_SQUARE)
 
     old, new = squares(before), squares(after)
-    channels = {
-        column(name): (float(old[cells.channel == i].mean()), float(new[cells.channel == i].mean()))
-        for i, name in enumerate(cells.channels)
-        if (cells.channel == i).any()
-    }
-    return Shrink(float(old.mean()), float(new.mean()), channels, len(cells), what)
+    channels = {}
+    for i, name in enumerate(readings.channels):
+        in_channel = readings.channel == i
+        if in_channel.any():
+            channels[column(name)] = (float(old[in_channel].mean()), float(new[in_channel].mean()))
+    return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
 
 
-def refitted(bench: Bench, fit: GapFit, kept: Mask) -> GapFit:
-    """The same model fitted again to some of the cells, from where it stood."""
-    matrix = bench.covariance.matrix[np.ix_(kept, kept)]
+def refit(problem: FitProblem, fit: GapFit, selected: Mask) -> GapFit:
+    """Fit the same model to some of the readings, starting at its optimum."""
+    matrix = problem.covariance.matrix[np.ix_(selected, selected)]
     whiten = np.linalg.inv(np.linalg.cholesky(matrix))
-    return descend(fit.case, fit.axes, bench.cells.keeping(kept), whiten, fit.x)
+    readings = problem.readings.subset(selected)
+    return levenberg_marquardt(fit.case, fit.coordinates, readings, whiten, fit.x)
 
 
-def held_out_runs(bench: Bench, soil: GapFit, after: GapFit, seed: int) -> Shrink | None:
-    """Each run predicted by fits to the others; None where there are fewer than three runs."""
-    runs = len(bench.cells.runs)
+def held_out_runs(
+    problem: FitProblem, soil: GapFit, after: GapFit, seed: int
+) -> GapReduction | None:
+    """Cross-validation by runs; None where there are fewer than three runs."""
+    runs = len(problem.readings.runs)
     if runs < 3:
         return None
-    fold = np.random.default_rng(seed).permutation(runs) % min(FOLDS, runs)
-    of_cell = fold[bench.cells.run[bench.cells.row]]
-    return _crossed(bench, soil, after, of_cell, "every run predicted by fits to the others")
+    fold_of_run = np.random.default_rng(seed).permutation(runs) % min(FOLDS, runs)
+    fold = fold_of_run[problem.readings.run[problem.readings.row]]
+    description = "every run predicted by fits to the others"
+    return _cross_validate(problem, soil, after, fold, np.unique(fold), description)
 
 
-def held_out_region(bench: Bench, soil: GapFit, after: GapFit) -> Shrink | None:
-    """The heaviest loads predicted from the lighter; high slips where one load was driven."""
-    cells = bench.cells
-    by_load = distinct(np.log(cells.load)) >= 3
-    values = cells.load if by_load else cells.slip
-    if distinct(values) < 3:
+def held_out_region(problem: FitProblem, soil: GapFit, after: GapFit) -> GapReduction | None:
+    """Extrapolation to the highest loads, or to the highest slips where the load hardly varies.
+
+    None where fewer than three loads and fewer than three slips were measured.
+    """
+    readings = problem.readings
+    by_load = count_distinct(np.log(readings.load)) >= 3
+    values = readings.load if by_load else readings.slip
+    if count_distinct(values) < 3:
         return None
     levels = np.unique(values)
-    shares = np.asarray([np.mean(values >= level) for level in levels])
-    edge = levels[int(np.argmin(np.abs(shares - REGION)))]
-    beyond = values >= edge
+    fractions = np.asarray([np.mean(values >= level) for level in levels])
+    edge = levels[int(np.argmin(np.abs(fractions - REGION_FRACTION)))]
     name = f"load_N >= {edge:.4g}" if by_load else f"slip >= {edge:.3g}"
-    return _crossed(
-        bench, soil, after, np.where(beyond, 1, 0), f"{name}, predicted from the rest", 1
-    )
+    fold = np.where(values >= edge, 1, 0)
+    description = f"{name}, predicted from the rest"
+    return _cross_validate(problem, soil, after, fold, np.asarray([1]), description)
 
 
-def _crossed(
-    bench: Bench,
+def _cross_validate(
+    problem: FitProblem,
     soil: GapFit,
     after: GapFit,
     fold: NDArray[np.int64],
-    what: str,
-    only: int | None = None,
-) -> Shrink | None:
-    old, new = np.full(len(bench.cells), np.nan), np.full(len(bench.cells), np.nan)
-    folds = np.unique(fold) if only is None else [only]
-    for number in folds:
+    predicted_folds: NDArray[np.int64],
+    description: str,
+) -> GapReduction | None:
+    """Predict each fold by refits of both models to all readings outside it."""
+    readings = problem.readings
+    before_prediction = np.full(len(readings), np.nan)
+    after_prediction = np.full(len(readings), np.nan)
+    for number in predicted_folds:
         out = fold == number
-        for fit, target in ((soil, old), (after, new)):
+        for fit, target in ((soil, before_prediction), (after, after_prediction)):
             try:
-                again = refitted(bench, fit, ~out)
+                again = refit(problem, fit, ~out)
             except (InputError, np.linalg.LinAlgError):
-                continue  # no fit, no prediction: these cells count as far off
-            y = predicted(again.case, again.axes, again.x[None, :], bench.cells)[0]
+                continue  # without a fit the prediction stays NaN
+            y = predict_readings(again.case, again.coordinates, again.x[None, :], readings)[0]
             target[out] = y[out]
-    held = np.isin(fold, folds)
-    cells = bench.cells.keeping(held)
-    return shrink(cells, bench.covariance.std[held], old[held], new[held], what)
+    selected = np.isin(fold, predicted_folds)
+    return gap_reduction(
+        readings.subset(selected),
+        problem.covariance.std[selected],
+        before_prediction[selected],
+        after_prediction[selected],
+        description,
+    )
 
 
-def unseen(bench: Bench, soil: GapFit, after: GapFit, cells: Cells, what: str) -> Shrink:
-    """Rows that took no part in anything, predicted by both fits."""
-    old = predicted(soil.case, soil.axes, soil.x[None, :], cells)[0]
-    new = predicted(after.case, after.axes, after.x[None, :], cells)[0]
-    return shrink(cells, spread(bench, after, cells).std, old, new, what)
+def predict_held_out(
+    problem: FitProblem,
+    soil: GapFit,
+    after: GapFit,
+    readings: StackedReadings,
+    description: str,
+) -> GapReduction:
+    """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
+    old = predict_readings(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
+    new = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
+    std = covariance_at(problem, after, readings).std
+    return gap_reduction(readings, std, old, new, description)
 
 
-def spread(bench: Bench, fit: GapFit, cells: Cells) -> Covariance:
-    """The covariance of other cells, by the scatter found on the bench."""
-    own = bench.covariance.scatter
-    place = {name: i for i, name in enumerate(bench.cells.channels)}
-    scale = np.asarray([own.scale[place[n]] if n in place else 1.0 for n in cells.channels])
-    columns = scatter_columns(fit.fitted(), cells)
-    return assembled(cells, columns, replace(own, scale=scale))
+def covariance_at(problem: FitProblem, fit: GapFit, readings: StackedReadings) -> Covariance:
+    """The covariance of other readings, by the variance components of the problem."""
+    components = problem.covariance.components
+    index = {name: i for i, name in enumerate(problem.readings.channels)}
+    scale = np.asarray(
+        [components.noise_scale[index[n]] if n in index else 1.0 for n in readings.channels]
+    )
+    columns = run_effect_columns(fit.fitted(), readings)
+    return assemble_covariance(readings, columns, replace(components, noise_scale=scale))

@@ -1,4 +1,4 @@
-"""One analysis: gate, covariance, soil alone, search, and once more with what was learned."""
+"""The analysis: covariance, outliers, fit of the soil and search for effects, iterated."""
 
 from __future__ import annotations
 
@@ -9,134 +9,168 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.observations import Cells
-from soilml.gap.search.candidate_fits import Bench, coordinates
-from soilml.gap.search.stepwise import Found, search
-from soilml.gap.statistics.coordinates import soil_axis
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.search.stepwise import ResidualTest, SearchResult, search
+from soilml.gap.statistics.coordinates import soil_coordinate
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.outliers import MOST_OUTLIERS, outliers
+from soilml.gap.statistics.outliers import MAX_OUTLIER_FRACTION, outliers
 from soilml.gap.statistics.reml_covariance import (
-    SCATTER,
+    RUN_EFFECT_UNITS,
     Covariance,
-    Scatter,
-    assembled,
-    estimated,
-    scatter_columns,
+    VarianceComponents,
+    assemble_covariance,
+    estimate_covariance,
+    run_effect_columns,
 )
-from soilml.gap.statistics.signatures import Signature, signatures
-from soilml.gap.statistics.smooth_basis import smooth_columns
+from soilml.gap.statistics.score_test import ScoreTest
+from soilml.gap.statistics.signatures import Signature, effect_signatures
+from soilml.gap.statistics.smooth_basis import smooth_basis
 from soilml.identification.free_parameters import FreeParameter
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Passes of covariance, strays and search: each knows what the one before has found.
-PASSES = 3
+#: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
+MAX_PASSES = 3
+#: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
+SOIL_STARTS = (0.5, 0.25)
+#: Variance components have converged when noise scales differ by less than this fraction and the
+#: run-to-run standard deviations by less than this many units: weights of the readings then differ
+#: by less than their estimation error.
+SCALE_TOLERANCE, RUN_EFFECT_TOLERANCE = 0.2, 0.3
+#: Singular values below this fraction of the largest are ignored in the generalised least squares
+#: fit that smooths the noise: its columns are nearly collinear, and only their span matters.
+GLS_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """The bench that was used in the end, what was found on it, and what was set aside."""
+    """The final fit problem, the result of the search on it, and the excluded outliers.
 
-    bench: Bench
-    found: Found
-    strays: tuple[str, ...]
-    refused: str = ""
+    `error` says why the data could not be analysed; it is empty where they could.
+    """
+
+    problem: FitProblem
+    result: SearchResult
+    outliers: tuple[str, ...]
+    error: str = ""
 
 
-def analysed(
+def analyse(
     case: Case,
     free: Sequence[FreeParameter],
-    cells: Cells,
+    readings: StackedReadings,
     effects: Mapping[str, type[Effect]],
     calibration: Mapping[str, float],
     seed: int,
     place: Callable[[int], str],
 ) -> Analysis:
-    """Search the cells for what the soil alone does not explain.
+    """Search for the effects that explain what the soil alone does not.
 
-    `place` says where a row stands, for messages.
+    `place` gives the file and line of a row, for messages.
     """
-    axes = tuple(soil_axis(f) for f in free)
+    coordinates = tuple(soil_coordinate(f) for f in free)
+    problem = FitProblem(
+        case, coordinates, readings, _declared_covariance(readings), effects, calibration
+    )
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    starts = [nominal, np.full(len(free), 0.5), np.full(len(free), 0.25)]
-    plain = Scatter(np.ones(len(cells.channels)), 0.0, 0.0, 0.0, 1.0)
-    none = np.zeros((len(cells), 2))
-    bench = Bench(case, axes, cells, assembled(cells, none, plain), effects, calibration)
-    soil = bench.soil_only(starts)
-    if not np.isfinite(soil.prediction).all():
-        bad = int(cells.row[np.flatnonzero(~np.isfinite(soil.prediction))[0]])
-        return Analysis(
-            bench, _nothing(soil), (), f"the model cannot carry the load of {place(bad)}"
-        )
-    best, dropped = soil, []
-    found = _nothing(soil)
-    for _ in range(PASSES):
-        before = bench.covariance.scatter
-        bench, lost = _scattered(bench, best, cells, found.left.signatures)
-        dropped += [f"{name} at {place(row)}" for name, row in lost]
-        if len(dropped) > MOST_OUTLIERS * (len(cells) + len(dropped)):
-            text = f"{len(dropped)} readings stray from all others: look at the sensors first"
-            return Analysis(bench, _nothing(soil), (), text)
-        if found.causes and not lost and _alike(before, bench.covariance.scatter):
+    soil = problem.fit_soil([nominal, *(np.full(len(free), x) for x in SOIL_STARTS)])
+    result = _no_result(soil)
+    infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
+    if infeasible.size:
+        row = int(readings.row[infeasible[0]])
+        return Analysis(problem, result, (), f"the model cannot carry the load of {place(row)}")
+    best, excluded = soil, []
+    for _ in range(MAX_PASSES):
+        last = problem.covariance.components
+        signatures = result.final_test.signatures
+        problem, found = _reestimate_covariance(problem, best, readings, signatures)
+        excluded += [f"{name} at {place(row)}" for name, row in found]
+        if len(excluded) > MAX_OUTLIER_FRACTION * (len(readings) + len(excluded)):
+            error = f"{len(excluded)} readings are outliers: check the sensors first"
+            return Analysis(problem, _no_result(soil), (), error)
+        converged = not found and _have_converged(last, problem.covariance.components)
+        if result.accepted and converged:
             break
-        cells = bench.cells
-        soil = bench.soil_only([soil.x])
-        known = {c.names: coordinates(c.strict) for c in found.tried}
-        found = search(bench, soil, seed, known)
-        if not found.causes:
+        readings = problem.readings
+        soil = problem.fit_soil([soil.x])
+        starts = {c.names: c.catalogue_fit.start_values() for c in result.candidates}
+        result = search(problem, soil, seed, starts)
+        if not result.accepted:
             break
-        best = found.causes[0].fit
-    return Analysis(bench, found, tuple(dropped))
+        best = result.accepted[0].fit
+    return Analysis(problem, result, tuple(excluded))
 
 
-def _alike(one: Scatter, other: Scatter) -> bool:
-    """Whether two scatters would weigh the data alike."""
+def _declared_covariance(readings: StackedReadings) -> Covariance:
+    """The declared noise alone."""
+    components = VarianceComponents(np.ones(len(readings.channels)), 0.0, 0.0, 0.0, 1.0)
+    return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
+
+
+def _have_converged(last: VarianceComponents, new: VarianceComponents) -> bool:
+    """Whether two estimates of the variance components weight the readings nearly equally."""
+    angle = abs(last.friction_angle_std - new.friction_angle_std)
+    bearing = abs(last.bearing_std - new.bearing_std)
     return (
-        bool(np.all(np.abs(one.scale / other.scale - 1.0) < 0.2))
-        and one.memory == other.memory
-        and abs(one.friction_angle - other.friction_angle) < 0.3 * SCATTER["friction_angle"]
-        and abs(one.bearing - other.bearing) < 0.3 * SCATTER["bearing"]
+        bool(np.all(np.abs(last.noise_scale / new.noise_scale - 1.0) < SCALE_TOLERANCE))
+        and last.autocorrelation == new.autocorrelation
+        and angle < RUN_EFFECT_TOLERANCE * RUN_EFFECT_UNITS["friction_angle"]
+        and bearing < RUN_EFFECT_TOLERANCE * RUN_EFFECT_UNITS["bearing"]
     )
 
 
-def _scattered(
-    bench: Bench, fit: GapFit, cells: Cells, known: Sequence[Signature]
-) -> tuple[Bench, list[tuple[str, int]]]:
-    """The bench with noise and scatter as the misfits of a fit show them, strays left out."""
-    case, reading = fit.fitted(), cells.reading
-    if not known or len(known[0].column) != len(cells):
-        known, _ = signatures(case, cells, bench.others(fit))
-    raw = np.linalg.solve(bench.covariance.whiten, fit.slope)
-    space = np.column_stack([raw, *[s.column for s in known], smooth_columns(cells)])
-    residual = reading - fit.prediction
-    typical = Scatter(np.ones(len(cells.channels)), np.deg2rad(0.5), 0.05, 0.0, 1.0)
-    columns = scatter_columns(case, cells)
-    wide = assembled(cells, columns if len(cells.runs) > 1 else 0.0 * columns, typical)
-    explained = fit.prediction + _explained(wide, residual, space)
-    cells = cells.expecting(explained)
-    away = outliers(assembled(cells, columns, typical), residual, space)
-    lost = [
-        (column(cells.channels[cells.channel[i]]), int(cells.row[i])) for i in np.flatnonzero(away)
+def _reestimate_covariance(
+    problem: FitProblem,
+    fit: GapFit,
+    readings: StackedReadings,
+    signatures: Sequence[Signature],
+) -> tuple[FitProblem, list[tuple[str, int]]]:
+    """The problem with covariance estimated from a fit's residuals, outliers excluded.
+
+    The outliers are returned as (column, row).
+    """
+    case = fit.fitted()
+    if not signatures or len(signatures[0].column) != len(readings):
+        signatures, _ = effect_signatures(case, readings, problem.effects_not_in(fit))
+    jacobian = np.linalg.solve(problem.covariance.whiten, fit.jacobian)
+    space = np.column_stack([jacobian, *[s.column for s in signatures], smooth_basis(readings)])
+    residual = readings.reading - fit.prediction
+    columns = run_effect_columns(case, readings)
+
+    # noise that is a fraction of the reading is evaluated at a smoothed prediction
+    typical = VarianceComponents(
+        np.ones(len(readings.channels)),
+        RUN_EFFECT_UNITS["friction_angle"],
+        RUN_EFFECT_UNITS["bearing"],
+        0.0,
+        1.0,
+    )
+    several_runs = len(readings.runs) > 1
+    smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
+    readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
+
+    is_outlier = outliers(assemble_covariance(readings, columns, typical), residual, space)
+    excluded = [
+        (column(readings.channels[readings.channel[i]]), int(readings.row[i]))
+        for i in np.flatnonzero(is_outlier)
     ]
-    kept = ~away
-    cells = cells.keeping(kept)
-    covariance = estimated(cells, columns[kept], residual[kept], space[kept])
-    return replace(bench, cells=cells, covariance=covariance), lost
+    kept = ~is_outlier
+    readings = readings.subset(kept)
+    covariance = estimate_covariance(readings, columns[kept], residual[kept], space[kept])
+    return replace(problem, readings=readings, covariance=covariance), excluded
 
 
-def _explained(covariance: Covariance, residual: Floats, space: Floats) -> Floats:
-    """What the columns of a space explain of the residuals, by generalised least squares."""
+def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> Floats:
+    """Component of the residuals in a column space, by generalised least squares."""
     white = covariance.whiten @ space
-    weights = np.linalg.lstsq(white, covariance.whiten @ residual, rcond=1e-6)[0]
+    weights = np.linalg.lstsq(white, covariance.whiten @ residual, rcond=GLS_TOLERANCE)[0]
     return np.asarray(space @ weights)
 
 
-def _nothing(soil: GapFit) -> Found:
-    from soilml.gap.search.stepwise import Left
-    from soilml.gap.statistics.score_test import Scores
-
-    blank = Scores(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0))
-    left = Left((), (), blank, 1.0)
-    return Found(soil, left, (), (), left, {})
+def _no_result(soil: GapFit) -> SearchResult:
+    """The result before any search: no candidates, and a test without scores."""
+    no_test = ResidualTest((), ScoreTest(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0)))
+    return SearchResult(soil, no_test, (), (), no_test, {})

@@ -1,31 +1,35 @@
-"""What no name explains: a smooth remainder, labelled as such."""
+"""Smooth trend of the residuals that no effect of the catalogue explains."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from soilml.gap.search.candidate_fits import Bench
+from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.score_test import outside
-from soilml.gap.statistics.smooth_basis import smooth_columns
+from soilml.gap.statistics.smooth_basis import smooth_basis
+from soilml.numerics.subspaces import column_space, project_out
 from soilml.quantities import column
 
+#: Smooth functions of which less than this fraction is outside the span of the fit are dropped.
+MIN_RELATIVE_SINGULAR_VALUE = 1e-6
 
-def remainder(bench: Bench, fit: GapFit) -> dict[str, float]:
-    """Size of the smooth part of what a fit leaves, by channel, in sigma.
 
-    The part of the whitened residual that smooth functions of slip and load explain, orthogonal to
-    all that soil and named effects can move; beyond chance, so that noise alone gives about nil.
-    It says nothing outside the slips and loads that were driven.
+def residual_trend(problem: FitProblem, fit: GapFit) -> dict[str, float]:
+    """Root mean square of the smooth trend of a fit's residuals, by channel, in sigma.
+
+    The component of the whitened residual that smooth functions of slip and load explain and that
+    soil and named effects cannot. The expectation under noise alone is subtracted. The trend does
+    not extrapolate beyond the slips and loads of the data.
     """
-    cells, whiten = bench.cells, bench.covariance.whiten
-    smooth = smooth_columns(cells)
-    found = {}
-    for i, name in enumerate(cells.channels):
-        here = cells.channel == i
-        columns = outside(whiten @ np.where(here[:, None], smooth, 0.0), fit.slope)
-        u, s, _ = np.linalg.svd(columns, full_matrices=False)
-        basis = u[:, s > 1e-6 * max(float(s[0]), 1e-300)] if s.size else u
+    readings, whiten = problem.readings, problem.covariance.whiten
+    smooth = smooth_basis(readings)
+    trend = {}
+    for i, name in enumerate(readings.channels):
+        in_channel = readings.channel == i
+        own = whiten @ np.where(in_channel[:, None], smooth, 0.0)
+        basis = column_space(
+            project_out(own, fit.jacobian), relative_tolerance=MIN_RELATIVE_SINGULAR_VALUE
+        )
         power = float(np.sum((basis.T @ fit.residual) ** 2)) - basis.shape[1]
-        found[column(name)] = float(np.sqrt(max(power, 0.0) / max(int(here.sum()), 1)))
-    return found
+        trend[column(name)] = float(np.sqrt(max(power, 0.0) / max(int(in_channel.sum()), 1)))
+    return trend

@@ -1,4 +1,4 @@
-"""From what was found to what may be said."""
+"""The verdict: which status the search result supports, and the figures that go with it."""
 
 from __future__ import annotations
 
@@ -8,157 +8,169 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.results import NamedEffect, Shrink, Value, Where
-from soilml.gap.search.candidate_fits import Bench, Candidate
-from soilml.gap.search.stepwise import Found
+from soilml.gap.results import Discrepancy, EstimatedValue, GapReduction, NamedEffect
+from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.statistics.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.score_test import outside, scores
-from soilml.gap.statistics.signatures import signatures
-from soilml.gap.statistics.smooth_basis import places
+from soilml.gap.statistics.score_test import score_test
+from soilml.gap.statistics.signatures import effect_signatures
+from soilml.gap.statistics.smooth_basis import regions
+from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Squared prior spreads that the law of one effect, or those of several, may be bent by before
-#: they are other laws; several bent ones fit anything.
-STRAINED, STRAINED_SEVERAL = 4.0, 1.0
-#: Mean squared residual above which further bends of a law cannot be all that is missing.
-UNFIT = 2.0
-#: Share of the gap that may be left on runs that an explanation was not fitted to, where the gap
-#: stands out there.
-CARRIES, STANDS_OUT = 0.5, 2.0
+#: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
+#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
+#: several adjustable laws together fit almost any data.
+MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
+#: Mean squared whitened residual above which the deviation cannot be one of shape alone.
+MAX_MEAN_SQUARE = 2.0
+#: Fraction of the gap on held-out runs that may remain, where that gap is above the second figure.
+MAX_REMAINING_GAP, MIN_HELD_OUT_GAP = 0.5, 2.0
 
 
-def status_of(found: Found, unnameable: Sequence[str], runs: Shrink | None) -> str:
-    """What may be said, see `soilml.gap.results.STATUSES`.
+def decide_status(
+    result: SearchResult, naming_obstacles: Sequence[str], runs: GapReduction | None
+) -> str:
+    """The status of a report; see `soilml.gap.results.STATUSES`.
 
-    An explanation that leaves more than noise, that needs a law far from any known, or that does
-    not predict runs it was not fitted to, explains nothing.
+    A candidate is no explanation if its residuals are inconsistent with noise, if its law is far
+    from the catalogue's, or if it does not predict the held-out runs.
     """
-    if not found.gap:
+    if not result.has_gap:
         return "no-gap"
-    if unnameable:
+    if naming_obstacles:
         return "not-testable"
-    if not found.causes or not found.adequate:
+    if not result.accepted or not result.adequate:
         return "unknown"
-    best = found.causes[0]
-    bent = STRAINED if len(best.names) == 1 else STRAINED_SEVERAL
-    if best.strain > bent or float(np.mean(best.fit.residual**2)) > UNFIT:
+    best = result.accepted[0]
+    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
+    if best.shape_deviation > most or float(np.mean(best.fit.residual**2)) > MAX_MEAN_SQUARE:
         return "unknown"
-    carried = runs is None or runs.after - 1.0 <= CARRIES * (runs.before - 1.0)
-    if runs is not None and runs.before > STANDS_OUT and not carried:
+    predicts = runs is None or runs.after - 1.0 <= MAX_REMAINING_GAP * (runs.before - 1.0)
+    if runs is not None and runs.before > MIN_HELD_OUT_GAP and not predicts:
         return "unknown"
-    if len(found.causes) > 1:
+    if len(result.accepted) > 1:
         return "class"
-    return "form-open" if found.causes[0].open else "named"
+    return "form-open" if best.shape_supported else "named"
 
 
-def values_of(fit: GapFit, *, soil: bool) -> dict[str, Value]:
-    """The soil parameters of a fit, or those of its effects, by path."""
-    stds = fit.stds()
+def soil_estimates(fit: GapFit) -> dict[str, EstimatedValue]:
+    """The soil parameters of a fit, by name."""
+    values, stds = fit.values(), fit.stds()
     return {
-        axis.path: Value(value, stds[axis.path], axis.unit)
-        for axis, value in zip(fit.axes, fit.values().values(), strict=True)
-        if ("." not in axis.path) == soil
+        c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
+        for c in fit.coordinates
+        if isinstance(c, SoilCoordinate)
     }
 
 
-def named(causes: Sequence[Candidate], alike: Likeness) -> list[NamedEffect]:
-    """The effects of the best candidate, with what explains the data as well."""
-    if not causes:
+def effect_estimates(fit: GapFit, effect: str) -> dict[str, EstimatedValue]:
+    """The parameters of one effect of a fit, by name."""
+    values, stds = fit.values(), fit.stds()
+    return {
+        c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
+        for c in fit.coordinates
+        if isinstance(c, EffectCoordinate) and c.effect == effect
+    }
+
+
+def named_effects(
+    accepted: Sequence[CandidateFit], similarity: SignatureSimilarity
+) -> list[NamedEffect]:
+    """The effects of the best candidate, with the effects of the other accepted candidates."""
+    if not accepted:
         return []
-    chosen = causes[0]
-    fit = chosen.fit
-    parameters = values_of(fit, soil=False)
-    found = []
-    for name in chosen.names:
-        others = {n for c in causes[1:] for n in c.names} - set(chosen.names)
-        own = {
-            path.rpartition(".")[2]: value
-            for path, value in parameters.items()
-            if path.rpartition(".")[0] == name
-        }
-        snr, rival = alike.separation(name, _size(fit, name))
-        found.append(NamedEffect(name, own, tuple(sorted(others)), snr, rival))
-    return found
+    best = accepted[0]
+    alternatives = {n for c in accepted[1:] for n in c.names} - set(best.names)
+    effects = []
+    for name in best.names:
+        snr, rival = similarity.separation(name, _size(best.fit, name))
+        estimates = effect_estimates(best.fit, name)
+        effects.append(NamedEffect(name, estimates, tuple(sorted(alternatives)), snr, rival))
+    return effects
 
 
-def _size(fit: GapFit, name: str) -> float:
-    for axis, x in zip(fit.axes, fit.x, strict=True):
-        if axis.path.rpartition(".")[0] == name:
+def _size(fit: GapFit, effect: str) -> float:
+    """Size of an effect in reference sizes; its coordinate precedes those of its shape."""
+    for c, x in zip(fit.coordinates, fit.x, strict=True):
+        if isinstance(c, EffectCoordinate) and c.effect == effect:
             return float(x)
     return 0.0
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """Signatures of the catalogue on these runs, soil projected off: lengths (sigma), cosines."""
+class SignatureSimilarity:
+    """Norms (sigma) and cosines of the catalogue's signatures, with the soil projected out."""
 
     names: tuple[str, ...]
-    length: Floats  # (k,)
-    cosine: Floats  # (k, k), without the diagonal
+    norm: Floats  # (k,)
+    cosine: Floats  # (k, k), absolute, with a zero diagonal
 
     def separation(self, name: str, size: float) -> tuple[float, str]:
-        """Separating signal-to-noise of an effect at a size (reference sizes), nearest rival.
+        """Separating signal-to-noise ratio of an effect at a size, and its nearest rival.
 
-        Length of its projected signature times the sine to the nearest rival's, in sigma.
+        Norm of the effect's projected signature times the sine of the angle to the nearest
+        rival's, in sigma; `size` is in reference sizes.
         """
         if name not in self.names:
             return 0.0, ""
         i = self.names.index(name)
         rival = int(np.argmax(self.cosine[i]))
         sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
-        return abs(size) * float(self.length[i]) * sine, self.names[rival]
+        return abs(size) * float(self.norm[i]) * sine, self.names[rival]
 
-    def mimicry(self, chosen: Sequence[str]) -> float:
-        """Largest cosine between a chosen effect's signature and another's."""
-        mine = np.isin(self.names, chosen)
-        if not mine.any() or mine.all():
+    def largest_cosine(self, names: Sequence[str]) -> float:
+        """Largest cosine between the signature of one of these effects and that of another."""
+        chosen = np.isin(self.names, names)
+        if not chosen.any() or chosen.all():
             return 0.0
-        return float(self.cosine[mine][:, ~mine].max())
+        return float(self.cosine[chosen][:, ~chosen].max())
 
 
-def likeness(bench: Bench, fit: GapFit) -> Likeness:
-    """How alike the catalogue's effects look on the soil of a fit."""
-    soil = {path: v for path, v in fit.values().items() if "." not in path}
-    known, _ = signatures(bench.case.with_values(soil), bench.cells, bench.effects)
-    columns = bench.covariance.whiten @ np.stack([s.column for s in known], axis=1)
-    columns = outside(columns, fit.slope[:, : len(bench.soil)])
-    length = np.linalg.norm(columns, axis=0)
-    unit = columns / np.where(length > 0, length, 1.0)
+def signature_similarity(problem: FitProblem, fit: GapFit) -> SignatureSimilarity:
+    """Similarity of the catalogue's signatures, computed on the soil of a fit."""
+    values = fit.values()
+    soil = {c.path: values[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
+    case = problem.case.with_values(soil)
+    signatures, _ = effect_signatures(case, problem.readings, problem.effects)
+    columns = problem.covariance.whiten @ np.stack([s.column for s in signatures], axis=1)
+    columns = project_out(columns, fit.jacobian[:, : len(problem.soil)])
+    norm = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(norm > 0, norm, 1.0)
     cosine = np.abs(unit.T @ unit)
     np.fill_diagonal(cosine, 0.0)
-    return Likeness(tuple(s.name for s in known), length, cosine)
+    return SignatureSimilarity(tuple(s.name for s in signatures), norm, cosine)
 
 
-def map_of(bench: Bench, fit: GapFit, seed: int) -> list[Where]:
-    """Where the soil alone disagrees with the data, the worst corner first.
+def discrepancy_map(problem: FitProblem, fit: GapFit, seed: int) -> list[Discrepancy]:
+    """Score of each region of the data against the fit of the soil alone, the largest first.
 
-    The score is above zero where readings lie above the prediction.
+    The score is positive where the mean reading is above the prediction.
     """
-    corners = list(places(bench.cells))
-    if not corners:
+    parts = list(regions(problem.readings))
+    if not parts:
         return []
-    std = bench.covariance.std
-    columns = np.stack([np.where(c.cells, std, 0.0) for c in corners], axis=1)
-    found = scores(
+    std = problem.covariance.std
+    columns = np.stack([np.where(r.selected, std, 0.0) for r in parts], axis=1)
+    test = score_test(
         fit.residual,
-        bench.covariance.whiten @ columns,
-        fit.slope,
-        np.zeros(len(corners)),
-        bench.covariance.scatter.freedom,
+        problem.covariance.whiten @ columns,
+        fit.jacobian,
+        np.zeros(len(parts)),
+        problem.covariance.components.degrees_of_freedom,
         seed,
     )
-    order = np.argsort(-found.z)
-    off = bench.cells.reading - fit.prediction
-    side = [float(np.mean(off[c.cells] / std[c.cells])) for c in corners]
-    return [
-        Where(
-            column(c.channel),
-            c.slip,
-            c.load,
-            float(np.copysign(found.z[i], side[i])),
-            found.p(float(found.z[i])),
+    standardised = (problem.readings.reading - fit.prediction) / std
+    found = []
+    for i in np.argsort(-test.z):
+        region, z = parts[i], float(test.z[i])
+        side = float(np.mean(standardised[region.selected]))
+        signed = float(np.copysign(z, side))
+        found.append(
+            Discrepancy(column(region.channel), region.slip, region.load, signed, test.p_value(z))
         )
-        for i, c in ((i, corners[i]) for i in order)
-    ]
+    return found

@@ -1,7 +1,8 @@
-"""Predictions of a growing model: soil parameters and effect sizes as one vector."""
+"""Coordinates of a fit: soil parameters, effect sizes and effect shapes in one vector."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.observations import Cells
+from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.identification.free_parameters import FreeParameter
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
@@ -17,84 +18,135 @@ from soilml.physics.effects.base import Effect
 
 Floats = NDArray[np.float64]
 
-#: Step of differences: a share of a soil parameter's prior, or of an effect's reference size.
-STEP = 1e-5
-#: Prior spread of an effect's two shape coefficients, in their own units.
+#: Step of the difference quotients, in units of the coordinate: a fraction of a soil parameter's
+#: prior range, or of an effect's reference size.
+DIFFERENCE_STEP = 1e-5
+#: Prior standard deviations of an effect's two shape coefficients, in their own units.
 SHAPE_STD = {"by_slip": 3.0, "by_load": 1.0}
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One coordinate of a fit: a parameter's path and how the coordinate x maps to its value.
+class FitCoordinate(ABC):
+    """One coordinate x of a fit: its bounds, and how it maps to the value of a parameter.
 
-    A soil parameter's x is its fraction of the prior; an effect's is its size in reference sizes.
-    `std` is the spread of a Gaussian prior of x about zero, infinite where there is none.
+    `name` is the parameter's name within its soil or effect. `prior` maps x to the value. `std`
+    is the standard deviation of a Gaussian prior of x with mean zero, infinite where there is none.
     """
 
-    path: str
+    name: str
     unit: str
     lower: float
     upper: float
     prior: Prior
     std: float = float("inf")
 
+    @property
+    @abstractmethod
+    def path(self) -> str:
+        """Path of the parameter in the case."""
+
     def value(self, x: Floats) -> Floats:
-        """The parameter's values at coordinates x."""
+        """Values of the parameter at coordinates x."""
         return self.prior.at(x)
 
     def rate(self, x: float) -> float:
-        """Derivative of the value."""
+        """Derivative of the value with respect to x."""
         return float(self.prior.rate(np.asarray([x]))[0])
 
 
-def soil_axis(free: FreeParameter) -> Axis:
-    """The coordinate of a soil parameter."""
-    return Axis(free.path, free.unit, 0.0, 1.0, free.prior)
+@dataclass(frozen=True)
+class SoilCoordinate(FitCoordinate):
+    """A soil parameter: x is its cumulative probability under the prior, from 0 to 1."""
+
+    @property
+    def path(self) -> str:
+        """Path of the parameter in the case: its name."""
+        return self.name
 
 
-def size_axis(effect: type[Effect], calibration: float | None) -> Axis:
-    """The coordinate of an effect's size."""
+@dataclass(frozen=True, kw_only=True)
+class EffectCoordinate(FitCoordinate):
+    """The size of an effect, x being in reference sizes, or one of its shape coefficients."""
+
+    effect: str
+    is_shape: bool = False
+
+    @property
+    def path(self) -> str:
+        """Path of the parameter in the case: effect.parameter."""
+        return f"{self.effect}.{self.name}"
+
+
+def soil_coordinate(free: FreeParameter) -> SoilCoordinate:
+    """The coordinate of a free soil parameter."""
+    return SoilCoordinate(free.path, free.unit, 0.0, 1.0, free.prior)
+
+
+def size_coordinate(effect: type[Effect], calibration: float | None) -> EffectCoordinate:
+    """The coordinate of an effect's size.
+
+    `calibration` is the prior standard deviation of the size in its own unit; None: no prior.
+    """
     size = effect.about.size
     parameter = declared(effect)[size]
     unit = effect.about.reference[size]
     lower, upper = sorted((parameter.lower / unit, parameter.upper / unit))
-    return Axis(
-        f"{effect.name}.{size}",
+    return EffectCoordinate(
+        size,
         parameter.unit,
         lower,
         upper,
         Prior(0.0, unit),
         float("inf") if calibration is None else calibration / abs(unit),
+        effect=effect.name,
     )
 
 
-def shape_axes(effect: type[Effect]) -> list[Axis]:
-    """The coordinates of an effect's shape, none where its law is certain."""
-    found = []
+def shape_coordinates(effect: type[Effect]) -> list[EffectCoordinate]:
+    """The coordinates of an effect's shape coefficients; none where its law has no uncertainty."""
+    coordinates = []
     for name, std in SHAPE_STD.items():
         if name in declared(effect):
-            parameter = declared(effect)[name]
-            path = f"{effect.name}.{name}"
-            bound = min(parameter.upper, 4.0 * std)
-            found.append(Axis(path, "1", -bound, bound, Prior(0.0, 1.0), std))
-    return found
+            bound = min(declared(effect)[name].upper, 4.0 * std)
+            coordinates.append(
+                EffectCoordinate(
+                    name,
+                    "1",
+                    -bound,
+                    bound,
+                    Prior(0.0, 1.0),
+                    std,
+                    effect=effect.name,
+                    is_shape=True,
+                )
+            )
+    return coordinates
 
 
-def predicted(case: Case, axes: Sequence[Axis], x: Floats, cells: Cells) -> Floats:
+def predict_readings(
+    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
+) -> Floats:
     """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
-    values = {axis.path: axis.value(x[:, i])[:, None] for i, axis in enumerate(axes)}
+    values = {c.path: c.value(x[:, i])[:, None] for i, c in enumerate(coordinates)}
     changed = case.with_values(values) if values else case
-    force = changed.model(changed.soil, cells.at)
-    shape = (len(x), len(cells.run))
-    return cells.of({name: np.broadcast_to(getattr(force, name), shape) for name in cells.channels})
+    force = changed.model(changed.soil, readings.at)
+    shape = (len(x), len(readings.run))
+    return readings.stack(
+        {name: np.broadcast_to(getattr(force, name), shape) for name in readings.channels}
+    )
 
 
-def linearised(case: Case, axes: Sequence[Axis], x: Floats, cells: Cells) -> tuple[Floats, Floats]:
-    """Predictions (m,) at `x` (p,) and their derivatives (m, p), from one call of the model."""
-    p = len(axes)
-    upper = np.asarray([axis.upper for axis in axes])
-    step = np.where(x + STEP <= upper, STEP, -STEP)
+def linearise(
+    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
+) -> tuple[Floats, Floats]:
+    """Predictions (m,) at `x` (p,) and their Jacobian (m, p), from one call of the model.
+
+    One-sided differences; the step points downwards for a coordinate at its upper bound.
+    """
+    p = len(coordinates)
+    upper = np.asarray([coordinate.upper for coordinate in coordinates])
+    step = np.where(x + DIFFERENCE_STEP <= upper, DIFFERENCE_STEP, -DIFFERENCE_STEP)
     sets = np.tile(x, (p + 1, 1))
     sets[np.arange(p), np.arange(p)] += step
-    y = predicted(case, axes, sets, cells)
+    y = predict_readings(case, coordinates, sets, readings)
     return y[-1], np.asarray(((y[:-1] - y[-1]) / step[:, None]).T)

@@ -9,122 +9,161 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.observations import Cells
-from soilml.gap.statistics.coordinates import Axis, linearised, predicted
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.coordinates import (
+    FitCoordinate,
+    SoilCoordinate,
+    linearise,
+    predict_readings,
+)
 
 Floats = NDArray[np.float64]
 
-ROUNDS = 25
-#: Whitened residual of a reading for which a trial has no equilibrium.
-NO_ANSWER = 1e2
-#: A descent ends when a step lowers the objective by less than this, or by less than this share.
+#: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
+MAX_ITERATIONS = 25
+#: Whitened residual assigned to a reading where a trial has no equilibrium: large enough that the
+#: trial is rejected, finite so that trials can still be compared.
+INFEASIBLE_RESIDUAL = 1e2
+#: A descent has converged when a step lowers the objective by less than `ENOUGH` (far below the
+#: thresholds on differences of the objective, which start at 9) or by less than the fraction
+#: `SHARE` of its excess over the number of readings (while the model is far from the data).
 ENOUGH, SHARE = 0.01, 2e-3
+#: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
+#: factor after an iteration without improvement, and the bounds.
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.01, 1.0, 100.0), 1e3
+MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
+#: Precision of a fraction of the prior: a uniform distribution from 0 to 1 has variance 1/12.
+UNIFORM_PRECISION = 12.0
 
 
 @dataclass(frozen=True)
 class GapFit:
-    """An optimum: coordinates, whitened residuals and derivatives there, and the objective.
+    """An optimum of generalised least squares: coordinates, residuals, Jacobian and objective.
 
-    `cost` is the sum of squared whitened residuals and of squared coordinates over their prior
-    spread; `converged` says whether the descent came to rest.
+    `objective` is the sum of squared whitened residuals plus the sum of squared coordinates over
+    their prior variances; `converged` is false where the iteration limit was reached.
     """
 
     case: Case
-    axes: tuple[Axis, ...]
+    coordinates: tuple[FitCoordinate, ...]
     x: Floats  # (p,)
     prediction: Floats  # (m,)
     residual: Floats  # (m,) whitened
-    slope: Floats  # (m, p) whitened
-    cost: float
+    jacobian: Floats  # (m, p) whitened
+    objective: float
     converged: bool
 
     @property
     def precision(self) -> Floats:
-        """Gaussian prior's precision of each coordinate, (p,)."""
-        return np.asarray([axis.std**-2 for axis in self.axes])
+        """Precision of the Gaussian prior of each coordinate, (p,)."""
+        return np.asarray([c.std**-2 for c in self.coordinates])
 
     @property
     def covariance(self) -> Floats:
-        """Covariance of the coordinates, linearised, (p, p)."""
-        flat = np.asarray(
-            [12.0 if np.isinf(a.std) and "." not in a.path else 0.0 for a in self.axes]
+        """Linearised posterior covariance of the coordinates, (p, p).
+
+        A soil coordinate is uniform a priori; its precision enters as that of a Gaussian.
+        """
+        uniform = np.asarray(
+            [
+                UNIFORM_PRECISION if np.isinf(c.std) and isinstance(c, SoilCoordinate) else 0.0
+                for c in self.coordinates
+            ]
         )
         return np.asarray(
-            np.linalg.pinv(self.slope.T @ self.slope + np.diag(self.precision + flat))
+            np.linalg.pinv(self.jacobian.T @ self.jacobian + np.diag(self.precision + uniform))
         )
 
     def values(self) -> dict[str, float]:
-        """The parameters at the optimum, by path."""
+        """Parameters at the optimum, by path."""
         return {
-            axis.path: float(axis.value(self.x[i : i + 1])[0]) for i, axis in enumerate(self.axes)
+            c.path: float(c.value(self.x[i : i + 1])[0]) for i, c in enumerate(self.coordinates)
         }
 
     def stds(self) -> dict[str, float]:
         """Standard deviations of the parameters, by path."""
-        spread = np.sqrt(np.diag(self.covariance))
+        std = np.sqrt(np.diag(self.covariance))
         return {
-            axis.path: float(spread[i] * abs(axis.rate(float(self.x[i]))))
-            for i, axis in enumerate(self.axes)
+            c.path: float(std[i] * abs(c.rate(float(self.x[i]))))
+            for i, c in enumerate(self.coordinates)
         }
+
+    def start_values(self) -> dict[str, float]:
+        """Coordinates by path, for another fit to start from."""
+        return {c.path: float(x) for c, x in zip(self.coordinates, self.x, strict=True)}
 
     def fitted(self) -> Case:
         """The case with the parameters of the optimum."""
         return self.case.with_values(self.values())
 
 
-def descend(
-    case: Case, axes: Sequence[Axis], cells: Cells, whiten: Floats, start: Floats
+def levenberg_marquardt(
+    case: Case,
+    coordinates: Sequence[FitCoordinate],
+    readings: StackedReadings,
+    whiten: Floats,
+    start: Floats,
 ) -> GapFit:
-    r"""Levenberg-Marquardt with bounds, from one start.
+    r"""Bounded Levenberg-Marquardt descent from one start.
 
     .. math:: \min_x \|L^{-1} (y - f(x))\|^2 + \sum_k (x_k / \sigma_k)^2
 
-    `whiten` (m, m) is the inverse of the covariance's Cholesky factor L. References: Nocedal and
-    Wright, Numerical Optimization, 2006, section 10.3.
+    Parameters
+    ----------
+    whiten : array (m, m)
+        Inverse of the Cholesky factor L of the covariance of the readings.
+    start : array (p,)
+        First coordinates; clipped to the bounds.
+
+    References
+    ----------
+    Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
-    lower = np.asarray([axis.lower for axis in axes])
-    upper = np.asarray([axis.upper for axis in axes])
-    weight = np.asarray([1.0 / axis.std for axis in axes])
+    lower = np.asarray([c.lower for c in coordinates])
+    upper = np.asarray([c.upper for c in coordinates])
+    weight = np.asarray([1.0 / c.std for c in coordinates])
 
-    def objective(off: Floats, x: Floats) -> Floats:
-        return np.asarray((off**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
+    def objective_of(residual: Floats, x: Floats) -> Floats:
+        return np.asarray((residual**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
 
-    def residuals(y: Floats) -> Floats:
-        white = (cells.reading - y) @ whiten.T
-        return np.where(np.isfinite(white), white, NO_ANSWER)
+    def whitened_residual(y: Floats) -> Floats:
+        white = (readings.reading - y) @ whiten.T
+        return np.where(np.isfinite(white), white, INFEASIBLE_RESIDUAL)
 
     x = np.clip(start, lower, upper)
-    y, slope = linearised(case, axes, x, cells)
-    off, steep = residuals(y), whiten @ np.nan_to_num(slope)
-    cost, damping, converged = float(objective(off, x)), 1e-3, False
-    for _ in range(ROUNDS):
-        gradient = steep.T @ off - weight**2 * x
-        held = ((x <= lower) & (gradient < 0)) | ((x >= upper) & (gradient > 0))
-        if held.all():
+    y, derivatives = linearise(case, coordinates, x, readings)
+    residual, jacobian = whitened_residual(y), whiten @ np.nan_to_num(derivatives)
+    objective, damping, converged = float(objective_of(residual, x)), FIRST_DAMPING, False
+    for _ in range(MAX_ITERATIONS):
+        descent = jacobian.T @ residual - weight**2 * x  # half the negative gradient
+        at_bound = ((x <= lower) & (descent < 0)) | ((x >= upper) & (descent > 0))
+        if at_bound.all():
             converged = True
             break
-        free = ~held
-        normal = steep[:, free].T @ steep[:, free] + np.diag(weight[free] ** 2)
+        free = ~at_bound
+        normal = jacobian[:, free].T @ jacobian[:, free] + np.diag(weight[free] ** 2)
         scale = np.diag(np.diag(normal) + 1e-9)
-        dampings = damping * np.asarray([0.01, 1.0, 100.0])
+        dampings = damping * np.asarray(DAMPING_FACTORS)
         trials = np.tile(x, (len(dampings), 1))
         for i, d in enumerate(dampings):
-            trials[i, free] += np.linalg.solve(normal + d * scale, gradient[free])
+            trials[i, free] += np.linalg.solve(normal + d * scale, descent[free])
         trials = np.clip(trials, lower, upper)
-        costs = objective(residuals(predicted(case, axes, trials, cells)), trials)
-        best = int(np.argmin(costs))
-        gained = cost - float(costs[best])
-        if gained <= 0.0:
-            # a step of no length that does not help is an optimum; a long one asks for more damping
+        predictions = predict_readings(case, coordinates, trials, readings)
+        objectives = objective_of(whitened_residual(predictions), trials)
+        best = int(np.argmin(objectives))
+        improvement = objective - float(objectives[best])
+        if improvement <= 0.0:
+            # if the most damped, shortest step is negligible this is an optimum; else damp more
             converged = float(np.abs(trials[-1] - x).max()) < 1e-3
-            damping *= 1e3
-            if converged or damping > 1e9:
+            damping *= DAMPING_INCREASE
+            if converged or damping > MAX_DAMPING:
                 break
             continue
-        x, cost, damping = trials[best], float(costs[best]), max(float(dampings[best]), 1e-9)
-        y, slope = linearised(case, axes, x, cells)
-        off, steep = residuals(y), whiten @ np.nan_to_num(slope)
-        if gained < max(ENOUGH, SHARE * (cost - len(cells))):
+        x, objective = trials[best], float(objectives[best])
+        damping = max(float(dampings[best]), MIN_DAMPING)
+        y, derivatives = linearise(case, coordinates, x, readings)
+        residual, jacobian = whitened_residual(y), whiten @ np.nan_to_num(derivatives)
+        if improvement < max(ENOUGH, SHARE * (objective - len(readings))):
             converged = True
             break
-    return GapFit(case, tuple(axes), x, y, off, steep, cost, converged)
+    return GapFit(case, tuple(coordinates), x, y, residual, jacobian, objective, converged)

@@ -1,213 +1,270 @@
-"""How readings scatter: noise, soil that differs from run to run, samples that remember."""
+"""Covariance of the readings by restricted maximum likelihood.
+
+Three sources of variation: sensor noise, soil parameters that differ from run to run, and
+autocorrelation of neighbouring samples of a run.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.observations import Cells
-from soilml.gap.statistics.coordinates import Axis, linearised
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.coordinates import SoilCoordinate, linearise
 from soilml.numerics.prior import Prior
+from soilml.numerics.subspaces import column_space
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 
 Floats = NDArray[np.float64]
 
-#: One unit of run-to-run scatter: half a degree of friction angle, 5 % of the bearing moduli.
-SCATTER = {"friction_angle": np.deg2rad(0.5), "bearing": 0.05}
-#: Spread of the prior of scatter, in those units, and of the log of the noise's scale.
-USUAL_SCATTER, USUAL_SCALE = 1.0, 0.3
-#: With fewer runs than this scatter cannot be measured; this much of it is taken for granted then.
-FEW_RUNS, GRANTED = 6, 0.8
-#: Correlations of neighbouring samples, and scales of scatter, that are tried.
-MEMORY = (0.25, 0.5, 0.7, 0.85, 0.95)
-TIMES = (0.0, 0.25, 0.5, 0.8, 1.2, 1.8, 3.0, 5.0)
+#: One unit of run-to-run variation: half a degree of friction angle, 5 % of the bearing moduli.
+RUN_EFFECT_UNITS = {"friction_angle": np.deg2rad(0.5), "bearing": 0.05}
+#: Prior standard deviations of the run-to-run variation, in those units, and of the logarithm of a
+#: channel's noise scale.
+RUN_EFFECT_PRIOR_STD, LOG_NOISE_SCALE_PRIOR_STD = 1.0, 0.3
+#: With fewer runs than this the run-to-run variation cannot be estimated; it is then assumed to be
+#: at least this many units.
+FEW_RUNS, MIN_RUN_EFFECT = 6, 0.8
+#: Values of the run-to-run standard deviations that are tried, in units: none, then steps of about
+#: a factor 1.5, which change the objective by about 1 near its minimum; 5 units are 2.5 deg.
+RUN_EFFECT_GRID = (0.0, 0.25, 0.5, 0.8, 1.2, 1.8, 3.0, 5.0)
+#: Factors by which a channel's noise scale is multiplied in each step of the search. The uneven
+#: spacing lets two sweeps reach scales between 1 and 3 without returning to the same values.
+#: Scales below 1 are excluded: the declared noise is a lower bound.
+NOISE_SCALE_FACTORS = (0.93, 1.0, 1.15, 1.32, 1.75)
+#: Sweeps of the coordinate search; the covariance is estimated again after each search for effects.
+SWEEPS = 2
+#: Correlations of neighbouring samples that are tried: correlation lengths of 0.7, 1.4, 2.8, 6 and
+#: 20 samples, which a run of usual length can distinguish.
+AUTOCORRELATION_GRID = (0.25, 0.5, 0.7, 0.85, 0.95)
+#: An autocorrelation is accepted if it lowers the objective, -2 log posterior, by this much: the
+#: penalty of Akaike's criterion for one parameter.
+AUTOCORRELATION_PENALTY = 2.0
+#: Pairs of neighbouring samples, and standard deviations above its expectation of the sum of their
+#: products, from which an autocorrelation is estimated at all.
+MIN_PAIRS, AUTOCORRELATION_SIGMA = 8, 2.0
+#: Directions of the fixed effects whose whitened singular value is below these, relative to the
+#: largest and in standard deviations, are too weak to absorb noise and cost no degree of freedom.
+FIXED_EFFECT_TOLERANCES = {"relative_tolerance": 1e-3, "absolute_tolerance": 0.3}
 
 
 @dataclass(frozen=True)
-class Scatter:
-    """What was found of the scatter: scale of each channel's noise, run-to-run soil, memory."""
+class VarianceComponents:
+    """Estimated noise scales, run-to-run standard deviations and autocorrelation."""
 
-    scale: Floats  # (channels,) of the declared noise
-    friction_angle: float  # rad, from run to run
-    bearing: float  # share, from run to run
-    memory: float  # correlation of neighbouring samples of a run
-    freedom: float  # degrees of freedom that the noise was estimated from
+    noise_scale: Floats  # (channels,) factor on the declared noise
+    friction_angle_std: float  # rad, from run to run
+    bearing_std: float  # relative, from run to run
+    autocorrelation: float  # correlation of neighbouring samples of a run
+    degrees_of_freedom: float  # from which the noise was estimated
 
 
 @dataclass(frozen=True)
 class Covariance:
-    """The covariance of all cells, (m, m), and the inverse of its Cholesky factor."""
+    """The covariance of all readings, (m, m), and the inverse of its Cholesky factor."""
 
     matrix: Floats
     whiten: Floats
-    scatter: Scatter
+    components: VarianceComponents
 
     @property
     def std(self) -> Floats:
-        """Standard deviation of each cell, (m,)."""
+        """Standard deviation of each reading, (m,)."""
         return np.asarray(np.sqrt(np.diag(self.matrix)))
 
 
-def scatter_columns(case: Case, cells: Cells) -> Floats:
-    """Change of each cell, (m, 2), by one unit of scatter of friction angle and of bearing."""
-    angle = declared(Soil)["friction_angle"]
-    phi = float(case.soil.friction_angle)
-    axis = Axis(
+def run_effect_columns(case: Case, readings: StackedReadings) -> Floats:
+    """Change of each reading by one unit of run-to-run variation, (m, 2).
+
+    The columns are those of friction angle and of the bearing moduli, which scale together.
+    """
+    bounds = declared(Soil)["friction_angle"]
+    phi, unit = float(case.soil.friction_angle), RUN_EFFECT_UNITS["friction_angle"]
+    angle = SoilCoordinate(
         "friction_angle",
         "rad",
-        (angle.lower - phi) / SCATTER["friction_angle"],
-        (angle.upper - phi) / SCATTER["friction_angle"],
-        Prior(phi, phi + SCATTER["friction_angle"]),
+        (bounds.lower - phi) / unit,
+        (bounds.upper - phi) / unit,
+        Prior(phi, phi + unit),
     )
-    by_angle = linearised(case, [axis], np.zeros(1), cells)[1][:, 0]
-    sides = []
+    by_angle = linearise(case, [angle], np.zeros(1), readings)[1][:, 0]
+    step, sides = 1e-4, []  # central difference in the logarithm of the moduli
     for sign in (1.0, -1.0):
-        stiffer = {k: float(getattr(case.soil, k)) * (1.0 + sign * 1e-4) for k in ("kc", "kphi")}
-        sides.append(linearised(case.with_values(stiffer), [], np.zeros(0), cells)[0])
-    by_bearing = (sides[0] - sides[1]) / 2e-4 * SCATTER["bearing"]
+        moduli = {k: float(getattr(case.soil, k)) * (1.0 + sign * step) for k in ("kc", "kphi")}
+        sides.append(linearise(case.with_values(moduli), [], np.zeros(0), readings)[0])
+    by_bearing = (sides[0] - sides[1]) / (2.0 * step) * RUN_EFFECT_UNITS["bearing"]
     return np.asarray(np.nan_to_num(np.stack([by_angle, by_bearing], axis=1)))
 
 
-def assembled(cells: Cells, columns: Floats, scatter: Scatter) -> Covariance:
-    """The covariance that a scatter makes of the cells' declared noise."""
-    std = cells.std * scatter.scale[cells.channel]
-    matrix = np.outer(std, std) * _remembering(cells, scatter.memory)
-    sizes = np.asarray(
+def assemble_covariance(
+    readings: StackedReadings, columns: Floats, components: VarianceComponents
+) -> Covariance:
+    """The covariance of readings with their declared noise under given variance components."""
+    std = readings.std * components.noise_scale[readings.channel]
+    matrix = np.outer(std, std) * _noise_correlation(readings, components.autocorrelation)
+    run_effects = np.asarray(
         [
-            scatter.friction_angle / SCATTER["friction_angle"],
-            scatter.bearing / SCATTER["bearing"],
+            components.friction_angle_std / RUN_EFFECT_UNITS["friction_angle"],
+            components.bearing_std / RUN_EFFECT_UNITS["bearing"],
         ]
     )
-    matrix += _same_run(cells) * ((columns * sizes**2) @ columns.T)
-    return Covariance(matrix, np.linalg.inv(np.linalg.cholesky(matrix)), scatter)
+    matrix += _same_run_indicator(readings) * ((columns * run_effects**2) @ columns.T)
+    return Covariance(matrix, np.linalg.inv(np.linalg.cholesky(matrix)), components)
 
 
-def _memory_seen(cells: Cells, residual: Floats, basis: Floats) -> bool:
-    """Whether neighbouring samples of a run are more alike than chance lets them be."""
-    white, q = residual / cells.std, np.linalg.qr(basis / cells.std[:, None])[0]
-    left = white - q @ (q.T @ white)
-    run = cells.run[cells.row]
-    place = cells.order[cells.row]
-    key = np.lexsort((place, cells.channel, run))
-    follows = (np.diff(run[key]) == 0) & (np.diff(cells.channel[key]) == 0)
-    follows &= np.diff(place[key]) == 1
-    pairs = left[key][:-1][follows] * left[key][1:][follows]
-    if pairs.size < 8:
-        return False
-    # what fitting takes out of the residuals makes neighbours unlike: allow for it
-    expected = -float(np.sum((q @ q.T)[key[:-1][follows], key[1:][follows]]))
-    spread = float(np.mean(left**2)) * np.sqrt(pairs.size)
-    return bool(pairs.sum() - expected * float(np.mean(left**2)) > 2.0 * spread)
-
-
-def _same_run(cells: Cells) -> Floats:
-    run = cells.run[cells.row]
-    return np.asarray(run[:, None] == run, dtype=np.float64)
-
-
-def _remembering(cells: Cells, memory: float) -> Floats:
-    """Correlation of the noise of cells: neighbours of one channel in one run share it."""
-    if memory == 0.0:
-        return np.eye(len(cells))
-    alike = _same_run(cells) * (cells.channel[:, None] == cells.channel)
-    place = cells.order[cells.row].astype(np.float64)
-    apart = np.abs(place[:, None] - place)
-    return np.asarray(alike * memory**apart)
-
-
-def estimated(cells: Cells, columns: Floats, residual: Floats, space: Floats) -> Covariance:
-    r"""Restricted maximum likelihood of the scatter, with weak priors.
+def estimate_covariance(
+    readings: StackedReadings, columns: Floats, residual: Floats, space: Floats
+) -> Covariance:
+    r"""Estimate the variance components by restricted maximum likelihood with weak priors.
 
     .. math::
         -2 \ln p = \ln|V| + \ln|X^T V^{-1} X| + r^T P r + \text{prior}, \quad
         V = D_\rho + \sum_k \tau_k^2 J_k J_k^T
 
-    `residual` (m,) are the misfits of any fit, `space` (m, q) all that soil, effects and smooth
-    shapes could explain; only what is left of them speaks of noise. References: Patterson and
-    Thompson, Biometrika 58, 1971.
+    Parameters
+    ----------
+    columns : array (m, 2)
+        J, from `run_effect_columns`.
+    residual : array (m,)
+        r, the residuals of any fit.
+    space : array (m, q)
+        X, all that soil, effects and smooth functions could explain: the fixed effects. Only the
+        component of the residuals outside its span contributes to the estimate.
+
+    References
+    ----------
+    Patterson and Thompson, Biometrika 58, 1971.
     """
-    several = len(cells.runs) > 1
-    basis = _basis(space / cells.std[:, None]) * cells.std[:, None]
-    times: tuple[float, ...] = TIMES if several else (0.0,)
-    if several and len(cells.runs) < FEW_RUNS:
-        times = tuple(t for t in TIMES if t >= GRANTED)
-    independent = np.eye(len(cells))
-    best, lowest = _climb(cells, columns, residual, basis, independent, 0.0, times)
-    if _memory_seen(cells, residual, basis):
-        for memory in MEMORY:
-            noise = _remembering(cells, memory)
-            found, value = _climb(cells, columns, residual, basis, noise, memory, times)
-            if value < lowest - 2.0:  # memory must earn its place
-                best, lowest = found, value
-    freedom = max(float(len(cells) - basis.shape[1]), 2.0)
-    best = Scatter(best.scale, best.friction_angle, best.bearing, best.memory, freedom)
-    return assembled(cells, columns, best)
+    whitened = space / readings.std[:, None]
+    basis = column_space(whitened, **FIXED_EFFECT_TOLERANCES) * readings.std[:, None]
+    grid = _run_effect_grid(len(readings.runs))
+    likelihood = _RestrictedLikelihood(readings, columns, residual, basis)
+    best, lowest = _coordinate_search(likelihood, np.eye(len(readings)), 0.0, grid)
+    if _is_autocorrelated(readings, residual, basis):
+        for autocorrelation in AUTOCORRELATION_GRID:
+            noise = _noise_correlation(readings, autocorrelation)
+            components, value = _coordinate_search(likelihood, noise, autocorrelation, grid)
+            if value < lowest - AUTOCORRELATION_PENALTY:
+                best, lowest = components, value
+    degrees_of_freedom = max(float(len(readings) - basis.shape[1]), 2.0)
+    best = replace(best, degrees_of_freedom=degrees_of_freedom)
+    return assemble_covariance(readings, columns, best)
 
 
-def _climb(
-    cells: Cells,
-    columns: Floats,
-    residual: Floats,
-    basis: Floats,
-    noise: Floats,
-    memory: float,
-    times: tuple[float, ...],
-) -> tuple[Scatter, float]:
-    """Coordinate search over the scales, at one memory."""
-    same = _same_run(cells)
-    channels = len(cells.channels)
-    scale, tau = np.ones(channels), np.full(2, times[0])
+def _run_effect_grid(runs: int) -> tuple[float, ...]:
+    """Run-to-run standard deviations to try: none for one run, assumed ones for few runs."""
+    if runs < 2:
+        return (0.0,)
+    if runs < FEW_RUNS:
+        return tuple(t for t in RUN_EFFECT_GRID if t >= MIN_RUN_EFFECT)
+    return RUN_EFFECT_GRID
 
-    def objective(scale: Floats, tau: Floats) -> float:
-        std = cells.std * scale[cells.channel]
-        matrix = np.outer(std, std) * noise + same * ((columns * tau**2) @ columns.T)
+
+@dataclass(frozen=True)
+class _RestrictedLikelihood:
+    """The restricted likelihood of residuals, as a function of the variance components."""
+
+    readings: StackedReadings
+    columns: Floats
+    residual: Floats
+    basis: Floats  # of the fixed effects
+
+    def objective(self, scale: Floats, run_effects: Floats, noise: Floats, same: Floats) -> float:
+        """-2 log posterior; infinite where the covariance is not positive definite."""
+        columns = self.columns
+        std = self.readings.std * scale[self.readings.channel]
+        matrix = np.outer(std, std) * noise + same * ((columns * run_effects**2) @ columns.T)
         try:
             factor = np.linalg.cholesky(matrix)
         except np.linalg.LinAlgError:
             return np.inf
-        white = np.linalg.solve(factor, np.column_stack([basis, residual]))
+        white = np.linalg.solve(factor, np.column_stack([self.basis, self.residual]))
         q, r = np.linalg.qr(white[:, :-1])
-        left = white[:, -1] - q @ (q.T @ white[:, -1])
-        value = 2.0 * np.log(np.diag(factor)).sum()
-        value += 2.0 * np.log(np.abs(np.diag(r)) + 1e-300).sum() + left @ left
-        value += float(np.sum((np.log(scale) / USUAL_SCALE) ** 2))
-        return float(value + np.sum((tau / USUAL_SCATTER) ** 2))
+        projected = white[:, -1] - q @ (q.T @ white[:, -1])
+        value = 2.0 * np.log(np.diag(factor)).sum()  # ln |V|
+        value += 2.0 * np.log(np.abs(np.diag(r)) + 1e-300).sum() + projected @ projected
+        value += float(np.sum((np.log(scale) / LOG_NOISE_SCALE_PRIOR_STD) ** 2))
+        return float(value + np.sum((run_effects / RUN_EFFECT_PRIOR_STD) ** 2))
 
-    value = objective(scale, tau)
-    for _ in range(2):
+
+def _coordinate_search(
+    likelihood: _RestrictedLikelihood,
+    noise: Floats,
+    autocorrelation: float,
+    grid: tuple[float, ...],
+) -> tuple[VarianceComponents, float]:
+    """Minimise over run effects and noise scales in turn, at one autocorrelation."""
+    same = _same_run_indicator(likelihood.readings)
+    channels = len(likelihood.readings.channels)
+    scale, run_effects = np.ones(channels), np.full(2, grid[0])
+
+    def objective(scale: Floats, run_effects: Floats) -> float:
+        return likelihood.objective(scale, run_effects, noise, same)
+
+    value = objective(scale, run_effects)
+    for _ in range(SWEEPS):
         for k in range(2):
-            trials = [(objective(scale, _with(tau, k, t)), t) for t in times]
-            value, t = min(trials)
-            tau = _with(tau, k, t)
+            trials = [(objective(scale, _replaced(run_effects, k, t)), t) for t in grid]
+            value, best = min(trials)
+            run_effects = _replaced(run_effects, k, best)
         for k in range(channels):
+            candidates = (1.0, *(scale[k] * factor for factor in NOISE_SCALE_FACTORS))
             trials = [
-                (objective(_with(scale, k, s), tau), s)
-                for s in (1.0, *(scale[k] * f for f in (0.93, 1.0, 1.15, 1.32, 1.75)))
-                if s >= 1.0
+                (objective(_replaced(scale, k, s), run_effects), s) for s in candidates if s >= 1.0
             ]
-            value, s = min(trials)
-            scale = _with(scale, k, s)
-    found = Scatter(
+            value, best = min(trials)
+            scale = _replaced(scale, k, best)
+    components = VarianceComponents(
         scale,
-        float(tau[0] * SCATTER["friction_angle"]),
-        float(tau[1] * SCATTER["bearing"]),
-        memory,
+        float(run_effects[0] * RUN_EFFECT_UNITS["friction_angle"]),
+        float(run_effects[1] * RUN_EFFECT_UNITS["bearing"]),
+        autocorrelation,
         1.0,
     )
-    return found, value
+    return components, value
 
 
-def _with(values: Floats, index: int, value: float) -> Floats:
+def _is_autocorrelated(readings: StackedReadings, residual: Floats, basis: Floats) -> bool:
+    """Whether neighbouring residuals of a run are more similar than independent noise explains."""
+    white, q = residual / readings.std, np.linalg.qr(basis / readings.std[:, None])[0]
+    projected = white - q @ (q.T @ white)
+    run = readings.run[readings.row]
+    sample = readings.order[readings.row]
+    key = np.lexsort((sample, readings.channel, run))
+    follows = (np.diff(run[key]) == 0) & (np.diff(readings.channel[key]) == 0)
+    follows &= np.diff(sample[key]) == 1
+    pairs = projected[key][:-1][follows] * projected[key][1:][follows]
+    if pairs.size < MIN_PAIRS:
+        return False
+    # projecting out the fixed effects correlates neighbours negatively: correct for it
+    expected = -float(np.sum((q @ q.T)[key[:-1][follows], key[1:][follows]]))
+    std = float(np.mean(projected**2)) * np.sqrt(pairs.size)
+    excess = pairs.sum() - expected * float(np.mean(projected**2))
+    return bool(excess > AUTOCORRELATION_SIGMA * std)
+
+
+def _same_run_indicator(readings: StackedReadings) -> Floats:
+    """1 where two readings are of one run, else 0, (m, m)."""
+    run = readings.run[readings.row]
+    return np.asarray(run[:, None] == run, dtype=np.float64)
+
+
+def _noise_correlation(readings: StackedReadings, autocorrelation: float) -> Floats:
+    """First-order autoregressive correlation within each run and channel, (m, m)."""
+    if autocorrelation == 0.0:
+        return np.eye(len(readings))
+    channel = readings.channel
+    same_series = _same_run_indicator(readings) * (channel[:, None] == channel)
+    sample = readings.order[readings.row].astype(np.float64)
+    lag = np.abs(sample[:, None] - sample)
+    return np.asarray(same_series * autocorrelation**lag)
+
+
+def _replaced(values: Floats, index: int, value: float) -> Floats:
     changed = values.copy()
     changed[index] = value
     return changed
-
-
-def _basis(space: Floats) -> Floats:
-    """An orthonormal basis of what the columns of a space truly span, (m, r)."""
-    u, s, _ = np.linalg.svd(space, full_matrices=False)
-    return np.asarray(u[:, s > max(1e-3 * float(s[0]), 0.3)] if s.size else u)

@@ -1,4 +1,4 @@
-"""Scores of signatures against residuals, and how surprising the largest of many is."""
+"""Family-wise score test of residuals against many directions."""
 
 from __future__ import annotations
 
@@ -7,80 +7,94 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.subspaces import project_out
+
 Floats = NDArray[np.float64]
 
-#: Draws for the family-wise level, and share of a signature that must survive projection.
+#: Draws of the null distribution: the smallest p value is 1/4001, well below every level used.
 DRAWS = 4000
-SURVIVES = 1e-4
-
-
-def outside(columns: Floats, space: Floats) -> Floats:
-    """The part of columns (m, k) orthogonal to a space (m, p)."""
-    if space.shape[1] == 0:
-        return columns
-    u, s, _ = np.linalg.svd(space, full_matrices=False)
-    basis = u[:, s > 1e-9 * max(float(s[0]), 1e-300)]
-    return np.asarray(columns - basis @ (basis.T @ columns))
+#: A column of which less than this fraction of its norm remains after projection cannot be tested.
+MIN_PROJECTED_FRACTION = 1e-4
 
 
 @dataclass(frozen=True)
-class Scores:
-    """Score of each column, in standard deviations, and what chance makes of the largest."""
+class ScoreTest:
+    """Score of each of k columns, and the null distribution of the largest score."""
 
-    z: Floats  # (k,) after the sign that a column may have
-    level: Floats  # (draws,) largest score of the family in data without a gap
-    length: Floats  # (k,) length of each projected column: one size's worth, in sigma
-    absorbed: Floats  # (k,) share of its power that the projected-off space explains
+    z: Floats  # (k,) in standard deviations, with the sign constraint of each column
+    null_maxima: Floats  # (draws,) largest score under the null hypothesis, sorted
+    projected_norm: Floats  # (k,) norm after projection: expected score at unit size
+    absorbed: Floats  # (k,) fraction of the squared norm that the projection removes
 
-    def p(self, z: float) -> float:
-        """Probability that the family's largest score is this large by chance."""
-        return float((np.sum(self.level >= z) + 1) / (len(self.level) + 1))
+    def p_value(self, z: float) -> float:
+        """Probability that the largest score is at least this large under the null hypothesis."""
+        exceeding = np.sum(self.null_maxima >= z)
+        return float((exceeding + 1) / (len(self.null_maxima) + 1))
 
     @property
-    def worst(self) -> float:
-        """The family-wise p value of the largest score."""
-        return self.p(float(self.z.max())) if self.z.size else 1.0
+    def family_wise_p(self) -> float:
+        """Family-wise p value of the largest score."""
+        return self.p_value(float(self.z.max())) if self.z.size else 1.0
 
 
-def scores(
+def score_test(
     residual: Floats,
     columns: Floats,
     space: Floats,
     signs: Floats,
-    freedom: float,
+    degrees_of_freedom: float,
     seed: int,
-) -> Scores:
-    r"""Family-wise test of whitened residuals (m,) against whitened columns (m, k).
+) -> ScoreTest:
+    r"""Score test of whitened residuals against each of many whitened columns.
 
     .. math:: z_i = g_{\perp i} \cdot r / |g_{\perp i}|, \quad z \sim N(0, C)
 
-    with C the cosines between the projected columns, drawn; `signs` (k,) is 0 for a column that may
-    take either sign. `freedom` is that of the estimated noise: the draws are of Student's t.
-    References: Westfall and Young, Resampling-Based Multiple Testing, 1993.
+    with C the cosines between the projected columns. The null distribution of the largest score is
+    sampled.
+
+    Parameters
+    ----------
+    residual : array (m,)
+    columns : array (m, k)
+    space : array (m, p)
+        Directions that are projected out of the columns.
+    signs : array (k,)
+        1 or -1 for a column whose coefficient can only have that sign, else 0.
+    degrees_of_freedom : float
+        Of the noise estimate; the draws are from Student's t distribution.
+
+    References
+    ----------
+    Westfall and Young, Resampling-Based Multiple Testing, 1993.
     """
-    beyond = outside(columns, space)
-    total = np.linalg.norm(columns, axis=0)
-    length = np.linalg.norm(beyond, axis=0)
-    alive = length > SURVIVES * np.maximum(total, 1e-300)
-    unit = np.where(alive, beyond / np.where(alive, length, 1.0), 0.0)
-    z = unit.T @ residual
-    rng = np.random.default_rng(seed)
-    draws = rng.standard_normal((DRAWS, unit.shape[0])) if unit.shape[1] > unit.shape[0] else None
-    if draws is None:
-        u, s, _ = np.linalg.svd(unit, full_matrices=False)
-        chance = rng.standard_normal((DRAWS, s.size)) @ (u.T @ unit)
-    else:
-        chance = draws @ unit
-    chance *= np.sqrt(freedom / rng.chisquare(freedom, DRAWS))[:, None]
-    signed, chance = _signed(z, signs), _signed(chance, signs)
-    chance[:, ~alive] = 0.0
-    return Scores(
-        z=np.where(alive, signed, 0.0),
-        level=np.sort(chance.max(axis=1)) if chance.shape[1] else np.zeros(1),
-        length=np.where(alive, length, 0.0),
-        absorbed=1.0 - (length / np.maximum(total, 1e-300)) ** 2,
+    projected = project_out(columns, space)
+    norm = np.linalg.norm(columns, axis=0)
+    projected_norm = np.linalg.norm(projected, axis=0)
+    testable = projected_norm > MIN_PROJECTED_FRACTION * np.maximum(norm, 1e-300)
+    unit = np.where(testable, projected / np.where(testable, projected_norm, 1.0), 0.0)
+    z = _with_sign(unit.T @ residual, signs)
+    null = _with_sign(_null_scores(unit, degrees_of_freedom, seed), signs)
+    null[:, ~testable] = 0.0
+    return ScoreTest(
+        z=np.where(testable, z, 0.0),
+        null_maxima=np.sort(null.max(axis=1)) if null.shape[1] else np.zeros(1),
+        projected_norm=np.where(testable, projected_norm, 0.0),
+        absorbed=1.0 - (projected_norm / np.maximum(norm, 1e-300)) ** 2,
     )
 
 
-def _signed(z: Floats, signs: Floats) -> Floats:
+def _null_scores(unit: Floats, degrees_of_freedom: float, seed: int) -> Floats:
+    """Scores (draws, k) of unit columns (m, k) under the null hypothesis."""
+    rng = np.random.default_rng(seed)
+    if unit.shape[1] > unit.shape[0]:
+        scores = rng.standard_normal((DRAWS, unit.shape[0])) @ unit
+    else:  # fewer columns than readings: draw in the column space
+        u, s, _ = np.linalg.svd(unit, full_matrices=False)
+        scores = rng.standard_normal((DRAWS, s.size)) @ (u.T @ unit)
+    scores *= np.sqrt(degrees_of_freedom / rng.chisquare(degrees_of_freedom, DRAWS))[:, None]
+    return np.asarray(scores)
+
+
+def _with_sign(z: Floats, signs: Floats) -> Floats:
+    """Scores in the direction that each column may take: absolute values where both are allowed."""
     return np.where(signs == 0, np.abs(z), signs * z)

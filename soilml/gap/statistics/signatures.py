@@ -1,4 +1,4 @@
-"""What each effect would do to the readings: its signature."""
+"""Signatures: the change of the readings by each effect of the catalogue."""
 
 from __future__ import annotations
 
@@ -11,91 +11,96 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.observations import Cells, distinct
-from soilml.gap.statistics.coordinates import predicted, size_axis
+from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.statistics.coordinates import predict_readings, size_coordinate
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 
 Floats = NDArray[np.float64]
 
-#: Signatures are secants at this share of the reference size: some effects begin with a root.
-SECANT = 0.5
+#: Step of the secant that gives a signature, in reference sizes. A secant is used because some
+#: effects start with a square root, whose derivative at zero is infinite.
+SECANT_STEP = 0.5
+#: A signature below this fraction of every reading's noise counts as zero.
+MIN_CHANGE = 1e-6
 
 
 @dataclass(frozen=True)
 class Signature:
-    """The change of every cell, (m,), per reference size of an effect."""
+    """Change of every reading, (m,), per reference size of an effect."""
 
     name: str
     kind: str
     column: Floats
-    #: +1 or -1 where the size can only be of that sign, 0 where it may be of both
+    #: 1 or -1 where the size can only change in that direction, 0 where it can in both
     sign: int
 
 
 @dataclass(frozen=True)
 class Untestable:
-    """An effect of which these runs can say nothing, and why."""
+    """An effect that these runs cannot test, and the reason."""
 
     name: str
     reason: str
 
 
-def grown(case: Case, effect: type[Effect]) -> Case:
-    """The case with the effect: as it has it, or with one more at its neutral size."""
+def with_effect(case: Case, effect: type[Effect]) -> Case:
+    """The case with an effect added at its neutral size, or unchanged if it has the effect."""
     if any(own.name == effect.name for own in case.model.effects):
         return case
-    made: Any = effect()
-    return replace(case, model=case.model + made)
+    neutral: Any = effect()
+    return replace(case, model=case.model + neutral)
 
 
-def standing(case: Case, path: str, unit: float) -> float:
-    """The coordinate at which a case has an effect's size, in reference sizes; 0 where not."""
-    own = case.parameters()
-    return float(own[path][1]) / unit if path in own else 0.0
+def current_size(case: Case, path: str, unit: float) -> float:
+    """Coordinate of an effect's size in the case, in reference sizes; 0 where it is absent."""
+    parameters = case.parameters()
+    return float(parameters[path][1]) / unit if path in parameters else 0.0
 
 
-def signatures(
-    case: Case, cells: Cells, effects: Mapping[str, type[Effect]]
+def effect_signatures(
+    case: Case, readings: StackedReadings, effects: Mapping[str, type[Effect]]
 ) -> tuple[list[Signature], list[Untestable]]:
-    """Signatures of all effects, and those that these runs cannot test.
+    """Signatures of all effects that these runs can test, and the effects that they cannot.
 
-    An effect that the case has is moved from the size that it has there: it may be wrong.
+    An effect that the case has already is changed from its present size, which may be wrong.
     """
-    base = predicted(case, [], np.zeros((1, 0)), cells)[0]
-    found, cannot = [], []
+    base = predict_readings(case, [], np.zeros((1, 0)), readings)[0]
+    signatures, untestable = [], []
     for name, effect in effects.items():
-        if reason := _lacking(effect, cells):
-            cannot.append(Untestable(name, reason))
+        if reason := _missing_covariate(effect, readings):
+            untestable.append(Untestable(name, reason))
             continue
-        axis = size_axis(effect, None)
-        at = standing(case, axis.path, axis.prior.upper)
-        x = SECANT if axis.upper >= at + SECANT else -SECANT
+        size = size_coordinate(effect, None)
+        at = current_size(case, size.path, size.prior.upper)
+        step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
         try:
-            moved = predicted(grown(case, effect), [axis], np.asarray([[at + x]]), cells)[0]
+            changed = with_effect(case, effect)
+            moved = predict_readings(changed, [size], np.asarray([[at + step]]), readings)[0]
         except InputError as error:
-            cannot.append(Untestable(name, str(error)))
+            untestable.append(Untestable(name, str(error)))
             continue
-        column = (moved - base) / x
+        column = (moved - base) / step
         if not np.isfinite(column).all():
-            cannot.append(Untestable(name, "the model has no equilibrium with it in every row"))
+            reason = "with it, the model has no equilibrium in some row"
+            untestable.append(Untestable(name, reason))
             continue
-        if not np.any(np.abs(column) > 1e-6 * cells.std):
-            cannot.append(Untestable(name, "it changes no reading that there is"))
+        if not np.any(np.abs(column) > MIN_CHANGE * readings.std):
+            untestable.append(Untestable(name, "it changes no measured quantity"))
             continue
-        sign = 0 if axis.lower < at < axis.upper else int(np.sign(x))
-        found.append(Signature(name, effect.about.kind, column, sign))
-    return found, cannot
+        sign = 0 if size.lower < at < size.upper else int(np.sign(step))
+        signatures.append(Signature(name, effect.about.kind, column, sign))
+    return signatures, untestable
 
 
-def _lacking(effect: type[Effect], cells: Cells) -> str:
-    """Why these runs cannot test an effect for want of a covariate; nothing where they can."""
+def _missing_covariate(effect: type[Effect], readings: StackedReadings) -> str:
+    """Which covariate these runs lack to test an effect; empty where they have it."""
     if effect.about.varied:
         return f"needs {effect.about.varied}"
     for field in effect.about.needs:
-        value = getattr(cells.at, field)
+        value = getattr(readings.at, field)
         if value is None:
             return f"needs the column {COVARIATES[field]}"
-        if distinct(np.asarray(value, dtype=np.float64)) < 2:
+        if count_distinct(np.asarray(value, dtype=np.float64)) < 2:
             return f"needs runs at several values of {COVARIATES[field]}"
     return ""

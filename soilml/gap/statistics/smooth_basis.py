@@ -1,4 +1,4 @@
-"""Shapes that no catalogue has: smooth in slip and load, or local to a corner of them."""
+"""Smooth functions of slip and load, and regions of the data, for causes outside the catalogue."""
 
 from __future__ import annotations
 
@@ -8,74 +8,81 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.observations import Cells, distinct
+from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
 
 Floats = NDArray[np.float64]
 
-#: Degrees in slip and in log load of the smooth columns.
+#: Degrees in slip and in log load of the smooth functions: enough for one maximum and one
+#: inflection over slip, and for a curvature over load.
 SLIP_DEGREE, LOAD_DEGREE = 4, 2
-#: Bins along slip and along load of the map.
-SLIP_BINS, LOAD_BINS = 4, 3
+#: Readings of a channel per smooth function, so that noise cannot be fitted.
+READINGS_PER_FUNCTION = 4
+#: Bins along slip and along load of the discrepancy map, and readings that a region needs.
+SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
 
 
-def smooth_columns(cells: Cells) -> Floats:
+def smooth_basis(readings: StackedReadings) -> Floats:
     """Products of Legendre polynomials of slip and log load for each channel, (m, q).
 
-    In the unit of each cell's noise. The degree falls where few values were driven.
+    Each column is in the unit of its channel's noise. The degree is limited by the number of
+    distinct slips and loads.
     """
-    slip, load = _unit(cells.slip), _unit(np.log(cells.load))
-    most = (_degree(slip, SLIP_DEGREE), _degree(load, LOAD_DEGREE))
+    slip, load = _scaled(readings.slip), _scaled(np.log(readings.load))
+    degrees = _degree(slip, SLIP_DEGREE), _degree(load, LOAD_DEGREE)
     columns = []
-    for channel in range(len(cells.channels)):
-        here = cells.channel == channel
-        room = int(here.sum()) // 4
-        for i, j in _orders(*most)[:room]:
+    for channel in range(len(readings.channels)):
+        in_channel = readings.channel == channel
+        most = int(in_channel.sum()) // READINGS_PER_FUNCTION
+        for i, j in _orders(*degrees)[:most]:
             basis = np.polynomial.legendre.Legendre.basis(i)(slip)
             basis = basis * np.polynomial.legendre.Legendre.basis(j)(load)
-            columns.append(np.where(here, basis, 0.0) * np.median(cells.std[here]))
-    return np.stack(columns, axis=1) if columns else np.zeros((len(cells), 0))
+            std = np.median(readings.std[in_channel])
+            columns.append(np.where(in_channel, basis, 0.0) * std)
+    return np.stack(columns, axis=1) if columns else np.zeros((len(readings), 0))
 
 
 def _orders(slip: int, load: int) -> list[tuple[int, int]]:
-    """Orders of the products, the smoothest first."""
+    """Orders of the products up to the larger degree in total, the smoothest first."""
     pairs = [(i, j) for i in range(slip + 1) for j in range(load + 1) if i + j <= max(slip, load)]
     return sorted(pairs, key=lambda pair: (pair[0] + pair[1], pair[1]))
 
 
-def _unit(values: Floats) -> Floats:
+def _scaled(values: Floats) -> Floats:
+    """Values mapped to -1 to 1, the interval on which Legendre polynomials are orthogonal."""
     low, high = float(values.min()), float(values.max())
     return 2.0 * (values - low) / (high - low) - 1.0 if high > low else np.zeros_like(values)
 
 
-def _degree(unit: Floats, most: int) -> int:
-    """The degree that the distinct values can carry."""
-    return int(min(most, distinct(unit) - 1))
+def _degree(values: Floats, highest: int) -> int:
+    """The degree that the distinct values can determine."""
+    return int(min(highest, count_distinct(values) - 1))
 
 
 @dataclass(frozen=True)
-class Place:
-    """A corner of the data: one channel, between two slips and two loads (N)."""
+class Region:
+    """The readings of one channel between two slips and two loads (N)."""
 
     channel: str
     slip: tuple[float, float]
     load: tuple[float, float]
-    cells: NDArray[np.bool_]
+    selected: NDArray[np.bool_]  # (m,)
 
 
-def places(cells: Cells) -> Iterator[Place]:
-    """Channel by slip bin by load bin, those with two cells at least."""
-    slips, loads = _edges(cells.slip, SLIP_BINS), _edges(cells.load, LOAD_BINS)
-    for i, name in enumerate(cells.channels):
+def regions(readings: StackedReadings) -> Iterator[Region]:
+    """Channel by slip bin by load bin, those with enough readings."""
+    slips, loads = _bins(readings.slip, SLIP_BINS), _bins(readings.load, LOAD_BINS)
+    for i, name in enumerate(readings.channels):
         for low, high in slips:
             for light, heavy in loads:
-                here = (cells.channel == i) & (cells.slip >= low) & (cells.slip <= high)
-                here &= (cells.load >= light) & (cells.load <= heavy)
-                if here.sum() >= 2:
-                    yield Place(name, (low, high), (light, heavy), here)
+                selected = (readings.channel == i) & (readings.slip >= low)
+                selected &= (readings.slip <= high) & (readings.load >= light)
+                selected &= readings.load <= heavy
+                if selected.sum() >= MIN_READINGS:
+                    yield Region(name, (low, high), (light, heavy), selected)
 
 
-def _edges(values: Floats, bins: int) -> list[tuple[float, float]]:
-    """Bins of about as many cells each, by the values that were driven."""
+def _bins(values: Floats, count: int) -> list[tuple[float, float]]:
+    """Bins with nearly equal numbers of distinct values."""
     ordered = np.unique(values)
-    parts = np.array_split(ordered, min(bins, distinct(values)))
+    parts = np.array_split(ordered, min(count, count_distinct(values)))
     return [(float(part[0]), float(part[-1])) for part in parts if part.size]

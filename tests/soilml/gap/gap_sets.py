@@ -11,11 +11,15 @@ import numpy as np
 from datagen.blind_sets import draw, matrix
 from soilml.config.case import Case, read_case
 from soilml.gap import gap
-from soilml.gap.data.observations import cells_of
-from soilml.gap.search.candidate_fits import Bench
-from soilml.gap.search.iteration import SCATTER
-from soilml.gap.statistics.coordinates import soil_axis
-from soilml.gap.statistics.reml_covariance import Scatter, assembled, scatter_columns
+from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.coordinates import soil_coordinate
+from soilml.gap.statistics.reml_covariance import (
+    RUN_EFFECT_UNITS,
+    VarianceComponents,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
@@ -71,20 +75,22 @@ def driven(case, effects=(), *, loads=LOADS, slips=8, noise=1.0, soils=None, see
     return Table(columns | {names[name]: values for name, values in known.items()})
 
 
-def bench_of(case, table, scatter=(0.0, 0.0)) -> Bench:
-    """A bench on these rows that believes the declared noise and this scatter."""
-    cells = cells_of(case, table)
-    columns = scatter_columns(case, cells)
-    known = Scatter(
-        np.ones(len(cells.channels)),
-        scatter[0] * SCATTER["friction_angle"],
-        scatter[1] * SCATTER["bearing"],
+def fit_problem(case, table, run_effects=(0.0, 0.0)) -> FitProblem:
+    """A problem on these rows with the declared noise and this run-to-run variation, in units."""
+    readings = stack_readings(case, table)
+    columns = run_effect_columns(case, readings)
+    known = VarianceComponents(
+        np.ones(len(readings.channels)),
+        run_effects[0] * RUN_EFFECT_UNITS["friction_angle"],
+        run_effects[1] * RUN_EFFECT_UNITS["bearing"],
         0.0,
         1e6,
     )
-    axes = tuple(soil_axis(f) for f in select_free(case, None))
+    coordinates = tuple(soil_coordinate(f) for f in select_free(case, None))
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-    return Bench(case, axes, cells, assembled(cells, columns, known), effects, {})
+    return FitProblem(
+        case, coordinates, readings, assemble_covariance(readings, columns, known), effects, {}
+    )
 
 
 #: The first of its kind in the list of plans, whatever becomes of it: tier, cause, size, noise

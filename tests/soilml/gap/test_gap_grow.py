@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, bench_of, case_of, driven
+from gap_sets import MODEL, case_of, driven, fit_problem
 
+from soilml.config.write_case import case_as_toml
 from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.design.run_options import CHECKS, cells_at, menu
-from soilml.gap.search.candidate_fits import coordinates
-from soilml.gap.search.updated_case import grown_case, model_text
+from soilml.gap.design.run_options import SENSOR_CHECKS, expected_readings, run_options
+from soilml.gap.search.candidate_fits import fit_candidate
+from soilml.gap.search.updated_case import updated_case
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 
@@ -58,53 +59,55 @@ def same_forces(one, other):
 )
 def test_a_model_written_and_read_again_predicts_the_same(text):
     case = case_of(text)
-    again = case_of(model_text(case, ["a comment", "another one"]))
+    again = case_of(case_as_toml(case, ["a comment", "another one"]))
     same_forces(case, again)
     assert again.prior == case.prior
     assert again.noise == case.noise
     assert again.model == case.model
-    assert model_text(again) == model_text(case)
+    assert case_as_toml(again) == case_as_toml(case)
 
 
 def test_a_soil_of_any_digits_is_kept_to_the_last():
     case = case_of().with_values(
         {"cohesion": 1 / 3, "friction_angle": 0.1 + 0.4, "kphi": 1.23456789012e-3 * 1e9}
     )
-    again = case_of(model_text(case))
+    again = case_of(case_as_toml(case))
     assert again.soil == case.soil
 
 
 def test_noise_of_any_digits_is_kept_to_the_last():
     case = case_of(MODEL.replace('"1 %"', '"1.23456789 %"'))
-    assert case_of(model_text(case)).noise == case.noise
+    assert case_of(case_as_toml(case)).noise == case.noise
 
 
 @pytest.fixture(scope="module")
 def rivals():
     """Two explanations of runs in which the wheel digs itself in."""
     case = case_of()
-    bench = bench_of(case, driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=2))
-    start = coordinates(bench.soil_only([np.full(3, 0.5)]))
-    return bench, [bench.fit([name], start) for name in ("slip-sinkage", "torque-gain")]
+    problem = fit_problem(case, driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=2))
+    start = problem.fit_soil([np.full(3, 0.5)]).start_values()
+    return problem, [
+        fit_candidate(problem, [name], start) for name in ("slip-sinkage", "torque-gain")
+    ]
 
 
 def test_the_grown_case_is_the_fit_with_a_prior_for_what_was_added(rivals):
-    bench, (one, _) = rivals
-    case = grown_case(one.fit)
+    problem, (one, _) = rivals
+    case = updated_case(one.fit)
     size = case.prior.pop("slip-sinkage.n1")
     assert size.lower < one.fit.values()["slip-sinkage.n1"] < size.upper
-    assert case.prior == bench.case.prior and case.noise == bench.case.noise
+    assert case.prior == problem.case.prior and case.noise == problem.case.noise
     assert [e.name for e in case.model.effects] == ["slip-sinkage"]
     assert case.model.effects[0].n1 == one.fit.values()["slip-sinkage.n1"]
-    same_forces(case, case_of(model_text(case)))
+    same_forces(case, case_of(case_as_toml(case)))
 
 
 def test_the_menu_goes_beyond_what_was_driven(rivals):
-    cells = rivals[0].cells
-    options = {option.kind: option.at for option in menu(cells)}
-    assert options["heavier"].load[0] > cells.load.max()
-    assert options["lighter"].load[0] < cells.load.min()
-    assert options["higher slip"].slip.max() > cells.slip.max()
+    readings = rivals[0].readings
+    options = {option.kind: option.at for option in run_options(readings)}
+    assert options["heavier"].load[0] > readings.load.max()
+    assert options["lighter"].load[0] < readings.load.min()
+    assert options["higher slip"].slip.max() > readings.slip.max()
     assert (options["braking"].slip < 0.0).all()
     assert (options["reverse"].speed < 0.0).all()
     assert (options["second pass"].pass_number == 2.0).all()
@@ -115,23 +118,23 @@ def test_the_menu_goes_beyond_what_was_driven(rivals):
 def test_a_covariate_that_was_varied_is_not_suggested_again():
     case = case_of()
     table = driven(case, loads=(40.0, 60.0, 90.0), slips=4, speed=(0.02, 0.05, 0.1))
-    kinds = {option.kind for option in menu(bench_of(case, table).cells)}
+    kinds = {option.kind for option in run_options(fit_problem(case, table).readings)}
     assert "other speed" not in kinds and "second pass" in kinds
 
 
 def test_a_run_of_the_menu_brings_the_channels_and_noise_of_the_rig(rivals):
-    bench = rivals[0]
-    option = next(iter(menu(bench.cells)))
-    cells = cells_at(option, bench.cells, bench.case)
-    assert len(cells) == 3 * len(option.at.slip)
-    torque = cells.channel == 0
-    np.testing.assert_allclose(cells.std[torque], 0.01 * np.abs(cells.reading[torque]))
+    problem = rivals[0]
+    option = next(iter(run_options(problem.readings)))
+    readings = expected_readings(option, problem.readings, problem.case)
+    assert len(readings) == 3 * len(option.at.slip)
+    torque = readings.channel == 0
+    np.testing.assert_allclose(readings.std[torque], 0.01 * np.abs(readings.reading[torque]))
 
 
 def test_suggestions_are_ranked_and_come_with_what_each_explanation_expects(rivals):
-    bench, both = rivals
-    found = next_runs(bench, both)
-    apart = [run.separates for run in found]
+    problem, both = rivals
+    found = next_runs(problem, both)
+    apart = [run.discrimination for run in found]
     assert apart == sorted(apart, reverse=True) and apart[0] > 0.0
     driving = next(run for run in found if run.rows)
     row = driving.rows[-1]
@@ -146,16 +149,16 @@ def test_a_checked_sensor_tells_a_fault_from_physics(rivals, monkeypatch):
     monkeypatch.setattr("soilml.gap.design.discriminating_runs.LISTED", 99)
     found = {run.kind: run for run in next_runs(*rivals)}
     gain = abs(rivals[1][1].fit.values()["torque-gain.gain"])
-    assert found["dead-weight torque"].separates == pytest.approx(min(gain / 0.003, 10.0))
-    assert all(run.rows == () for kind, run in found.items() if kind in CHECKS)
+    assert found["dead-weight torque"].discrimination == pytest.approx(min(gain / 0.003, 10.0))
+    assert all(run.rows == () for kind, run in found.items() if kind in SENSOR_CHECKS)
 
 
 def test_with_one_explanation_alone_nothing_is_left_to_separate(rivals):
-    bench, both = rivals
-    assert next_runs(bench, both[:1]) == []
+    problem, both = rivals
+    assert next_runs(problem, both[:1]) == []
 
 
 def test_explanations_that_are_the_same_cannot_be_separated(rivals):
-    bench, (one, _) = rivals
+    problem, (one, _) = rivals
     twin = replace(one, names=("twin",))
-    assert all(run.separates < 1e-3 for run in next_runs(bench, [one, twin]) if run.rows)
+    assert all(run.discrimination < 1e-3 for run in next_runs(problem, [one, twin]) if run.rows)

@@ -39,24 +39,24 @@ def test_where_nothing_is_hidden_no_cause_is_named(kind):
     report = analysed(kind)
     assert report.status in ("no-gap", "unknown")
     assert report.cause_set == report.effects == report.model.model.effects == ()
-    for shrunk in report.gap.values():
-        assert shrunk.after == shrunk.before
+    for reduction in report.gap.values():
+        assert reduction.after == reduction.before
 
 
 def test_soil_that_differs_from_run_to_run_is_noticed():
-    found = analysed("scatter").scatter
+    found = analysed("scatter").variance_components
     assert 0.002 < found["friction_angle_from_run_to_run_rad"] < 0.02  # half a degree is 0.0087
     assert 0.01 < found["bearing_from_run_to_run"] < 0.12  # 0.05 is true
 
 
 def test_samples_that_remember_are_noticed():
-    assert analysed("memory").scatter["memory_of_samples"] > 0.0
+    assert analysed("memory").variance_components["memory_of_samples"] > 0.0
     assert any("share their noise" in note for note in analysed("memory").notes)
-    assert analysed("nothing").scatter["memory_of_samples"] == 0.0
+    assert analysed("nothing").variance_components["memory_of_samples"] == 0.0
 
 
 def test_outliers_are_set_aside_and_said():
-    assert any("stray from all others" in note for note in analysed("outliers").notes)
+    assert any("readings are outliers" in note for note in analysed("outliers").notes)
 
 
 @pytest.mark.parametrize("kind", STRONG)
@@ -85,10 +85,10 @@ def test_the_size_of_a_strong_cause_is_found(kind):
 def test_adding_the_cause_closes_the_gap_where_it_was_not_fitted(kind):
     gap = analysed(kind).gap
     assert set(gap) == {"train", "held_out_runs", "held_out_region"}
-    for shrunk in gap.values():
-        assert shrunk.before > 5.0
-        assert shrunk.after < 0.25 * shrunk.before
-        assert shrunk.after < 3.0
+    for reduction in gap.values():
+        assert reduction.before > 5.0
+        assert reduction.after < 0.25 * reduction.before
+        assert reduction.after < 3.0
 
 
 @pytest.mark.parametrize("kind", STRONG)
@@ -117,7 +117,7 @@ def test_a_cause_that_no_catalogue_has_is_not_named_alone():
 def test_what_fits_best_without_being_believed_is_not_in_the_model():
     report = analysed("stick-slip")
     if report.status == "unknown":
-        assert report.stand_in and report.model.model.effects == ()
+        assert report.best_unclaimed and report.model.model.effects == ()
         assert any("any cause" in said for said in report.not_claimed)
 
 

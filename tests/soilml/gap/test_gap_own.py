@@ -67,9 +67,9 @@ def test_what_was_added_is_handed_on_with_its_uncertainty():
     assert prior.lower < 0.4 < prior.upper and prior.upper - prior.lower < 0.2
 
 
-def test_what_was_held_fixed_is_said():
+def test_fixed_parameters_are_reported():
     report = gap(Case(WHEEL, SAND, PRIOR, NOISE), measured(SlipSinkage(n1=0.4)))
-    assert any("kphi, n, gear.radius" in text and "held" in text for text in report.not_claimed)
+    assert any("kphi, n, gear.radius" in text and "fixed" in text for text in report.not_claimed)
     freed = {"kphi": Prior(1e5, 1e7, log=True), "n": Prior(0.5, 1.5)}
     more = gap(replace(Case(WHEEL, SAND, PRIOR | freed, NOISE)), measured(SlipSinkage(n1=0.4)))
     assert not any("kphi, n" in text for text in more.not_claimed)

@@ -1,19 +1,19 @@
-"""How readings scatter: planted noise, run-to-run soil and memory are found again."""
+"""How readings scatter: planted noise, run-to-run soil and autocorrelation are found again."""
 
 import numpy as np
 import pytest
-from gap_sets import bench_of, case_of, driven
+from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.data.observations import cells_of
-from soilml.gap.statistics.coordinates import linearised
+from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.statistics.coordinates import linearise
 from soilml.gap.statistics.reml_covariance import (
-    SCATTER,
-    Scatter,
-    assembled,
-    estimated,
-    scatter_columns,
+    RUN_EFFECT_UNITS,
+    VarianceComponents,
+    assemble_covariance,
+    estimate_covariance,
+    run_effect_columns,
 )
-from soilml.gap.statistics.smooth_basis import smooth_columns
+from soilml.gap.statistics.smooth_basis import smooth_basis
 
 LOADS = (40.0, 65.0, 100.0, 150.0) * 4
 
@@ -22,36 +22,39 @@ LOADS = (40.0, 65.0, 100.0, 150.0) * 4
 def rig():
     """Sixteen runs, the columns of scatter, and what soil and smooth shapes could explain."""
     case = case_of()
-    cells = cells_of(case, driven(case, loads=LOADS, slips=4, noise=0.0))
-    bench = bench_of(case, driven(case, loads=LOADS, slips=4, noise=0.0))
-    soil = linearised(case, bench.soil, np.full(3, 0.4), cells)[1]
-    columns = scatter_columns(case, cells)
-    return cells, columns, np.column_stack([soil, smooth_columns(cells)])
+    readings = stack_readings(case, driven(case, loads=LOADS, slips=4, noise=0.0))
+    problem = fit_problem(case, driven(case, loads=LOADS, slips=4, noise=0.0))
+    soil = linearise(case, problem.soil, np.full(3, 0.4), readings)[1]
+    columns = run_effect_columns(case, readings)
+    return readings, columns, np.column_stack([soil, smooth_basis(readings)])
 
 
 def typical(rig, truth, draws=3):
     """What is estimated from residuals drawn from a scatter, typically."""
-    cells, columns, space = rig
-    root = np.linalg.cholesky(assembled(cells, columns, truth).matrix)
+    readings, columns, space = rig
+    root = np.linalg.cholesky(assemble_covariance(readings, columns, truth).matrix)
     rng = np.random.default_rng(11)
     found = [
-        estimated(cells, columns, root @ rng.standard_normal(len(cells)), space).scatter
+        estimate_covariance(
+            readings, columns, root @ rng.standard_normal(len(readings)), space
+        ).components
         for _ in range(draws)
     ]
+    units = RUN_EFFECT_UNITS
     return {
-        "scale": np.median([f.scale for f in found], axis=0),
-        "angle": np.median([f.friction_angle for f in found]) / SCATTER["friction_angle"],
-        "bearing": np.median([f.bearing for f in found]) / SCATTER["bearing"],
-        "memory": np.median([f.memory for f in found]),
+        "scale": np.median([f.noise_scale for f in found], axis=0),
+        "angle": np.median([f.friction_angle_std for f in found]) / units["friction_angle"],
+        "bearing": np.median([f.bearing_std for f in found]) / units["bearing"],
+        "autocorrelation": np.median([f.autocorrelation for f in found]),
     }
 
 
-def scatter(scale=1.0, angle=0.0, bearing=0.0, memory=0.0):
-    return Scatter(
+def scatter(scale=1.0, angle=0.0, bearing=0.0, autocorrelation=0.0):
+    return VarianceComponents(
         np.full(3, scale),
-        angle * SCATTER["friction_angle"],
-        bearing * SCATTER["bearing"],
-        memory,
+        angle * RUN_EFFECT_UNITS["friction_angle"],
+        bearing * RUN_EFFECT_UNITS["bearing"],
+        autocorrelation,
         1.0,
     )
 
@@ -59,7 +62,7 @@ def scatter(scale=1.0, angle=0.0, bearing=0.0, memory=0.0):
 def test_readings_as_declared_are_believed(rig):
     found = typical(rig, scatter())
     assert np.all(found["scale"] < 1.2)
-    assert found["angle"] <= 0.25 and found["bearing"] <= 0.25 and found["memory"] == 0.0
+    assert found["angle"] <= 0.25 and found["bearing"] <= 0.25 and found["autocorrelation"] == 0.0
 
 
 def test_soil_that_differs_from_run_to_run_is_found(rig):
@@ -70,7 +73,7 @@ def test_soil_that_differs_from_run_to_run_is_found(rig):
 
 
 def test_samples_that_remember_are_found(rig):
-    assert typical(rig, scatter(memory=0.7))["memory"] in (0.5, 0.7, 0.85)
+    assert typical(rig, scatter(autocorrelation=0.7))["autocorrelation"] in (0.5, 0.7, 0.85)
 
 
 def test_noise_above_the_declared_is_found(rig):
@@ -84,31 +87,33 @@ def test_noise_is_never_believed_smaller_than_declared(rig):
 
 def test_one_run_alone_tells_nothing_of_scatter_between_runs():
     case = case_of()
-    cells = cells_of(case, driven(case, loads=(60.0,), slips=12))
-    columns = scatter_columns(case, cells)
+    readings = stack_readings(case, driven(case, loads=(60.0,), slips=12))
+    columns = run_effect_columns(case, readings)
     residual = 3.0 * columns[:, 0]
-    found = estimated(cells, columns, residual, smooth_columns(cells)).scatter
-    assert found.friction_angle == 0.0 and found.bearing == 0.0
+    found = estimate_covariance(readings, columns, residual, smooth_basis(readings)).components
+    assert found.friction_angle_std == 0.0 and found.bearing_std == 0.0
 
 
 def test_the_covariance_is_noise_scatter_of_runs_and_memory(rig):
-    cells, columns, _ = rig
-    made = assembled(cells, columns, scatter(scale=2.0, angle=1.0, memory=0.5))
-    np.testing.assert_allclose(
-        made.whiten @ made.matrix @ made.whiten.T, np.eye(len(cells)), atol=1e-8
+    readings, columns, _ = rig
+    made = assemble_covariance(
+        readings, columns, scatter(scale=2.0, angle=1.0, autocorrelation=0.5)
     )
-    np.testing.assert_allclose(made.std, np.hypot(2.0 * cells.std, columns[:, 0]))
-    run, channel = cells.run[cells.row], cells.channel
+    np.testing.assert_allclose(
+        made.whiten @ made.matrix @ made.whiten.T, np.eye(len(readings)), atol=1e-8
+    )
+    np.testing.assert_allclose(made.std, np.hypot(2.0 * readings.std, columns[:, 0]))
+    run, channel = readings.run[readings.row], readings.channel
     assert np.all(made.matrix[run[:, None] != run] == 0.0)
     i, j = np.flatnonzero((run == 0) & (channel == 0))[:2]
-    shared = 0.5 * 4.0 * cells.std[i] * cells.std[j] + columns[i, 0] * columns[j, 0]
+    shared = 0.5 * 4.0 * readings.std[i] * readings.std[j] + columns[i, 0] * columns[j, 0]
     assert made.matrix[i, j] == pytest.approx(shared)
 
 
 def test_the_columns_of_scatter_are_what_the_soil_does(rig):
-    cells, columns, _ = rig
+    readings, columns, _ = rig
     case = case_of()
-    phi = float(case.soil.friction_angle) + SCATTER["friction_angle"]
-    more = linearised(case.with_values({"friction_angle": phi}), [], np.zeros(0), cells)[0]
-    off = more - linearised(case, [], np.zeros(0), cells)[0]
+    phi = float(case.soil.friction_angle) + RUN_EFFECT_UNITS["friction_angle"]
+    more = linearise(case.with_values({"friction_angle": phi}), [], np.zeros(0), readings)[0]
+    off = more - linearise(case, [], np.zeros(0), readings)[0]
     np.testing.assert_allclose(columns[:, 0], off, rtol=0.1, atol=0.05 * np.abs(off).max())

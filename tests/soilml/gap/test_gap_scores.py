@@ -3,41 +3,42 @@
 import numpy as np
 import pytest
 
-from soilml.gap.statistics.score_test import outside, scores
+from soilml.gap.statistics.score_test import score_test
+from soilml.numerics.subspaces import project_out
 
 
-def family(seed=1, cells=40, space=3, columns=12):
+def family(seed=1, readings=40, space=3, columns=12):
     rng = np.random.default_rng(seed)
-    return rng.standard_normal((cells, columns)), rng.standard_normal((cells, space))
+    return rng.standard_normal((readings, columns)), rng.standard_normal((readings, space))
 
 
 def test_what_is_outside_a_space_is_at_right_angles_to_it():
     columns, space = family()
-    beyond = outside(columns, space)
+    beyond = project_out(columns, space)
     np.testing.assert_allclose(space.T @ beyond, 0.0, atol=1e-12)
-    np.testing.assert_allclose(outside(beyond, space), beyond, atol=1e-12)
-    np.testing.assert_allclose(outside(space @ np.ones((3, 2)), space), 0.0, atol=1e-12)
+    np.testing.assert_allclose(project_out(beyond, space), beyond, atol=1e-12)
+    np.testing.assert_allclose(project_out(space @ np.ones((3, 2)), space), 0.0, atol=1e-12)
 
 
 def test_nothing_is_projected_off_an_empty_space_and_twins_count_once():
     columns, space = family()
-    np.testing.assert_array_equal(outside(columns, np.zeros((40, 0))), columns)
+    np.testing.assert_array_equal(project_out(columns, np.zeros((40, 0))), columns)
     twins = np.column_stack([space, space])
-    np.testing.assert_allclose(outside(columns, twins), outside(columns, space), atol=1e-9)
+    np.testing.assert_allclose(project_out(columns, twins), project_out(columns, space), atol=1e-9)
 
 
 @pytest.mark.parametrize("columns", [12, 60])
 def test_p_values_of_pure_noise_are_uniform(columns):
-    """Kolmogorov-Smirnov at 200 draws; 0.115 is the 1 % point. More columns than cells, too."""
+    """Kolmogorov-Smirnov at 200 draws; 0.115 is the 1 % point. More columns than readings, too."""
     rng = np.random.default_rng(7)
     known, space = family(columns=columns)
     signs = np.where(np.arange(columns) % 3, 0.0, 1.0)
-    found = scores(rng.standard_normal(40), known, space, signs, 1e9, 0)
-    beyond = outside(known, space)
+    found = score_test(rng.standard_normal(40), known, space, signs, 1e9, 0)
+    beyond = project_out(known, space)
     unit = beyond / np.linalg.norm(beyond, axis=0)
     z = rng.standard_normal((200, 40)) @ unit
     largest = np.where(signs == 0, np.abs(z), signs * z).max(axis=1)
-    p = np.sort([found.p(float(value)) for value in largest])
+    p = np.sort([found.p_value(float(value)) for value in largest])
     even = np.arange(200) / 200
     assert max(np.abs(p - even).max(), np.abs(p - even - 1 / 200).max()) < 0.115
 
@@ -45,49 +46,51 @@ def test_p_values_of_pure_noise_are_uniform(columns):
 def test_estimated_noise_makes_large_scores_less_surprising():
     known, space = family()
     residual = np.random.default_rng(0).standard_normal(40)
-    sure, unsure = (scores(residual, known, space, np.zeros(12), f, 0) for f in (1e9, 8.0))
-    assert unsure.p(4.0) > 2.0 * sure.p(4.0)
+    sure, unsure = (score_test(residual, known, space, np.zeros(12), f, 0) for f in (1e9, 8.0))
+    assert unsure.p_value(4.0) > 2.0 * sure.p_value(4.0)
 
 
 def test_a_planted_column_has_the_largest_score():
     known, space = family()
-    beyond = outside(known, space)
+    beyond = project_out(known, space)
     rng = np.random.default_rng(3)
     residual = rng.standard_normal(40) + 8.0 * beyond[:, 4] / np.linalg.norm(beyond[:, 4])
-    found = scores(residual, known, space, np.zeros(12), 1e9, 0)
+    found = score_test(residual, known, space, np.zeros(12), 1e9, 0)
     assert int(np.argmax(found.z)) == 4
     assert found.z[4] == pytest.approx(8.0, abs=3.5)
-    assert found.worst < 0.001
-    np.testing.assert_allclose(found.length, np.linalg.norm(beyond, axis=0))
+    assert found.family_wise_p < 0.001
+    np.testing.assert_allclose(found.projected_norm, np.linalg.norm(beyond, axis=0))
 
 
 def test_a_column_of_one_sign_has_no_score_on_the_other_side():
     known, space = family()
-    beyond = outside(known, space)[:, :1]
+    beyond = project_out(known, space)[:, :1]
     residual = -6.0 * beyond[:, 0] / np.linalg.norm(beyond)
     for sign, expected in ((1.0, -6.0), (-1.0, 6.0), (0.0, 6.0)):
-        found = scores(residual, known[:, :1], space, np.asarray([sign]), 1e9, 0)
+        found = score_test(residual, known[:, :1], space, np.asarray([sign]), 1e9, 0)
         assert found.z[0] == pytest.approx(expected)
-    up = scores(residual, known[:, :1], space, np.ones(1), 1e9, 0)
-    assert up.worst > 0.9
+    up = score_test(residual, known[:, :1], space, np.ones(1), 1e9, 0)
+    assert up.family_wise_p > 0.9
 
 
 def test_a_column_that_the_soil_absorbs_scores_nothing():
     known, space = family()
     known[:, 0] = space @ np.asarray([1.0, -2.0, 0.5])
-    found = scores(100.0 * known[:, 0], known, space, np.zeros(12), 1e9, 0)
-    assert found.z[0] == 0.0 and found.length[0] == 0.0
+    found = score_test(100.0 * known[:, 0], known, space, np.zeros(12), 1e9, 0)
+    assert found.z[0] == 0.0 and found.projected_norm[0] == 0.0
     assert found.absorbed[0] == pytest.approx(1.0)
     assert np.all((found.absorbed >= 0.0) & (found.absorbed <= 1.0 + 1e-12))
 
 
 def test_the_same_seed_gives_the_same_level():
     known, space = family()
-    one, two, other = (scores(known[:, 0], known, space, np.zeros(12), 20.0, s) for s in (5, 5, 6))
-    np.testing.assert_array_equal(one.level, two.level)
-    assert not np.array_equal(one.level, other.level)
+    one, two, other = (
+        score_test(known[:, 0], known, space, np.zeros(12), 20.0, s) for s in (5, 5, 6)
+    )
+    np.testing.assert_array_equal(one.null_maxima, two.null_maxima)
+    assert not np.array_equal(one.null_maxima, other.null_maxima)
 
 
 def test_a_family_without_columns_is_no_surprise():
-    none = scores(np.ones(10), np.zeros((10, 0)), np.zeros((10, 0)), np.zeros(0), 5.0, 0)
-    assert none.worst == 1.0
+    none = score_test(np.ones(10), np.zeros((10, 0)), np.zeros((10, 0)), np.zeros(0), 5.0, 0)
+    assert none.family_wise_p == 1.0

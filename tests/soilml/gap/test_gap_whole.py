@@ -7,9 +7,9 @@ import pytest
 from gap_sets import MODEL, analysed, case_of, driven, hidden
 
 from soilml.cli import main
+from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.gap import gap
-from soilml.gap.search.updated_case import model_text
 from soilml.physics.effects import EFFECTS
 
 FEW = {n: EFFECTS[n] for n in ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")}
@@ -24,10 +24,10 @@ def dug():
 
 
 def answers(report):
-    """Everything that is found, without the figures on rows kept back."""
+    """Everything that is found, without the figures on rows held out."""
     content = report.as_json()
-    content["gap"] = {k: v for k, v in content["gap"].items() if "kept back" not in v["what"]}
-    content["not_claimed"] = [said for said in content["not_claimed"] if "kept back" not in said]
+    content["gap"] = {k: v for k, v in content["gap"].items() if "held out" not in v["what"]}
+    content["not_claimed"] = [said for said in content["not_claimed"] if "held out" not in said]
     return content
 
 
@@ -60,7 +60,7 @@ def test_without_the_cause_in_the_catalogue_nothing_is_named_for_sure(dug):
 def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
     case, table = dug
     report = gap(case, table, effects=FEW, holdout=holdout, seed=3)
-    (what,) = {s.what for s in report.gap.values() if "kept back" in s.what}
+    (what,) = {s.description for s in report.gap.values() if "held out" in s.description}
     if holdout == "run":
         back = np.asarray([name in what for name in table["run"]])
         assert len(set(table["run"][back])) == 1  # a quarter of six
@@ -74,25 +74,28 @@ def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
     assert answers(other) == answers(report)
     key = "held_out_runs" if holdout == "run" else "held_out_region"
     assert other.gap[key].after > 2.0 * report.gap[key].after
-    assert report.gap[key].cells == 3 * back.sum()
+    assert report.gap[key].readings == 3 * back.sum()
 
 
 def test_runs_kept_back_change_no_fit(dug):
-    """What is fitted, and what is tried, is the same whatever the runs kept back say."""
+    """What is fitted, and which candidates are tried, does not depend on the held-out runs."""
     case, table = dug
     report = gap(case, table, effects=FEW, holdout="run", seed=3)
-    back = np.asarray([name in report.gap["held_out_runs"].what for name in table["run"]])
+    back = np.asarray([name in report.gap["held_out_runs"].description for name in table["run"]])
     torque = np.where(back, 1.7, 1.0) * table["torque_Nm"]
     changed = replace(table, columns=table.columns | {"torque_Nm": torque})
     other = gap(case, changed, effects=FEW, holdout="run", seed=3)
-    assert other.tried == report.tried and other.soil_before == report.soil_before
-    assert other.scatter == report.scatter and other.p_left == report.p_left
+    assert other.candidates == report.candidates and other.soil_before == report.soil_before
+    assert (
+        other.variance_components == report.variance_components
+        and other.p_residual == report.p_residual
+    )
 
 
 def test_the_named_effect_predicts_rows_kept_back(dug):
     report = gap(*dug, effects=FEW, holdout="load_N=140")
     region = report.gap["held_out_region"]
-    assert region.what == "load_N=140, kept back"
+    assert region.description == "load_N=140, held out"
     assert region.after < 0.25 * region.before
 
 
@@ -114,7 +117,7 @@ def test_rows_that_their_status_says_are_no_answer_are_left_out(dug):
     }
     more["torque_Nm"][-1] *= 3.0
     told = gap(case, replace(table, columns=more), effects=FEW).as_json()
-    assert told.pop("notes") == ["1 row is left out: its status is not ok"]
+    assert told.pop("notes") == ["1 row is excluded: the status is not ok"]
     assert plain.pop("notes") == []
     assert told == plain
 
@@ -137,7 +140,7 @@ def test_too_few_runs_to_keep_some_back():
     case = case_of()
     with pytest.raises(InputError, match="needs four runs or more; the table has 3"):
         gap(case, driven(case, loads=(40.0, 60.0, 90.0)), holdout="run")
-    with pytest.raises(InputError, match="keeps every row back"):
+    with pytest.raises(InputError, match="holds out every row"):
         gap(case, driven(case, loads=(60.0, 60.0)), holdout="load_N=60")
 
 
@@ -158,7 +161,7 @@ def model(dug, tmp_path_factory):
     case, table = dug
     report = gap(case, table, effects=FEW)
     assert report.status == "named"
-    (folder / "model.toml").write_text(model_text(report.model, [report.sentence]))
+    (folder / "model.toml").write_text(case_as_toml(report.model, [report.sentence]))
     names = list(table.columns)
     rows = [",".join(str(table[n][i]) for n in names) for i in range(len(table))]
     (folder / "runs.csv").write_text("\n".join([",".join(names), *rows]) + "\n")

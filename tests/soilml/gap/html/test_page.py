@@ -14,14 +14,14 @@ from soilml.gap.html.page import page
 from soilml.gap.html.plots import MOST_RUNS, chosen_runs
 from soilml.gap.results import (
     STATUSES,
-    Curves,
+    CandidateSummary,
+    Discrepancy,
+    EstimatedValue,
+    GapReduction,
     GapReport,
     NamedEffect,
     NextRun,
-    Shrink,
-    Tried,
-    Value,
-    Where,
+    ReadingsAndPredictions,
 )
 from soilml.physics.effects import EFFECTS
 
@@ -81,7 +81,7 @@ def curves(runs=8, channels=("torque_Nm", "drawbar_pull_N", "sinkage_m"), slips=
     run, slip, channel = run.ravel(), slip.ravel(), channel.ravel()
     load = 40.0 + 10.0 * run
     true = load * slip
-    return Curves(
+    return ReadingsAndPredictions(
         channels=channels,
         channel=channel,
         run=tuple(f"r{i}" for i in run),
@@ -100,8 +100,8 @@ def report(status="named", **changes):
     wheel = Model(Wheel(radius=0.15, width=0.12))
     case = Case(wheel + EFFECTS["slip-sinkage"](n1=0.4), soil("wong1989/dry_sand"))
     channels = {"torque_Nm": (55.2, 1.11), "drawbar_pull_N": (26.8, 1.06), "sinkage_m": (879, 0.83)}
-    shrink = Shrink(320.2, 1.0017, channels, 192, "all rows fitted")
-    n1 = {"n1": Value(0.40134, 0.00147, "1")}
+    reduction = GapReduction(320.2, 1.0017, channels, 192, "all rows fitted")
+    n1 = {"n1": EstimatedValue(0.40134, 0.00147, "1")}
     whole = GapReport(
         status=status,
         sentence="The gap is slip-sinkage: mean squared residual 3.2e+02 -> 1 (1 is the noise).",
@@ -109,29 +109,44 @@ def report(status="named", **changes):
         effects=(NamedEffect("slip-sinkage", n1, (), 184.3, "exit-angle"),),
         cause_set=(("slip-sinkage",), ("grousers", "bulldozing")),
         where=(
-            Where("sinkage_m", (0.4, 0.6), (40.0, 80.0), 122.9, 0.0002),
-            Where("torque_Nm", (0.1, 0.3), (80.0, 150.0), 2.1, 0.4),
+            Discrepancy("sinkage_m", (0.4, 0.6), (40.0, 80.0), 122.9, 0.0002),
+            Discrepancy("torque_Nm", (0.1, 0.3), (80.0, 150.0), 2.1, 0.4),
         ),
         gap={
-            "train": shrink,
-            "held_out_runs": replace(shrink, what="every run predicted by fits to the others"),
-            "held_out_region": replace(shrink, what="load_N >= 150, predicted from the rest"),
+            "train": reduction,
+            "held_out_runs": replace(
+                reduction, description="every run predicted by fits to the others"
+            ),
+            "held_out_region": replace(
+                reduction, description="load_N >= 150, predicted from the rest"
+            ),
         },
-        soil_before={"friction_angle": Value(0.404, 0.0013, "rad"), "kc": Value(0.0, 0.0, "Pa")},
-        soil_after={"friction_angle": Value(0.47694, 0.0013, "rad"), "kc": Value(9.0, 1.0, "Pa")},
+        soil_before={
+            "friction_angle": EstimatedValue(0.404, 0.0013, "rad"),
+            "kc": EstimatedValue(0.0, 0.0, "Pa"),
+        },
+        soil_after={
+            "friction_angle": EstimatedValue(0.47694, 0.0013, "rad"),
+            "kc": EstimatedValue(9.0, 1.0, "Pa"),
+        },
         mimic_radius=0.62,
         next_runs=(NextRun("reverse", "the same run driven the other way", 7.25, ()),),
-        tried=(
-            Tried(("slip-sinkage",), 61202.8, 61284.0, 0.0, "explains the data"),
-            Tried(("grousers", "bulldozing"), float("nan"), 7.0, 9.0, "more effects than needed"),
+        candidates=(
+            CandidateSummary(("slip-sinkage",), 61202.8, 61284.0, 0.0, "explains the data"),
+            CandidateSummary(
+                ("grousers", "bulldozing"), float("nan"), 7.0, 9.0, "more effects than needed"
+            ),
         ),
         untestable={"rate": "needs speed_m_s"},
         notes=("sinkage_m scatters 1.3 times as much as declared",),
         not_claimed=("that a smaller gap proves a cause",),
-        scatter={"noise_scale_torque_Nm": 0.87, "friction_angle_from_run_to_run_rad": 0.00698},
-        remainder={"torque_Nm": 0.25, "sinkage_m": 0.0},
+        variance_components={
+            "noise_scale_torque_Nm": 0.87,
+            "friction_angle_from_run_to_run_rad": 0.00698,
+        },
+        residual_trend={"torque_Nm": 0.25, "sinkage_m": 0.0},
         p_gap=0.00025,
-        p_left=0.86,
+        p_residual=0.86,
         seed=7,
         curves=curves(),
     )
@@ -173,15 +188,15 @@ def test_hostile_names_stay_text():
         notes=(EVIL,),
         not_claimed=(EVIL,),
         untestable={EVIL: EVIL},
-        remainder={EVIL: 1.0},
-        scatter={EVIL: 1.0},
+        residual_trend={EVIL: 1.0},
+        variance_components={EVIL: 1.0},
         cause_set=((EVIL,),),
-        effects=(NamedEffect(EVIL, {EVIL: Value(1.0, 0.1, EVIL)}, (EVIL,), 1.0, EVIL),),
-        where=(Where(EVIL, (0.1, 0.2), (1.0, 2.0), 5.0, 0.01),),
-        tried=(Tried((EVIL,), 1.0, 1.0, 0.0, EVIL),),
+        effects=(NamedEffect(EVIL, {EVIL: EstimatedValue(1.0, 0.1, EVIL)}, (EVIL,), 1.0, EVIL),),
+        where=(Discrepancy(EVIL, (0.1, 0.2), (1.0, 2.0), 5.0, 0.01),),
+        candidates=(CandidateSummary((EVIL,), 1.0, 1.0, 0.0, EVIL),),
         next_runs=(NextRun(EVIL, EVIL, 1.0, ()),),
-        soil_before={EVIL: Value(1.0, 0.1, EVIL)},
-        gap={EVIL: Shrink(2.0, 1.0, {EVIL: (2.0, 1.0)}, 9, EVIL)},
+        soil_before={EVIL: EstimatedValue(1.0, 0.1, EVIL)},
+        gap={EVIL: GapReduction(2.0, 1.0, {EVIL: (2.0, 1.0)}, 9, EVIL)},
         curves=replace(c, run=tuple(EVIL + r for r in c.run), channels=(EVIL, *c.channels[1:])),
     )
     html = page(whole, EVIL, EVIL)
@@ -213,7 +228,7 @@ def test_figures_stand_where_people_look_for_them():
 
 
 def test_a_gap_that_did_not_change_is_drawn_once():
-    same = Shrink(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
+    same = GapReduction(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
     html = page(report("no-gap", gap={"train": same}, effects=(), cause_set=()), "m", "r")
     assert "before and after" not in html
     assert "Dashed" not in html
@@ -223,10 +238,12 @@ def test_figures_that_are_none_break_nothing():
     nan, inf = float("nan"), float("inf")
     c = curves(channels=("sinkage_m",), slips=1)
     c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan), held_out=c.load > 60.0)
-    odd = Shrink(inf, nan, {"sinkage_m": (nan, 0.0)}, 0, "")
-    old = {"n": Value(nan, nan, "1"), "kphi": Value(0.0, inf, "N/m^(n+2)")}
-    whole = report(curves=c, gap={"train": odd}, soil_before=old, soil_after=old, p_left=nan)
-    read(page(replace(whole, where=(Where("sinkage_m", (0, 1), (1, 2), inf, nan),)), "m", "r"))
+    odd = GapReduction(inf, nan, {"sinkage_m": (nan, 0.0)}, 0, "")
+    old = {"n": EstimatedValue(nan, nan, "1"), "kphi": EstimatedValue(0.0, inf, "N/m^(n+2)")}
+    whole = report(curves=c, gap={"train": odd}, soil_before=old, soil_after=old, p_residual=nan)
+    read(
+        page(replace(whole, where=(Discrepancy("sinkage_m", (0, 1), (1, 2), inf, nan),)), "m", "r")
+    )
 
 
 def test_runs_are_drawn_from_all_loads():

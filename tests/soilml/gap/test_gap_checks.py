@@ -1,24 +1,24 @@
-"""The gate: which data are analysed, what is set aside, and what is said."""
+"""Data checks: which data are analysed, which readings are excluded, and the messages."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, bench_of, case_of, driven
+from gap_sets import MODEL, case_of, driven, fit_problem
 
-from soilml.gap.data.checks import examined, repeated_noise, without_repeats
-from soilml.gap.data.observations import cells_of
+from soilml.gap.data.checks import check_readings, estimate_repeat_noise, without_duplicate_rows
+from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.statistics.outliers import outliers
-from soilml.gap.statistics.smooth_basis import smooth_columns
+from soilml.gap.statistics.smooth_basis import smooth_basis
 from soilml.io.table import Table
 
 
-def gate(table, text=MODEL):
+def check(table, text=MODEL):
     case = case_of(text)
-    table, repeats = without_repeats(table)
-    cells = cells_of(case, table)
-    cells = cells.with_noise(repeated_noise(cells)[0])
-    return examined(cells, table, repeats, 3)
+    table, repeats = without_duplicate_rows(table)
+    readings = stack_readings(case, table)
+    readings = readings.with_default_std(estimate_repeat_noise(readings)[0])
+    return check_readings(readings, table, repeats, 3)
 
 
 def changed(table, **columns):
@@ -30,38 +30,38 @@ def joined(*tables):
 
 
 def test_sound_runs_pass():
-    found = gate(driven(case_of()))
-    assert found.refused == found.unnameable == found.notes == ()
+    found = check(driven(case_of()))
+    assert found.errors == found.naming_obstacles == found.notes == ()
 
 
 def test_readings_far_from_all_others_are_found_and_no_others():
     case = case_of()
     table = driven(case, seed=4)
-    bench = bench_of(case, table)
-    soil = bench.soil_only([np.full(3, 0.5)])
+    problem = fit_problem(case, table)
+    soil = problem.fit_soil([np.full(3, 0.5)])
     space = np.column_stack(
-        [np.linalg.solve(bench.covariance.whiten, soil.slope), smooth_columns(bench.cells)]
+        [np.linalg.solve(problem.covariance.whiten, soil.jacobian), smooth_basis(problem.readings)]
     )
-    residual = bench.cells.reading - soil.prediction
-    assert not outliers(bench.covariance, residual, space).any()
+    residual = problem.readings.reading - soil.prediction
+    assert not outliers(problem.covariance, residual, space).any()
     struck = np.isin(np.arange(len(residual)), (9, 50, 77))
-    far = residual + np.where(struck, 9.0, 0.0) * bench.covariance.std
-    np.testing.assert_array_equal(outliers(bench.covariance, far, space), struck)
+    far = residual + np.where(struck, 9.0, 0.0) * problem.covariance.std
+    np.testing.assert_array_equal(outliers(problem.covariance, far, space), struck)
 
 
 def test_rows_that_repeat_to_the_last_digit_count_once():
     table = driven(case_of())
     again = joined(table, table.rows(np.asarray([2, 5])))
-    kept, repeats = without_repeats(again)
+    kept, repeats = without_duplicate_rows(again)
     assert repeats == 2 and len(kept) == len(table)
     np.testing.assert_array_equal(kept["torque_Nm"], table["torque_Nm"])
-    assert "2 rows repeat another one" in gate(again).notes[0]
-    assert "rows repeat another one" in gate(joined(table, table)).refused[0]
+    assert "2 rows are exact duplicates" in check(again).notes[0]
+    assert "rows are exact duplicates" in check(joined(table, table)).errors[0]
 
 
 def test_rows_driven_alike_with_other_readings_are_no_repeats():
     table = joined(driven(case_of(), seed=1), driven(case_of(), seed=2))
-    assert without_repeats(table)[1] == 0
+    assert without_duplicate_rows(table)[1] == 0
 
 
 @pytest.mark.parametrize(
@@ -73,41 +73,41 @@ def test_rows_driven_alike_with_other_readings_are_no_repeats():
     ],
 )
 def test_runs_that_can_name_nothing(how, said):
-    found = gate(driven(case_of(), **how))
-    assert found.refused == ()
-    assert any(said in reason for reason in found.unnameable)
+    found = check(driven(case_of(), **how))
+    assert found.errors == ()
+    assert any(said in reason for reason in found.naming_obstacles)
 
 
 def test_a_sensor_that_shows_the_same_in_every_row_is_dead():
     table = driven(case_of())
-    found = gate(changed(table, sinkage_m=np.full(len(table), 0.01)))
-    assert found.refused == ("sinkage_m is the same in every row: is the sensor alive?",)
+    found = check(changed(table, sinkage_m=np.full(len(table), 0.01)))
+    assert found.errors == ("sinkage_m is the same in every row: check the sensor",)
 
 
 def test_readings_as_few_as_parameters_show_nothing():
     table = driven(case_of(), loads=(40.0, 80.0), slips=1)
-    assert "6 readings for 3 soil parameters" in gate(table).refused[0]
+    assert "6 readings for 3 soil parameters" in check(table).errors[0]
 
 
 def test_a_table_without_any_reading_is_refused():
     table = driven(case_of())
     blank = np.full(len(table), np.nan)
-    found = gate(changed(table, torque_Nm=blank, drawbar_pull_N=blank, sinkage_m=blank))
-    assert found.refused == ("no torque, drawbar pull or sinkage was measured",)
+    found = check(changed(table, torque_Nm=blank, drawbar_pull_N=blank, sinkage_m=blank))
+    assert found.errors == ("no torque, drawbar pull or sinkage was measured",)
 
 
 QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
 
 
 def test_noise_that_nobody_declared_is_asked_for():
-    found = gate(driven(case_of()), QUIET)
-    assert len(found.refused) == 1
-    assert "give [noise] sinkage_m, or sinkage_m_std" in found.refused[0]
+    found = check(driven(case_of()), QUIET)
+    assert len(found.errors) == 1
+    assert "give [noise] sinkage_m, or sinkage_m_std" in found.errors[0]
 
 
 def test_a_column_of_standard_deviations_declares_noise():
     table = driven(case_of())
-    assert gate(changed(table, sinkage_m_std=np.full(len(table), 1e-4)), QUIET).refused == ()
+    assert check(changed(table, sinkage_m_std=np.full(len(table), 1e-4)), QUIET).errors == ()
 
 
 def test_rows_driven_alike_speak_for_noise_that_nobody_declared():
@@ -120,8 +120,8 @@ def test_rows_driven_alike_speak_for_noise_that_nobody_declared():
         sinkage_m=driven(case_of(), loads=(60.0, 60.0, 90.0, 90.0) * 6, noise=0.0)["sinkage_m"]
         + spread,
     )
-    found, notes = repeated_noise(cells_of(case, table))
+    found, notes = estimate_repeat_noise(stack_readings(case, table))
     assert list(found) == ["sinkage"]
     assert found["sinkage"] == pytest.approx(2e-4, rel=0.2)
     assert "noise of sinkage_m is not declared" in notes[0]
-    assert gate(table, QUIET).refused == ()
+    assert check(table, QUIET).errors == ()

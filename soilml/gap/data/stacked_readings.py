@@ -1,4 +1,4 @@
-"""Measured cells: every reading of every channel, with what it was measured under."""
+"""Measured readings of all channels stacked in one vector, with their operating points."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
+from soilml.identification.observations import declared_std
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
@@ -16,22 +17,22 @@ from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-#: A value counts as another one if it differs by this share of the range.
-DISTINCT = 0.02
+#: Values that differ by less than this fraction of the range count as one.
+DISTINCT_FRACTION = 0.02
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Rows (n,) as driven, and the readings (m,) taken in them, channel by channel.
+class StackedReadings:
+    """Operating points of n rows, and the m readings of all channels in one vector.
 
-    `row` says in which row a reading was taken and `channel` which of `channels` it is; `std` is
-    its declared noise, NaN where nothing is declared.
+    `row` and `channel` are the row and the index in `channels` of each reading; `std` is its
+    declared noise, NaN where none is declared.
     """
 
     at: Operating
-    run: Integers  # (n,) number of the run of each row
+    run: Integers  # (n,) index of each row's run in `runs`
     runs: tuple[str, ...]
-    order: Integers  # (n,) place of the row in its run
+    order: Integers  # (n,) position of the row in its run, by time
     channels: tuple[str, ...]
     row: Integers  # (m,)
     channel: Integers  # (m,)
@@ -44,74 +45,80 @@ class Cells:
 
     @property
     def slip(self) -> Floats:
-        """Slip of each cell, (m,)."""
+        """Slip of each reading, (m,)."""
         return np.asarray(self.at.slip)[self.row]
 
     @property
     def load(self) -> Floats:
-        """Load of each cell, (m,), N."""
+        """Load of each reading, (m,), N."""
         return np.asarray(self.at.load)[self.row]
 
-    def of(self, force: dict[str, Floats]) -> Floats:
-        """Channels (..., n) as cells (..., m)."""
+    def stack(self, force: dict[str, Floats]) -> Floats:
+        """Values of each channel by row, (..., n), as one vector, (..., m)."""
         stacked = np.stack([force[name] for name in self.channels], axis=-1)
         return np.asarray(stacked[..., self.row, self.channel])
 
-    def keeping(self, cells: NDArray[np.bool_]) -> Cells:
-        """These cells alone; rows stay."""
+    def subset(self, selected: NDArray[np.bool_]) -> StackedReadings:
+        """The selected readings; all rows are retained."""
         return replace(
             self,
-            row=self.row[cells],
-            channel=self.channel[cells],
-            reading=self.reading[cells],
-            std=self.std[cells],
+            row=self.row[selected],
+            channel=self.channel[selected],
+            reading=self.reading[selected],
+            std=self.std[selected],
         )
 
-    def expecting(self, expected: Floats) -> Cells:
-        """The same cells with the noise that expected readings (m,) have.
+    def with_noise_at(self, expected: Floats) -> StackedReadings:
+        """The readings with the noise that is declared for the expected values (m,).
 
-        A share of the reading itself would give low readings too much weight.
+        Noise that is a fraction of the reading itself would give low readings too much weight. A
+        standard deviation is at least a thousandth of its channel's median.
         """
         std = self.std.copy()
         for i, noise in enumerate(self.noise):
-            here = self.channel == i
+            in_channel = self.channel == i
             if noise is not None:
-                std[here] = noise.std(expected[here])
+                std[in_channel] = noise.std(expected[in_channel])
         floor = np.asarray([1e-3 * np.median(self.std[self.channel == i]) for i in self.channel])
         return replace(self, std=np.maximum(std, floor))
 
-    def declared(self) -> tuple[Cells, list[str]]:
-        """The channels whose noise is known, if there is one, and what was left out in words."""
+    def with_known_noise(self) -> tuple[StackedReadings, list[str]]:
+        """The channels with known noise, if there are any, and notes about the excluded ones."""
         unknown = {int(i) for i in self.channel[~np.isfinite(self.std)]}
         if not unknown or len(unknown) == len(self.channels):
             return self, []
-        said = [
-            f"{column(self.channels[i])} is left out: its noise is not declared and no rows were "
-            "driven alike"
+        notes = [
+            f"{column(self.channels[i])} is excluded: its noise is not declared and there are no "
+            "repeated rows to estimate it from"
             for i in sorted(unknown)
         ]
         kept = [i for i in range(len(self.channels)) if i not in unknown]
-        cells = self.keeping(np.isin(self.channel, kept))
-        place = {old: new for new, old in enumerate(kept)}
+        readings = self.subset(np.isin(self.channel, kept))
+        index = {old: new for new, old in enumerate(kept)}
         return replace(
-            cells,
+            readings,
             channels=tuple(self.channels[i] for i in kept),
             noise=tuple(self.noise[i] for i in kept),
-            channel=np.asarray([place[int(i)] for i in cells.channel], dtype=np.int64),
-        ), said
+            channel=np.asarray([index[int(i)] for i in readings.channel], dtype=np.int64),
+        ), notes
 
-    def with_noise(self, std: dict[str, float]) -> Cells:
-        """The same cells with these constant standard deviations where none was declared."""
-        own = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])
-        return replace(self, std=np.where(np.isfinite(self.std), self.std, own))
+    def with_default_std(self, std: dict[str, float]) -> StackedReadings:
+        """The readings with these standard deviations, by channel, where none is declared."""
+        default = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])
+        return replace(self, std=np.where(np.isfinite(self.std), self.std, default))
 
 
-def cells_of(case: Case, table: Table) -> Cells:
-    """Every reading of a channel that the model predicts, with its declared noise.
+def stack_readings(case: Case, table: Table) -> StackedReadings:
+    """All finite readings of the channels that the model predicts, with their declared noise.
 
-    Noise comes from `<column>_std`, else from [noise] of the case.
+    Noise is that of `<column>_std`, else of [noise] in the case; a standard deviation that is not
+    positive counts as undeclared.
     """
-    names = tuple(name for name in CHANNELS if column(name) in table and _any(table[column(name)]))
+    names = tuple(
+        name
+        for name in CHANNELS
+        if column(name) in table and np.isfinite(table[column(name)]).any()
+    )
     runs, number = np.unique(table["run"], return_inverse=True)
     time = table["time_s"] if "time_s" in table else np.arange(len(table), dtype=np.float64)
     order = np.zeros(len(table), dtype=np.int64)
@@ -125,8 +132,8 @@ def cells_of(case: Case, table: Table) -> Cells:
         row.append(kept)
         channel.append(np.full(kept.size, i))
         reading.append(values[kept])
-        std.append(declared_std(case, table, column(name))[kept])
-    return Cells(
+        std.append(positive_std(case, table, column(name))[kept])
+    return StackedReadings(
         at=operating_points(table),
         run=number.astype(np.int64),
         runs=tuple(str(name) for name in runs),
@@ -142,28 +149,20 @@ def cells_of(case: Case, table: Table) -> Cells:
     )
 
 
-def declared_std(case: Case, table: Table, key: str) -> Floats:
-    """Declared noise of a column, (n,), NaN where there is none."""
-    std = np.full(len(table), np.nan)
-    if f"{key}_std" in table:
-        std = table[f"{key}_std"].copy()
-    if key in case.noise:
-        std = np.where(np.isfinite(std), std, case.noise[key].std(table[key]))
+def positive_std(case: Case, table: Table, key: str) -> Floats:
+    """Declared standard deviation of a column, (n,); NaN where it is absent or not positive."""
+    std = declared_std(case, table, key)
     return np.where(std > 0, std, np.nan)
 
 
-def _any(values: Floats) -> bool:
-    return bool(np.isfinite(values).any())
-
-
-def distinct(values: Floats) -> int:
-    """How many values there are, those within a fiftieth of the range counted as one."""
+def count_distinct(values: Floats) -> int:
+    """Number of distinct values; those within `DISTINCT_FRACTION` of the range count as one."""
     ordered = np.sort(np.asarray(values, dtype=np.float64))
     span = float(ordered[-1] - ordered[0])
     if span <= 1e-9 * max(1.0, abs(float(ordered[-1]))):
         return 1
     count, last = 1, ordered[0]
     for value in ordered:
-        if value - last > DISTINCT * span:
+        if value - last > DISTINCT_FRACTION * span:
             count, last = count + 1, value
     return count

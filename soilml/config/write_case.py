@@ -1,0 +1,60 @@
+"""Write a case as the text of a model file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from soilml.config.case import Case
+from soilml.parameters import declared
+from soilml.physics.soils import Soil
+
+
+def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
+    """The case as the text of a model file, in the order in which the file is documented.
+
+    `soilml.config.case.read_case` reads the same case back, to the last digit. Priors and noise
+    are inline values, which a general TOML writer would spread over many lines, and each line of
+    `comments` becomes a comment at the top.
+    """
+    lines = [f"# {line}" for line in comments]
+    lines += ["[gear]", f'type = "{case.model.gear.name}"']
+    lines += [
+        f"{k} = {_number(getattr(case.model.gear, k))}" for k in declared(type(case.model.gear))
+    ]
+    lines += ["", "[soil]"]
+    lines += [f"{k} = {_number(getattr(case.soil, k))}" for k in declared(Soil)]
+    soil_prior = {path: prior for path, prior in case.prior.items() if "." not in path}
+    if soil_prior:
+        lines += ["", "[soil.prior]"]
+        lines += [f"{path} = {_setting(p.as_setting())}" for path, p in soil_prior.items()]
+    if case.noise:
+        lines += ["", "[noise]"]
+        lines += [f"{key} = {_setting(noise.as_setting())}" for key, noise in case.noise.items()]
+    for effect in case.model.effects:
+        lines += ["", "[[effect]]", f'name = "{effect.name}"']
+        default = type(effect)()
+        for key in declared(type(effect)):
+            if float(getattr(effect, key)) != float(getattr(default, key)):
+                lines.append(f"{key} = {_number(getattr(effect, key))}")
+        priors = {p: v for p, v in case.prior.items() if p.startswith(f"{effect.name}.")}
+        if priors:
+            lines.append("[effect.prior]")
+            for path, prior in priors.items():
+                lines.append(f"{path.rpartition('.')[2]} = {_setting(prior.as_setting())}")
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: object) -> str:
+    text = repr(float(value))  # type: ignore[arg-type]
+    return text if any(c in text for c in ".en") else f"{text}.0"
+
+
+def _setting(value: object) -> str:
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, dict):
+        inner = ", ".join(f"{k} = {_setting(v)}" for k, v in value.items())
+        return "{ " + inner + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(_number(v) for v in value) + "]"
+    return _number(value)

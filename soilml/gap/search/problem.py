@@ -1,0 +1,117 @@
+"""The fit problem: data, covariance and catalogue, which all candidate fits share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.coordinates import (
+    EffectCoordinate,
+    FitCoordinate,
+    SoilCoordinate,
+    shape_coordinates,
+    size_coordinate,
+)
+from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
+from soilml.gap.statistics.reml_covariance import Covariance
+from soilml.gap.statistics.signatures import current_size, with_effect
+from soilml.physics.effects.base import Effect
+
+Floats = NDArray[np.float64]
+
+#: Size, in reference sizes, from which the fit of a new effect starts: away from zero, where the
+#: derivative of some effects vanishes.
+START_SIZE = 0.7
+#: Prior standard deviation of the error of a sensor or rig without calibration, in reference sizes.
+UNCALIBRATED_STD = 2.0
+#: Range of slip, and of log load, above which a shape coefficient can be estimated.
+MIN_SLIP_RANGE, MIN_LOG_LOAD_RANGE = 0.05, 0.1
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """Everything that stays the same while candidates are fitted.
+
+    `calibration` holds standard deviations of sensor and rig errors by effect name, in the unit of
+    the effect's size.
+    """
+
+    case: Case
+    soil: tuple[SoilCoordinate, ...]
+    readings: StackedReadings
+    covariance: Covariance
+    effects: Mapping[str, type[Effect]]
+    calibration: Mapping[str, float]
+
+    def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
+        """The effects of the catalogue without coordinates in a fit."""
+        fitted = {c.effect for c in fit.coordinates if isinstance(c, EffectCoordinate)}
+        return {name: effect for name, effect in self.effects.items() if name not in fitted}
+
+    def with_effects(self, names: Sequence[str]) -> Case:
+        """The case with these effects added."""
+        case = self.case
+        for name in names:
+            case = with_effect(case, self.effects[name])
+        return case
+
+    def size_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+        """The coordinates of the effects' sizes; sensor and rig errors have a Gaussian prior."""
+        coordinates = []
+        for name in names:
+            about = self.effects[name].about
+            default = UNCALIBRATED_STD * about.reference[about.size] if about.calibration else None
+            std = self.calibration.get(name, default)
+            coordinates.append(size_coordinate(self.effects[name], std))
+        return coordinates
+
+    def shape_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+        """The coordinates of the effects' shapes that the range of slip and load can determine."""
+        varies = {
+            "by_slip": np.ptp(self.readings.slip) > MIN_SLIP_RANGE,
+            "by_load": bool(np.ptp(np.log(self.readings.load)) > MIN_LOG_LOAD_RANGE),
+        }
+        shapes = [c for name in names for c in shape_coordinates(self.effects[name])]
+        return [c for c in shapes if varies[c.name]]
+
+    def fit_soil(self, starts: Sequence[Floats]) -> GapFit:
+        """The best of the fits of the soil alone, one from each start."""
+        fits = [
+            levenberg_marquardt(self.case, self.soil, self.readings, self.covariance.whiten, start)
+            for start in starts
+        ]
+        return min(fits, key=lambda fit: fit.objective)
+
+    def fit(
+        self, case: Case, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
+    ) -> GapFit:
+        """Fit from `start`, by path; other coordinates start at the case's value or small.
+
+        Where the model refuses a trial from there, the fit starts again with all effects at zero.
+        """
+        whiten = self.covariance.whiten
+        first = np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
+        try:
+            return levenberg_marquardt(case, coordinates, self.readings, whiten, first)
+        except InputError:
+            zero = np.asarray(
+                [
+                    start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0
+                    for c in coordinates
+                ]
+            )
+            return levenberg_marquardt(case, coordinates, self.readings, whiten, zero)
+
+    def _default_start(self, coordinate: FitCoordinate) -> float:
+        """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
+        if isinstance(coordinate, EffectCoordinate) and coordinate.is_shape:
+            return 0.0
+        if coordinate.path in self.case.parameters():
+            return current_size(self.case, coordinate.path, coordinate.prior.upper)
+        return START_SIZE if coordinate.upper > 0.0 else -START_SIZE

@@ -1,0 +1,148 @@
+"""Entries of a report that come from the analysis: one function for each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from soilml.gap.results import CandidateSummary, GapReduction, ReadingsAndPredictions
+from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.cross_validation import gap_reduction, held_out_region, held_out_runs
+from soilml.gap.search.iteration import Analysis
+from soilml.gap.search.stepwise import REJECTION_THRESHOLD
+from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
+from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.statistics.reml_covariance import FEW_RUNS
+from soilml.quantities import column
+
+#: Outliers that a note lists by name.
+LISTED_OUTLIERS = 6
+#: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
+AT_BOUND = 1e-3
+#: Factor on the declared noise above which a note is made.
+NOTABLE_NOISE_SCALE = 1.25
+
+
+def gap_reductions(analysis: Analysis, after: GapFit, seed: int) -> dict[str, GapReduction]:
+    """Figures of the fitted rows and of cross-validation, as far as the runs allow it."""
+    problem, soil = analysis.problem, analysis.result.soil
+    std = problem.covariance.std
+    description = "all rows fitted"
+    figures = {
+        "train": gap_reduction(
+            problem.readings, std, soil.prediction, after.prediction, description
+        ),
+        "held_out_runs": held_out_runs(problem, soil, after, seed),
+        "held_out_region": held_out_region(problem, soil, after),
+    }
+    return {name: entry for name, entry in figures.items() if entry is not None}
+
+
+def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
+    """All fitted candidates, the best first; `claimed` says whether the report claims a cause."""
+    result = analysis.result
+    if not result.candidates:
+        return []
+    lowest = min(c.objective for c in result.candidates)
+    accepted = {c.names for c in result.accepted}
+    summaries = []
+    for c in sorted(result.candidates, key=lambda c: c.objective):
+        single = len(c.names) == 1
+        predicted = result.predicted_gain.get(c.names[0], 0.0) if single else float("nan")
+        if c.names in accepted:
+            verdict = "explains the data" if claimed else "fits best, not claimed"
+        elif not c.catalogue_fit.converged:
+            verdict = "fit did not converge: no evidence"
+        elif c.objective <= lowest + REJECTION_THRESHOLD:
+            verdict = "more effects than needed"
+        else:
+            verdict = "rejected against the best"
+        achieved = result.soil.objective - c.objective
+        excess = c.objective - lowest
+        summaries.append(CandidateSummary(c.names, predicted, achieved, excess, verdict))
+    return summaries
+
+
+def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
+    """The explanations to distinguish: the accepted ones, or the only one and its runner-up."""
+    accepted, candidates = analysis.result.accepted, analysis.result.candidates
+    if len(accepted) != 1:
+        return list(accepted)
+    best = accepted[0]
+    others = [c for c in candidates if len(c.names) == len(best.names) and c != best]
+    return [best, *sorted(others, key=lambda c: c.objective)[:1]]
+
+
+def analysis_notes(analysis: Analysis, after: GapFit) -> list[str]:
+    """Notes on outliers, estimates at a bound, noise and run-to-run variation."""
+    readings = analysis.problem.readings
+    components = analysis.problem.covariance.components
+    notes = []
+    if analysis.outliers:
+        listed = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
+        notes.append(f"{len(analysis.outliers)} readings are outliers and were excluded: {listed}")
+    notes += _bound_notes(after.coordinates, after.x.tolist())
+    for name, scale in zip(readings.channels, components.noise_scale, strict=True):
+        if scale > NOTABLE_NOISE_SCALE:
+            notes.append(f"the noise of {column(name)} is {scale:.2g} times as large as declared")
+    if 1 < len(readings.runs) < FEW_RUNS:
+        notes.append(
+            f"run-to-run variation of the soil cannot be estimated from fewer than {FEW_RUNS} "
+            f"runs: {np.degrees(components.friction_angle_std):.2g} deg of friction angle and "
+            f"{components.bearing_std:.0%} of bearing strength are assumed, so mean squared "
+            "residuals may be below 1"
+        )
+    if components.autocorrelation > 0.0:
+        notes.append(
+            "the noise of neighbouring samples of a run is correlated "
+            f"({components.autocorrelation:.2g}), which reduces their weight"
+        )
+    return notes
+
+
+def _bound_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> list[str]:
+    notes = []
+    for c, value in zip(coordinates, x, strict=True):
+        if isinstance(c, SoilCoordinate):
+            if min(value, 1.0 - value) < AT_BOUND:
+                notes.append(f"{c.path} is at a bound of its prior")
+        elif value > c.upper - AT_BOUND * (c.upper - c.lower):
+            notes.append(f"{c.path} is at its upper bound")
+    return notes
+
+
+def variance_component_entries(analysis: Analysis) -> dict[str, float]:
+    """The variance components by their names in gap.json."""
+    channels = analysis.problem.readings.channels
+    components = analysis.problem.covariance.components
+    scales = {
+        f"noise_scale_{column(name)}": float(scale)
+        for name, scale in zip(channels, components.noise_scale, strict=True)
+    }
+    return scales | {
+        "friction_angle_from_run_to_run_rad": components.friction_angle_std,
+        "bearing_from_run_to_run": components.bearing_std,
+        "memory_of_samples": components.autocorrelation,
+    }
+
+
+def readings_and_predictions(analysis: Analysis, after: GapFit) -> ReadingsAndPredictions:
+    """Readings, predictions before and after, and the standard deviations of both."""
+    problem, readings = analysis.problem, analysis.problem.readings
+    jacobian = np.linalg.solve(problem.covariance.whiten, after.jacobian)
+    variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
+    prediction = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
+    return ReadingsAndPredictions(
+        channels=tuple(column(n) for n in readings.channels),
+        channel=readings.channel,
+        run=tuple(readings.runs[readings.run[r]] for r in readings.row),
+        slip=readings.slip,
+        load=readings.load,
+        reading=readings.reading,
+        std=problem.covariance.std,
+        before=analysis.result.soil.prediction,
+        after=prediction,
+        after_std=np.sqrt(np.maximum(variance, 0.0)),
+        held_out=np.zeros(len(readings), dtype=np.bool_),
+    )
