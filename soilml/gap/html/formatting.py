@@ -1,21 +1,21 @@
-"""Numbers, units and names as people read them."""
+"""Numbers, units and names as the page shows them."""
 
 from __future__ import annotations
 
 import math
 
-from soilml.gap.results import EstimatedValue
+from soilml.gap.results import EstimatedValue, decimal
 from soilml.quantities import COLUMNS
 
 _SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")
-#: SI unit -> factor and unit that people use; those of bearing are prefixed by size instead.
-_HANDY = {
+#: SI unit -> factor and display unit; moduli in N/m^(n+2) get a prefix by their size instead.
+_DISPLAY_UNITS = {
     "Pa": (1e-3, "kPa"),
     "rad": (180.0 / math.pi, "°"),
     "m": (1e3, "mm"),
     "N/m^3": (1e-3, "kN/m^3"),
 }
-_SCATTER = {
+_VARIANCE_COMPONENTS = {
     "friction_angle_from_run_to_run_rad": (
         "friction angle from run to run, std",
         180.0 / math.pi,
@@ -29,14 +29,14 @@ _NAMES = {
     "kc": "cohesive modulus of sinkage",
     "kphi": "frictional modulus of sinkage",
     "n": "exponent of sinkage",
-    "a0": "angle of most stress",
+    "a0": "angle of maximum stress",
     "a1": "its growth with slip",
 }
 _SYMBOLS |= {"a_1": "a₁"}
 
 
-def figure(x: float, digits: int = 3) -> str:
-    """A number to so many digits that count: 320, 1.00, 0.0832, 1.2 × 10⁷; a dash for none."""
+def format_number(x: float, digits: int = 3) -> str:
+    """A number to this many significant digits: 320, 1.00, 0.0832, 1.2 × 10⁷; a dash for NaN."""
     if math.isnan(x):
         return "–"
     if math.isinf(x):
@@ -44,27 +44,26 @@ def figure(x: float, digits: int = 3) -> str:
     if x != 0.0 and not 1e-3 <= abs(x) < 1e6:
         mantissa, _, exponent = f"{x:.{digits - 1}e}".partition("e")
         return _minus(f"{mantissa} × 10{_raised(int(exponent))}")
-    before = 1 if x == 0.0 else 1 + math.floor(math.log10(abs(x)))
-    return _minus(f"{x:.{max(0, digits - before)}f}")
+    return _minus(decimal(x, digits))
 
 
-def gain(x: float) -> str:
-    """A difference of objectives: to a tenth, without decimals from a thousand on."""
+def format_gain(x: float) -> str:
+    """A difference of objectives: one decimal, none from a thousand on."""
     if not math.isfinite(x):
-        return figure(x)
+        return format_number(x)
     return _minus(f"{x:.0f}" if abs(x) >= 999.95 else f"{x + 0.0:.1f}").replace("−0.0", "0.0")
 
 
-def chance(p: float) -> str:
-    """A p value, to two digits at most."""
+def format_p_value(p: float) -> str:
+    """A p value, to at most two digits."""
     text = "p < 0.001" if p < 1e-3 else f"p = {p:.2f}" if p >= 0.1 else f"p = {p:.2g}"
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def spread(value: float, std: float) -> str:
-    """Value and standard deviation, both to the second digit of the latter."""
+def format_with_std(value: float, std: float) -> str:
+    """Value ± standard deviation, both to the second significant digit of the latter."""
     if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
-        return figure(value, 4)
+        return format_number(value, 4)
     decimals = 1 - math.floor(math.log10(std))
     if -3 < decimals < 5:
         places = max(0, decimals)
@@ -76,62 +75,62 @@ def spread(value: float, std: float) -> str:
     return _minus(f"({inside}) × 10{_raised(power)}")
 
 
-def difference(x: float, std: float) -> str:
-    """A change with its sign, to the second digit of what it is uncertain by."""
+def format_change(x: float, std: float) -> str:
+    """A change with its sign, to the second significant digit of its standard deviation."""
     decimals = 1 - math.floor(math.log10(std)) if std > 0.0 and math.isfinite(std) else 3
-    return _minus(f"{x:+.{min(max(0, decimals), 6)}f}") if math.isfinite(x) else figure(x)
+    return _minus(f"{x:+.{min(max(0, decimals), 6)}f}") if math.isfinite(x) else format_number(x)
 
 
-def handy(unit: str, size: float) -> tuple[float, str]:
-    """Factor and unit for values of about that size."""
-    factor, name = _HANDY.get(unit, (1.0, unit))
+def display_unit(unit: str, size: float) -> tuple[float, str]:
+    """Factor and unit in which values of this size are shown."""
+    factor, name = _DISPLAY_UNITS.get(unit, (1.0, unit))
     if unit.startswith("N/m^("):
         factor, prefix = next(
             ((1.0 / f, p) for f, p in ((1e6, "M"), (1e3, "k")) if abs(size) >= f), (1.0, "")
         )
         name = prefix + unit
-    return factor, written(name)
+    return factor, format_unit(name)
 
 
-def written(unit: str) -> str:
-    """A unit with raised exponents; nothing for a pure number."""
+def format_unit(unit: str) -> str:
+    """A unit with superscript exponents; empty for a dimensionless number."""
     if unit in ("1", "-", ""):
         return ""
     base, caret, exponent = unit.partition("^")
     return base + (exponent.translate(_SUPERSCRIPT).replace(" ", "") if caret else "")
 
 
-def shown(value: EstimatedValue) -> str:
-    """A value with its standard deviation in a handy unit."""
-    factor, unit = handy(value.unit, value.value)
-    return joined(spread(factor * value.value, factor * value.std), unit)
+def format_estimate(value: EstimatedValue) -> str:
+    """An estimate ± standard deviation in its display unit."""
+    factor, unit = display_unit(value.unit, value.value)
+    return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
 
 
-def in_si(value: EstimatedValue) -> str:
-    """The same in SI, where that is another unit; else nothing."""
-    factor, _ = handy(value.unit, value.value)
+def format_in_si(value: EstimatedValue) -> str:
+    """The same in SI units; empty where that is the display unit."""
+    factor, _ = display_unit(value.unit, value.value)
     if factor == 1.0:
         return ""
-    return joined(spread(value.value, value.std), written(value.unit))
+    return with_unit(format_with_std(value.value, value.std), format_unit(value.unit))
 
 
-def joined(number: str, unit: str) -> str:
+def with_unit(number: str, unit: str) -> str:
     """A number and its unit."""
     return number + ("" if unit in ("", "°") else "\N{NO-BREAK SPACE}") + unit
 
 
-def channel(name: str) -> str:
+def channel_name(name: str) -> str:
     """A channel in words, from its column: `drawbar_pull_N` -> drawbar pull."""
     return _words(COLUMNS[name].name) if name in COLUMNS else name
 
 
 def channel_unit(name: str) -> tuple[float, str]:
-    """Factor and unit in which a channel is drawn."""
+    """Factor and unit in which a channel is plotted."""
     unit = COLUMNS[name].unit if name in COLUMNS else ""
-    return handy(unit, 1.0)
+    return display_unit(unit, 1.0)
 
 
-def parameter(path: str) -> str:
+def parameter_name(path: str) -> str:
     """A parameter in words, with its symbol: `friction_angle` -> friction angle φ."""
     for quantity in COLUMNS.values():
         if quantity.name == path:
@@ -140,19 +139,22 @@ def parameter(path: str) -> str:
     return path
 
 
-def between(low: float, high: float, digits: int = 3) -> str:
-    """A range, or the one value that it holds."""
-    one, two = (_trimmed(figure(x, digits)) for x in (low, high))
+def format_range(low: float, high: float, digits: int = 3) -> str:
+    """A range, or a single value where both ends agree."""
+    one, two = (_trimmed(format_number(x, digits)) for x in (low, high))
     return one if one == two else f"{one} to {two}" if low < 0.0 else f"{one}–{two}"
 
 
-def scattered(key: str, value: float) -> tuple[str, str]:
-    """One figure of the scatter that was found: what it is, and its size."""
+def format_variance_component(key: str, value: float) -> tuple[str, str]:
+    """Name and size of a variance component."""
     scale = "noise_scale_"
     if key.startswith(scale):
-        return f"noise of {channel(key[len(scale) :])}", f"{figure(value, 2)} × what was declared"
-    name, factor, unit = _SCATTER.get(key, (_words(key), 1.0, ""))
-    return name, f"{figure(factor * value, 2)}{unit}" if value != 0.0 else "none found"
+        return (
+            f"noise of {channel_name(key[len(scale) :])}",
+            f"{format_number(value, 2)} × the declared noise",
+        )
+    name, factor, unit = _VARIANCE_COMPONENTS.get(key, (_words(key), 1.0, ""))
+    return name, f"{format_number(factor * value, 2)}{unit}" if value != 0.0 else "none"
 
 
 def _words(name: str) -> str:

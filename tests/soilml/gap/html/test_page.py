@@ -1,5 +1,6 @@
 """The page says what the report says, stands alone, and lets nothing through."""
 
+import base64
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -11,7 +12,7 @@ from soilml import Model, Wheel, soil
 from soilml.config.case import Case
 from soilml.gap.html import formatting
 from soilml.gap.html.page import page
-from soilml.gap.html.plots import MOST_RUNS, chosen_runs
+from soilml.gap.html.prediction_curves import MOST_RUNS, select_runs
 from soilml.gap.results import (
     STATUSES,
     CandidateSummary,
@@ -73,6 +74,12 @@ def read(html):
     return seen
 
 
+def figures(seen):
+    """The SVG text of the embedded figures."""
+    head = "data:image/svg+xml;base64,"
+    return [base64.b64decode(s[len(head) :]).decode() for s in seen.fetched if s.startswith(head)]
+
+
 def curves(runs=8, channels=("torque_Nm", "drawbar_pull_N", "sinkage_m"), slips=5):
     rng = np.random.default_rng(0)
     run, slip, channel = np.meshgrid(
@@ -104,7 +111,8 @@ def report(status="named", **changes):
     n1 = {"n1": EstimatedValue(0.40134, 0.00147, "1")}
     whole = GapReport(
         status=status,
-        sentence="The gap is slip-sinkage: mean squared residual 3.2e+02 -> 1 (1 is the noise).",
+        sentence="The gap is explained by slip-sinkage: mean squared residual 320 -> 1.00 "
+        "(noise alone gives 1).",
         model=case,
         effects=(NamedEffect("slip-sinkage", n1, (), 184.3, "exit-angle"),),
         cause_set=(("slip-sinkage",), ("grousers", "bulldozing")),
@@ -138,7 +146,7 @@ def report(status="named", **changes):
             ),
         ),
         untestable={"rate": "needs speed_m_s"},
-        notes=("sinkage_m scatters 1.3 times as much as declared",),
+        notes=("the noise of sinkage_m is 1.3 times as large as declared",),
         not_claimed=("that a smaller gap proves a cause",),
         variance_components={
             "noise_scale_torque_Nm": 0.87,
@@ -174,10 +182,15 @@ def test_every_status_gives_a_whole_page_that_says_what_it_means(status):
 def test_the_page_needs_nothing_from_anywhere(whole):
     html = page(whole, "rover.toml", "runs.csv")
     seen = read(html)
-    assert not {"script", "iframe", "img", "object", "embed"} & set(seen.tags)
+    assert not {"script", "iframe", "object", "embed"} & set(seen.tags)
     known = {f"#{name}" for name in seen.ids}
-    assert set(seen.fetched) <= known | {"data:,"}
+    fetched = {source for source in seen.fetched if not source.startswith("data:image/svg+xml;")}
+    assert fetched <= known | {"data:,"}
     assert set(seen.targets) <= known
+    assert len(figures(seen)) == seen.tags.count("img")
+    for svg in figures(seen):
+        assert "<script" not in svg and "<image" not in svg
+        assert all(link.startswith("#") for link in re.findall(r'href="([^"]*)"', svg))
     assert "http:" not in html and "https:" not in html and "@import" not in html
 
 
@@ -211,18 +224,19 @@ def test_the_same_report_gives_the_same_bytes():
 
 
 def test_figures_stand_where_people_look_for_them():
-    text = " ".join(" ".join(read(page(report(), "rover.toml", "runs.csv")).text).split())
+    seen = read(page(report(), "rover.toml", "runs.csv"))
+    text = " ".join(" ".join([*seen.text, *figures(seen)]).split())
     for figure in (
         *("320", "1.00", "879", "0.830"),  # the gap, before and after
-        "mean squared residual 320 → 1",
+        "mean squared residual 320 → 1.00 (noise alone gives 1)",
         "0.4013 ± 0.0015",  # the effect
         *("23.147 ± 0.074", "27.327 ± 0.074", "+4.179°", "0.4040 ± 0.0013 rad"),  # the soil
         *("61203", "61284", "more effects than needed"),
         "7.25 σ",
         "p = 0.86",
-        "0.87 × what was declared",
+        "0.87 × the declared noise",
         *("rover.toml", "runs.csv", "seed 7", "needs speed_m_s"),
-        "Drawn are 6 of 8 runs",
+        "6 of 8 runs are shown",
     ):
         assert figure in text, figure
 
@@ -231,7 +245,7 @@ def test_a_gap_that_did_not_change_is_drawn_once():
     same = GapReduction(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
     html = page(report("no-gap", gap={"train": same}, effects=(), cause_set=()), "m", "r")
     assert "before and after" not in html
-    assert "Dashed" not in html
+    assert "Dashed lines" not in html
 
 
 def test_figures_that_are_none_break_nothing():
@@ -247,11 +261,11 @@ def test_figures_that_are_none_break_nothing():
 
 
 def test_runs_are_drawn_from_all_loads():
-    many = chosen_runs(curves(runs=16))
+    many = select_runs(curves(runs=16))
     assert len(many) == MOST_RUNS
     assert many[0].load == 40.0 and many[-1].load == 190.0
     assert len({run.colour for run in many}) == MOST_RUNS
-    assert len(chosen_runs(curves(runs=1))) == 1
+    assert len(select_runs(curves(runs=1))) == 1
 
 
 @pytest.mark.parametrize(
@@ -264,7 +278,7 @@ def test_runs_are_drawn_from_all_loads():
     ],
 )
 def test_values_are_written_to_the_digits_that_their_spread_leaves(value, std, text):
-    assert formatting.spread(value, std) == text
+    assert formatting.format_with_std(value, std) == text
 
 
 @pytest.mark.parametrize(
@@ -272,4 +286,4 @@ def test_values_are_written_to_the_digits_that_their_spread_leaves(value, std, t
     [(320.18, "320"), (0.0, "0.00"), (3311.0, "3311"), (1.2e7, "1.20 × 10⁷"), (-0.05, "−0.0500")],
 )
 def test_numbers_are_written_to_three_digits(x, text):
-    assert formatting.figure(x) == text
+    assert formatting.format_number(x) == text
