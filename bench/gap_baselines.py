@@ -18,17 +18,17 @@ from soilml.quantities import CHANNELS, column
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     """The effect that each baseline names, '' where it sees no gap."""
-    cells = stack_readings(case, table)
+    readings = stack_readings(case, table)
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-    known, _ = effect_signatures(soil_only, cells, effects)
-    y = predict_readings(soil_only, [], np.zeros((1, 0)), cells)[0]
-    r = (cells.reading - y) / cells.std
-    g = np.stack([s.column for s in known], axis=1) / cells.std[:, None]
+    known, _ = effect_signatures(soil_only, readings, effects)
+    y = predict_readings(soil_only, [], np.zeros((1, 0)), readings)[0]
+    r = (readings.reading - y) / readings.std
+    g = np.stack([s.column for s in known], axis=1) / readings.std[:, None]
     labels = [s.name for s in known]
     free = select_free(case, None)
     axes = [soil_coordinate(f) for f in free]
     at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
-    j = linearise(case, axes, at, cells)[1] / cells.std[:, None]
+    j = linearise(case, axes, at, readings)[1] / readings.std[:, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return {
@@ -37,7 +37,7 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
             "Lasso, BIC": _lasso(g, r, labels),
             "stepwise, AIC": _stepwise(g, r, j, labels, 2.0),
             "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
-            "random forest sees a gap": _forest(cells.slip, cells.load, cells.channel, r),
+            "random forest sees a gap": _forest(readings.slip, readings.load, readings.channel, r),
         }
 
 
@@ -68,7 +68,9 @@ def _lasso(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
     return _largest(fitted.coef_ / norm, g, labels)
 
 
-def _stepwise(g: np.ndarray, r: np.ndarray, j: np.ndarray, labels: list[str], price: float) -> str:
+def _stepwise(
+    g: np.ndarray, r: np.ndarray, j: np.ndarray, labels: list[str], penalty: float
+) -> str:
     """The first effect that a joint regression of soil and effects takes in."""
 
     def left(columns: np.ndarray) -> float:
@@ -76,7 +78,7 @@ def _stepwise(g: np.ndarray, r: np.ndarray, j: np.ndarray, labels: list[str], pr
         return float(np.sum((r - columns @ weights) ** 2))
 
     base = left(j)
-    costs = [left(np.column_stack([j, column_])) + price for column_ in g.T]
+    costs = [left(np.column_stack([j, column_])) + penalty for column_ in g.T]
     best = int(np.argmin(costs))
     return labels[best] if costs[best] < base else ""
 

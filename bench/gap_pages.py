@@ -69,7 +69,7 @@ def _misses(sets: Sequence[Judged]) -> str:
         f"{refused} of these are `unknown`, a refusal and no wrong name. They come where a strong "
         "effect at little noise bends further than two exponents follow (sideways slip along the "
         "velocity, a stress shift that grows with slip). False alarms of N3 remain after "
-        "strays are set aside: the smooth test is then the most sensitive one; most say "
+        "outliers are excluded: the smooth test is then the most sensitive one; most say "
         "`unknown`. The open set is named falsely where a cause acts just like an effect on these "
         "channels: vibration at high slip like an error of slip, a ripple of sinkage over few "
         "loads like a gain. Grousers cannot be told from a gain of the torque sensor, and small "

@@ -20,47 +20,47 @@ def stories(tmp_path_factory):
     sys.modules["stories"] = module
     spec.loader.exec_module(module)
     folder = tmp_path_factory.mktemp("stories")
-    return module.tell(folder), folder
+    return module.run_stories(folder), folder
 
 
-def phi_error(told, when):
-    return abs(told.said["soil"][when]["friction_angle"]["value"] - told.soil["friction_angle"])
+def phi_error(story, when):
+    return abs(story.report["soil"][when]["friction_angle"]["value"] - story.soil["friction_angle"])
 
 
 def test_slip_sinkage_by_another_law_is_found_and_predicts_heavier_loads(stories):
-    told = stories[0][0]
-    assert told.said["cause_set"] == [["slip-sinkage"]]
-    assert told.said["status"] in ("named", "form-open")
-    region = told.said["gap"]["held_out_region"]
+    story = stories[0][0]
+    assert story.report["cause_set"] == [["slip-sinkage"]]
+    assert story.report["status"] in ("named", "form-open")
+    region = story.report["gap"]["held_out_region"]
     assert region["after"] <= 0.25 * region["before"]
-    assert phi_error(told, "after") < phi_error(told, "before")
+    assert phi_error(story, "after") < phi_error(story, "before")
 
 
 def test_bulldozing_and_a_slope_look_alike_until_the_wheel_runs_in_reverse(stories):
     first, second = stories[0][1:3]
-    assert first.said["status"] == "class"
-    assert {("bulldozing",), ("slope",)} <= {tuple(c) for c in first.said["cause_set"]}
-    assert "reverse" in {run["kind"] for run in first.said["next_runs"]}
-    assert second.said["status"] == "named"
-    assert second.said["cause_set"] == [["bulldozing"]]
+    assert first.report["status"] == "class"
+    assert {("bulldozing",), ("slope",)} <= {tuple(c) for c in first.report["cause_set"]}
+    assert "reverse" in {run["kind"] for run in first.report["next_runs"]}
+    assert second.report["status"] == "named"
+    assert second.report["cause_set"] == [["bulldozing"]]
 
 
 def test_a_sensor_that_is_off_is_not_named_as_physics(stories):
-    told = stories[0][3]
-    assert told.said["status"] in ("named", "class")
-    assert any(SENSORS & set(names) for names in told.said["cause_set"])
-    assert ["torque-gain"] in told.said["cause_set"]
+    story = stories[0][3]
+    assert story.report["status"] in ("named", "class")
+    assert any(SENSORS & set(names) for names in story.report["cause_set"])
+    assert ["torque-gain"] in story.report["cause_set"]
 
 
 def test_where_nothing_is_hidden_nothing_is_found(stories):
-    assert stories[0][4].said["status"] == "no-gap"
-    assert stories[0][4].said["effects"] == []
+    assert stories[0][4].report["status"] == "no-gap"
+    assert stories[0][4].report["effects"] == []
 
 
 def test_what_no_catalogue_has_is_left_unnamed(stories):
-    told, folder = stories[0][5], stories[1]
-    assert told.said["status"] == "unknown"
-    assert told.said["cause_set"] == [] and told.said["effects"] == []
+    story, folder = stories[0][5], stories[1]
+    assert story.report["status"] == "unknown"
+    assert story.report["cause_set"] == [] and story.report["effects"] == []
     assert "[[effect]]" not in (folder / "unknown" / "gap" / "model.toml").read_text()
 
 

@@ -26,7 +26,7 @@ def run() -> None:
     kls1 = data / "kls1_rashid1" / "single_wheel_tests.csv"
     cmu = data / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
     if not (kls1.is_file() and cmu.is_file()):
-        sys.exit("set SOILML_DATA to the folder that holds kls1_rashid1 and cmu_smooth_wheel")
+        sys.exit("set SOILML_DATA to the folder that contains kls1_rashid1 and cmu_smooth_wheel")
     OUT.mkdir(parents=True, exist_ok=True)
     lugged(kls1)
     straight(cmu, "all", -1.0)
@@ -41,7 +41,7 @@ def lugged(table: Path) -> None:
     soil = json.loads(found.read_text())["parameters"]
     case = read_case(KLS1).with_values({name: entry["value"] for name, entry in soil.items()})
     case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
-    save_text(smooth, case_as_toml(case, ["the soil as the smooth wheel shows it"]))
+    save_text(smooth, case_as_toml(case, ["soil identified from the smooth wheel"]))
     rows = _rows(table, lambda row: row["run"] == "kls1_lug10_w59")
     runs = OUT / "kls1_lugged.csv"
     _written(runs, rows)

@@ -16,7 +16,7 @@ from datagen.blind_sets.factorial_plan import Plan
 from soilml.cli import main
 from soilml.io.text_tables import csv_text, format_table
 
-#: The plans of the stories; the truth stays in this file and never reaches the analyst.
+#: The plans of the stories; the analysis does not receive the truth.
 PLANS = {
     "slip-sinkage": Plan("B", "slip-sinkage/lyasko", 1.0, 0.01, 8, "dry-sand", 3, seed=2),
     "torque-sensor": Plan("S", "torque-gain", 1.0, 0.01, 8, "dry-sand", 3, seed=3),
@@ -28,16 +28,16 @@ SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Told:
-    """A story's end: what was hidden, what gap.json says, and the truth of the soil."""
+class Story:
+    """The result of a story: the hidden cause, the content of gap.json, and the true soil."""
 
     hidden: str
-    said: dict[str, Any]
+    report: dict[str, Any]
     soil: dict[str, float]
 
 
-def analysed(folder: Path, model: str, columns: dict[str, Any], *options: str) -> dict[str, Any]:
-    """Write what the analyst is given, run `soilml gap`, read gap.json."""
+def run_gap(folder: Path, model: str, columns: dict[str, Any], *options: str) -> dict[str, Any]:
+    """Write model and runs, run `soilml gap`, and read gap.json."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "model.toml").write_text(model)
     (folder / "runs.csv").write_text(csv_text(columns))
@@ -57,39 +57,39 @@ def both(drawn: Drawn) -> dict[str, Any]:
     return {n: [*drawn.columns[n], *region[n]] for n in names}
 
 
-def hidden_story(name: str, folder: Path) -> Told:
-    """A story of the sealed generator."""
+def hidden_story(name: str, folder: Path) -> Story:
+    """A story whose data come from the generator of blind sets."""
     plan = PLANS[name]
     drawn = draw(replace(plan))
-    said = analysed(folder / name, drawn.model, drawn.columns)
-    return Told(plan.cause or "nothing", said, drawn.truth["soil"])
+    report = run_gap(folder / name, drawn.model, drawn.columns)
+    return Story(plan.cause or "nothing", report, drawn.truth["soil"])
 
 
-def slip_sinkage(folder: Path) -> Told:
-    """Slip-sinkage by a law that the catalogue has not, soil differing from run to run."""
+def slip_sinkage(folder: Path) -> Story:
+    """Slip-sinkage by a law outside the catalogue, with soil that varies from run to run."""
     drawn = draw(PLANS["slip-sinkage"])
     columns = both(drawn)
     heaviest = max(columns["load_N"])
-    said = analysed(
+    report = run_gap(
         folder / "slip-sinkage", drawn.model, columns, "--holdout", f"load_N={float(heaviest)!r}"
     )
-    return Told("slip-sinkage, z = z0 (1 + s) / (1 - s / 2)", said, drawn.truth["soil"])
+    return Story("slip-sinkage, z = z0 (1 + s) / (1 - s / 2)", report, drawn.truth["soil"])
 
 
-def reverse_run(folder: Path) -> tuple[Told, Told]:
-    """A little bulldozing, which a slope of the bed mimics until the wheel runs in reverse."""
+def reverse_run(folder: Path) -> tuple[Story, Story]:
+    """A little bulldozing, which only a run in reverse distinguishes from a slope of the bed."""
     place = folder / "slope"
     place.mkdir(parents=True, exist_ok=True)
     (place / "rig.toml").write_text(TRUTH.format(share=SHARE))
     rng = np.random.default_rng(7)
     forward = [_simulated(place, f"run_{i}", 40.0 + 15.0 * i, 0.05, rng) for i in range(8)]
-    first = analysed(place, GIVEN, _joined(forward))
+    first = run_gap(place, MODEL, _pooled(forward))
     suggested = [run for run in first["next_runs"] if run["kind"] == "reverse"]
     print(f"suggested: {suggested[0]['text'] if suggested else 'no reverse run'}\n")
     backward = [_simulated(place, f"back_{i}", 40.0 + 35.0 * i, -0.05, rng) for i in range(4)]
-    second = analysed(place, GIVEN, _joined([*forward, *backward]))
+    second = run_gap(place, MODEL, _pooled([*forward, *backward]))
     soil = {"friction_angle": 0.5}
-    return Told("bulldozing", first, soil), Told("bulldozing, with a reverse run", second, soil)
+    return Story("bulldozing", first, soil), Story("bulldozing, with a reverse run", second, soil)
 
 
 def _simulated(
@@ -112,11 +112,11 @@ def _simulated(
     return columns
 
 
-def _joined(runs: list[dict[str, Any]]) -> dict[str, Any]:
+def _pooled(runs: list[dict[str, Any]]) -> dict[str, Any]:
     return {name: [v for run in runs for v in run[name]] for name in runs[0]}
 
 
-GIVEN = """\
+MODEL = """\
 [gear]
 type = "wheel"
 radius = 0.15
@@ -138,45 +138,45 @@ drawbar_pull_N = "1 % + 0.2"
 sinkage_m = "1 %"
 """
 TRUTH = (
-    GIVEN.replace("cohesion = 900.0", "cohesion = 1040.0")
+    MODEL.replace("cohesion = 900.0", "cohesion = 1040.0")
     .replace("friction_angle = 0.52", "friction_angle = 0.50")
     .replace("shear_modulus = 0.015", "shear_modulus = 0.012")
     + '[[effect]]\nname = "bulldozing"\nshare = {share}\n'
 )
 
 
-def tell(folder: Path) -> list[Told]:
-    """All stories, in order."""
+def run_stories(folder: Path) -> list[Story]:
+    """All stories, in the order of the table."""
     first, second = reverse_run(folder)
     rest = [hidden_story(name, folder) for name in ("torque-sensor", "nothing", "unknown")]
     return [slip_sinkage(folder), first, second, *rest]
 
 
-def line(told: Told) -> tuple[str, ...]:
-    """A story as a line of the table."""
-    said = told.said
-    causes = " | ".join("+".join(names) for names in said["cause_set"]) or "-"
-    region = said["gap"].get("held_out_region")
+def line(story: Story) -> tuple[str, ...]:
+    """A story as a row of the table."""
+    report = story.report
+    causes = " | ".join("+".join(names) for names in report["cause_set"]) or "-"
+    region = report["gap"].get("held_out_region")
     gap = "-" if region is None else f"{region['before']:.3g} -> {region['after']:.3g}"
     phi = "-"
-    if "friction_angle" in said["soil"]["after"]:
+    if "friction_angle" in report["soil"]["after"]:
         off = [
             abs(
                 np.degrees(
-                    said["soil"][when]["friction_angle"]["value"] - told.soil["friction_angle"]
+                    report["soil"][when]["friction_angle"]["value"] - story.soil["friction_angle"]
                 )
             )
             for when in ("before", "after")
         ]
         phi = f"{off[0]:.2f} -> {off[1]:.2f}"
-    return told.hidden, said["status"], causes, gap, phi
+    return story.hidden, report["status"], causes, gap, phi
 
 
 def run() -> None:
-    """Tell all stories and print how they ended."""
+    """Run all stories and print their results."""
     folder = Path("demo/gap")
     header = ("hidden", "status", "causes", "held-out region", "phi error, deg")
-    print(format_table(header, [line(told) for told in tell(folder)], text_columns=3))
+    print(format_table(header, [line(story) for story in run_stories(folder)], text_columns=3))
     print(f"\nreports: {folder}/*/gap/report.html", file=sys.stderr)
 
 

@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings, positive_std
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.design.planned_readings import planned_readings
 from soilml.gap.design.run_options import expected_readings, run_options
 from soilml.gap.statistics.coordinates import SoilCoordinate, linearise, soil_coordinate
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
-from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.numerics.subspaces import project_out
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.quantities import CHANNELS, SHEAR, column
-from soilml.row_status import Status
+from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
@@ -156,8 +155,9 @@ def audit(
     >>> slip, load = np.tile(np.linspace(0.1, 0.6, 6), 3), np.repeat([40.0, 60.0, 90.0], 6)
     >>> design = Table({"run": np.repeat(["a", "b", "c"], 6), "slip": slip, "load_N": load})
     >>> found = audit(case, design, effects={"slip-sinkage": EFFECTS["slip-sinkage"]})
-    >>> found.effects[0].separating_snr > 3.0
-    True
+    >>> e = found.effects[0]
+    >>> e.name, e.separating_snr > 3.0, round(e.absorbed, 3)
+    ('slip-sinkage', True, 0.121)
     """
     effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
     readings = planned_readings(case, design.rows(design.answered))
@@ -185,40 +185,6 @@ def audit(
         _indistinguishable_classes(signatures, readings.std, jacobian),
         {u.name: u.reason for u in untestable},
         tuple(added_runs),
-    )
-
-
-def planned_readings(case: Case, design: Table) -> StackedReadings:
-    """The readings that a case expects of a design, in the channels with declared noise."""
-    at = operating_points(design)
-    force = case.model(case.soil, at)
-    if np.any(force.status != 0):
-        row = int(np.flatnonzero(force.status)[0])
-        raise InputError(f"{design.place(row)}: {Status(int(force.status[row])).reason}")
-    names, readings, stds = [], [], []
-    for name in CHANNELS:
-        expected = np.asarray(getattr(force, name))
-        filled = Table({**design.columns, column(name): expected}, design.source, design.line)
-        std = positive_std(case, filled, column(name))
-        if np.isfinite(std).all():
-            names.append(name)
-            readings.append(expected)
-            stds.append(std)
-    if not names:
-        raise InputError("no channel has declared noise: give [noise] in the model file")
-    rows, channels = len(design), len(names)
-    runs, number = np.unique(design["run"], return_inverse=True)
-    return StackedReadings(
-        at=at,
-        run=number.astype(np.int64),
-        runs=tuple(str(r) for r in runs),
-        order=np.arange(rows),
-        channels=tuple(names),
-        row=np.tile(np.arange(rows), channels),
-        channel=np.repeat(np.arange(channels), rows),
-        reading=np.concatenate(readings),
-        std=np.concatenate(stds),
-        noise=tuple(case.noise.get(column(n)) for n in names),
     )
 
 

@@ -16,8 +16,6 @@ from soilml.gap.html.formatting import (
 from soilml.gap.results import EstimatedValue, GapReport
 from soilml.quantities import Z_90
 
-#: 95 % quantile of the standard normal distribution: ends of a 90 % interval.
-
 
 def soil_table(report: GapReport) -> list[dict[str, Any]]:
     """One row for each soil parameter."""
