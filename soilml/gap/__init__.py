@@ -1,4 +1,8 @@
-"""The gap workflow: where model and measurements disagree, and what is missing from the model."""
+"""Gap analysis: where a model disagrees with measurements, and which effect it lacks.
+
+`gap` analyses measured rows and returns a `GapReport`, whose status is one of `STATUSES`; `audit`
+determines which effects an experimental design could identify.
+"""
 
 from soilml.gap.design.identifiability_audit import Audit, audit
 from soilml.gap.results import STATUSES, GapReport

@@ -1,1 +1,1 @@
-"""Readings as vectors, and the checks that they must pass before an analysis."""
+"""Stacked readings, the data checks before an analysis, and held-out rows."""

@@ -1,1 +1,1 @@
-"""The report page of a gap analysis: formatting, plots and the page itself."""
+"""The report as an HTML page: one template and, where needed, one builder for each section."""

@@ -49,7 +49,7 @@ GLS_TOLERANCE = 1e-6
 class Analysis:
     """The final fit problem, the result of the search on it, and the excluded outliers.
 
-    `error` says why the data could not be analysed; it is empty where they could.
+    `error` is the reason why the data could not be analysed, or empty.
     """
 
     problem: FitProblem

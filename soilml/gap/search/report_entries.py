@@ -40,7 +40,7 @@ def gap_reductions(analysis: Analysis, after: GapFit, seed: int) -> dict[str, Ga
 
 
 def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
-    """All fitted candidates, the best first; `claimed` says whether the report claims a cause."""
+    """All fitted candidates, the best first; `claimed`: whether the report claims a cause."""
     result = analysis.result
     if not result.candidates:
         return []

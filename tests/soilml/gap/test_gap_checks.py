@@ -29,12 +29,12 @@ def joined(*tables):
     return Table({n: np.concatenate([t[n] for t in tables]) for n in tables[0].columns})
 
 
-def test_sound_runs_pass():
+def test_valid_runs_pass_all_checks():
     found = check(driven(case_of()))
     assert found.errors == found.naming_obstacles == found.notes == ()
 
 
-def test_readings_far_from_all_others_are_found_and_no_others():
+def test_only_planted_outliers_are_detected():
     case = case_of()
     table = driven(case, seed=4)
     problem = fit_problem(case, table)
@@ -49,7 +49,7 @@ def test_readings_far_from_all_others_are_found_and_no_others():
     np.testing.assert_array_equal(outliers(problem.covariance, far, space), struck)
 
 
-def test_rows_that_repeat_to_the_last_digit_count_once():
+def test_exact_duplicates_are_excluded():
     table = driven(case_of())
     again = joined(table, table.rows(np.asarray([2, 5])))
     kept, repeats = without_duplicate_rows(again)
@@ -59,7 +59,7 @@ def test_rows_that_repeat_to_the_last_digit_count_once():
     assert "rows are exact duplicates" in check(joined(table, table)).errors[0]
 
 
-def test_rows_driven_alike_with_other_readings_are_no_repeats():
+def test_repeated_rows_with_other_readings_are_no_duplicates():
     table = joined(driven(case_of(), seed=1), driven(case_of(), seed=2))
     assert without_duplicate_rows(table)[1] == 0
 
@@ -72,19 +72,19 @@ def test_rows_driven_alike_with_other_readings_are_no_repeats():
         ({"slips": 2, "loads": (40.0, 60.0, 80.0, 100.0)}, "fewer than three slips"),
     ],
 )
-def test_runs_that_can_name_nothing(how, said):
+def test_obstacles_to_naming_a_cause_are_reported(how, said):
     found = check(driven(case_of(), **how))
     assert found.errors == ()
     assert any(said in reason for reason in found.naming_obstacles)
 
 
-def test_a_sensor_that_shows_the_same_in_every_row_is_dead():
+def test_a_constant_sensor_is_an_error():
     table = driven(case_of())
     found = check(changed(table, sinkage_m=np.full(len(table), 0.01)))
     assert found.errors == ("sinkage_m is the same in every row: check the sensor",)
 
 
-def test_readings_as_few_as_parameters_show_nothing():
+def test_too_few_readings_are_an_error():
     table = driven(case_of(), loads=(40.0, 80.0), slips=1)
     assert "6 readings for 3 soil parameters" in check(table).errors[0]
 
@@ -99,7 +99,7 @@ def test_a_table_without_any_reading_is_refused():
 QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
 
 
-def test_noise_that_nobody_declared_is_asked_for():
+def test_undeclared_noise_is_an_error():
     found = check(driven(case_of()), QUIET)
     assert len(found.errors) == 1
     assert "give [noise] sinkage_m, or sinkage_m_std" in found.errors[0]
@@ -110,7 +110,7 @@ def test_a_column_of_standard_deviations_declares_noise():
     assert check(changed(table, sinkage_m_std=np.full(len(table), 1e-4)), QUIET).errors == ()
 
 
-def test_rows_driven_alike_speak_for_noise_that_nobody_declared():
+def test_undeclared_noise_is_estimated_from_repeated_rows():
     case = case_of(QUIET)
     table = joined(*[driven(case_of(), loads=(60.0, 60.0, 90.0, 90.0), seed=s) for s in range(6)])
     rng = np.random.default_rng(0)

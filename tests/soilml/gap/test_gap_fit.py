@@ -44,7 +44,7 @@ def test_a_fit_stops_at_the_bounds_of_the_prior(clean):
     )
 
 
-def test_a_prior_on_a_size_draws_it_towards_zero(clean):
+def test_a_prior_on_a_size_shrinks_it_towards_zero(clean):
     case = clean.with_effects(["torque-gain"])
     offset = size_coordinate(EFFECTS["torque-gain"], None)
     loose, tight = (replace(offset, std=std) for std in (10.0, 1e-3))
@@ -108,14 +108,14 @@ NEEDS = {"rate": "speed_m_s", "multipass": "pass", "lateral-slip": "slip_angle_r
 
 
 @pytest.mark.parametrize("name, column", NEEDS.items())
-def test_an_effect_whose_covariate_nobody_measured_cannot_be_tested(clean, name, column):
+def test_an_effect_without_its_covariate_cannot_be_tested(clean, name, column):
     known, untestable = effect_signatures(clean.case, clean.readings, {name: EFFECTS[name]})
     assert known == []
     assert [(u.name, u.reason) for u in untestable] == [(name, f"needs the column {column}")]
 
 
 @pytest.mark.parametrize("name, column", NEEDS.items())
-def test_an_effect_whose_covariate_never_varied_cannot_be_tested(name, column):
+def test_an_effect_with_a_constant_covariate_cannot_be_tested(name, column):
     case = case_of()
     field = EFFECTS[name].about.needs[0]
     for values, tested in (((0.2, 0.2, 0.2), False), ((0.1, 0.2, 0.3), True)):
@@ -137,7 +137,7 @@ def test_an_effect_that_the_model_has_is_moved_from_its_size():
     assert known.name == "grousers" and untestable == []
 
 
-def test_smooth_columns_touch_one_channel_each_and_are_free_of_each_other(clean):
+def test_smooth_columns_are_independent_and_of_one_channel_each(clean):
     smooth = smooth_basis(clean.readings)
     touched = [np.unique(clean.readings.channel[column != 0.0]).size for column in smooth.T]
     assert set(touched) == {1}
@@ -145,7 +145,7 @@ def test_smooth_columns_touch_one_channel_each_and_are_free_of_each_other(clean)
     assert np.linalg.matrix_rank(scaled) == smooth.shape[1]
 
 
-def test_the_degree_of_smooth_columns_is_what_was_driven():
+def test_the_degree_of_the_smooth_basis_follows_the_data():
     case = case_of()
     count = {}
     for name, how in {
@@ -166,6 +166,6 @@ def test_values_close_together_count_as_one():
     assert count_distinct(np.asarray([0.0, 0.5, 1.0])) == 3
 
 
-def test_the_places_of_the_map_cover_every_cell(clean):
+def test_the_regions_of_the_map_cover_every_reading(clean):
     covered = np.any([region.selected for region in regions(clean.readings)], axis=0)
     assert covered.all()

@@ -43,19 +43,19 @@ def test_where_nothing_is_hidden_no_cause_is_named(kind):
         assert reduction.after == reduction.before
 
 
-def test_soil_that_differs_from_run_to_run_is_noticed():
+def test_run_to_run_variation_is_reported():
     found = analysed("scatter").variance_components
     assert 0.002 < found["friction_angle_from_run_to_run_rad"] < 0.02  # half a degree is 0.0087
     assert 0.01 < found["bearing_from_run_to_run"] < 0.12  # 0.05 is true
 
 
-def test_samples_that_remember_are_noticed():
+def test_autocorrelation_is_reported():
     assert analysed("memory").variance_components["memory_of_samples"] > 0.0
     assert any("share their noise" in note for note in analysed("memory").notes)
     assert analysed("nothing").variance_components["memory_of_samples"] == 0.0
 
 
-def test_outliers_are_set_aside_and_said():
+def test_outliers_are_excluded_and_reported():
     assert any("readings are outliers" in note for note in analysed("outliers").notes)
 
 
@@ -114,7 +114,7 @@ def test_a_cause_that_no_catalogue_has_is_not_named_alone():
     assert report.p_gap < 0.03
 
 
-def test_what_fits_best_without_being_believed_is_not_in_the_model():
+def test_an_unclaimed_best_fit_is_not_in_the_model():
     report = analysed("stick-slip")
     if report.status == "unknown":
         assert report.best_unclaimed and report.model.model.effects == ()
@@ -122,7 +122,7 @@ def test_what_fits_best_without_being_believed_is_not_in_the_model():
 
 
 @pytest.mark.parametrize("kind", ["slip-sinkage", "stick-slip", "bulldozing"])
-def test_what_a_report_says_fits_together(kind):
+def test_a_report_is_consistent(kind):
     report = analysed(kind)
     assert report.status in STATUSES
     content = report.as_json()

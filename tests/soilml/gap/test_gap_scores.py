@@ -20,7 +20,7 @@ def test_what_is_outside_a_space_is_at_right_angles_to_it():
     np.testing.assert_allclose(project_out(space @ np.ones((3, 2)), space), 0.0, atol=1e-12)
 
 
-def test_nothing_is_projected_off_an_empty_space_and_twins_count_once():
+def test_projection_onto_empty_and_degenerate_spaces():
     columns, space = family()
     np.testing.assert_array_equal(project_out(columns, np.zeros((40, 0))), columns)
     twins = np.column_stack([space, space])
@@ -43,7 +43,7 @@ def test_p_values_of_pure_noise_are_uniform(columns):
     assert max(np.abs(p - even).max(), np.abs(p - even - 1 / 200).max()) < 0.115
 
 
-def test_estimated_noise_makes_large_scores_less_surprising():
+def test_estimated_noise_raises_the_p_value_of_large_scores():
     known, space = family()
     residual = np.random.default_rng(0).standard_normal(40)
     sure, unsure = (score_test(residual, known, space, np.zeros(12), f, 0) for f in (1e9, 8.0))
@@ -91,6 +91,6 @@ def test_the_same_seed_gives_the_same_level():
     assert not np.array_equal(one.null_maxima, other.null_maxima)
 
 
-def test_a_family_without_columns_is_no_surprise():
+def test_without_columns_the_p_value_is_one():
     none = score_test(np.ones(10), np.zeros((10, 0)), np.zeros((10, 0)), np.zeros(0), 5.0, 0)
     assert none.family_wise_p == 1.0

@@ -39,7 +39,7 @@ def named(dug):
     return fit_shapes(problem, fit_candidate(problem, ["slip-sinkage"], soil.start_values()))
 
 
-def test_the_true_law_needs_no_bend(named):
+def test_the_true_law_needs_no_shape(named):
     assert not named.shape_supported
     assert named.shape_deviation == 0.0
     assert named.objective == named.catalogue_fit.objective
@@ -47,7 +47,7 @@ def test_the_true_law_needs_no_bend(named):
     assert named.occam_penalty > 0.0
 
 
-def test_free_shapes_lower_the_objective_and_pay_for_it(dug):
+def test_free_shapes_lower_the_objective_and_are_penalised(dug):
     case = case_of()
     bent = DIGGING(n1=0.4, by_slip=3.0)
     problem = small(fit_problem(case, driven(case, [bent], seed=2)))
@@ -59,7 +59,7 @@ def test_free_shapes_lower_the_objective_and_pay_for_it(dug):
     assert found.fit.values()["slip-sinkage.by_slip"] == pytest.approx(3.0, abs=0.5)
 
 
-def test_an_effect_whose_law_is_certain_has_no_shape_to_pay_for(dug):
+def test_an_effect_with_a_certain_law_has_no_shape_penalty(dug):
     problem, soil = dug
     found = fit_shapes(problem, fit_candidate(problem, ["torque-gain"], soil.start_values()))
     assert found.occam_penalty == 0.0 and not found.shape_supported

@@ -1,4 +1,4 @@
-"""The page says what the report says, stands alone, and lets nothing through."""
+"""The page contains the report, is self-contained, and escapes all text."""
 
 import base64
 import re
@@ -166,7 +166,7 @@ def bad():
 
 
 @pytest.mark.parametrize("status", STATUSES)
-def test_every_status_gives_a_whole_page_that_says_what_it_means(status):
+def test_every_status_gives_a_complete_page_with_its_meaning(status):
     html = page(bad() if status == "bad-data" else report(status), "rover.toml", "runs.csv")
     seen = read(html)
     assert html.startswith("<!DOCTYPE html>\n<html lang=")
@@ -179,7 +179,7 @@ def test_every_status_gives_a_whole_page_that_says_what_it_means(status):
 
 
 @pytest.mark.parametrize("whole", [report(), bad()])
-def test_the_page_needs_nothing_from_anywhere(whole):
+def test_the_page_is_self_contained(whole):
     html = page(whole, "rover.toml", "runs.csv")
     seen = read(html)
     assert not {"script", "iframe", "object", "embed"} & set(seen.tags)
@@ -223,7 +223,7 @@ def test_the_same_report_gives_the_same_bytes():
     assert page(report(), "rover.toml", "runs.csv") == page(report(), "rover.toml", "runs.csv")
 
 
-def test_figures_stand_where_people_look_for_them():
+def test_the_page_contains_the_figures_of_the_report():
     seen = read(page(report(), "rover.toml", "runs.csv"))
     text = " ".join(" ".join([*seen.text, *figures(seen)]).split())
     for figure in (
@@ -241,14 +241,14 @@ def test_figures_stand_where_people_look_for_them():
         assert figure in text, figure
 
 
-def test_a_gap_that_did_not_change_is_drawn_once():
+def test_an_unchanged_gap_is_shown_once():
     same = GapReduction(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
     html = page(report("no-gap", gap={"train": same}, effects=(), cause_set=()), "m", "r")
     assert "before and after" not in html
     assert "Dashed lines" not in html
 
 
-def test_figures_that_are_none_break_nothing():
+def test_non_finite_figures_are_rendered():
     nan, inf = float("nan"), float("inf")
     c = curves(channels=("sinkage_m",), slips=1)
     c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan), held_out=c.load > 60.0)
@@ -260,7 +260,7 @@ def test_figures_that_are_none_break_nothing():
     )
 
 
-def test_runs_are_drawn_from_all_loads():
+def test_shown_runs_cover_all_loads():
     many = select_runs(curves(runs=16))
     assert len(many) == MOST_RUNS
     assert many[0].load == 40.0 and many[-1].load == 190.0
@@ -277,7 +277,7 @@ def test_runs_are_drawn_from_all_loads():
         (0.5, 0.0, "0.5000"),
     ],
 )
-def test_values_are_written_to_the_digits_that_their_spread_leaves(value, std, text):
+def test_values_are_rounded_to_their_standard_deviation(value, std, text):
     assert formatting.format_with_std(value, std) == text
 
 
@@ -285,5 +285,5 @@ def test_values_are_written_to_the_digits_that_their_spread_leaves(value, std, t
     ("x", "text"),
     [(320.18, "320"), (0.0, "0.00"), (3311.0, "3311"), (1.2e7, "1.20 × 10⁷"), (-0.05, "−0.0500")],
 )
-def test_numbers_are_written_to_three_digits(x, text):
+def test_numbers_have_three_significant_digits(x, text):
     assert formatting.format_number(x) == text

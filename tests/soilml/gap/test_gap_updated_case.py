@@ -1,4 +1,4 @@
-"""The grown model as a file, and the menu of runs that could be driven next."""
+"""The updated case as a file, and the proposed next runs."""
 
 from dataclasses import replace
 
@@ -91,7 +91,7 @@ def rivals():
     ]
 
 
-def test_the_grown_case_is_the_fit_with_a_prior_for_what_was_added(rivals):
+def test_the_updated_case_is_the_fit_with_priors_of_the_added_effects(rivals):
     problem, (one, _) = rivals
     case = updated_case(one.fit)
     size = case.prior.pop("slip-sinkage.n1")
@@ -102,7 +102,7 @@ def test_the_grown_case_is_the_fit_with_a_prior_for_what_was_added(rivals):
     same_forces(case, case_of(case_as_toml(case)))
 
 
-def test_the_menu_goes_beyond_what_was_driven(rivals):
+def test_run_options_extend_the_operating_range(rivals):
     readings = rivals[0].readings
     options = {option.kind: option.at for option in run_options(readings)}
     assert options["heavier"].load[0] > readings.load.max()
@@ -122,7 +122,7 @@ def test_a_covariate_that_was_varied_is_not_suggested_again():
     assert "other speed" not in kinds and "second pass" in kinds
 
 
-def test_a_run_of_the_menu_brings_the_channels_and_noise_of_the_rig(rivals):
+def test_expected_readings_have_the_channels_and_noise_of_the_rig(rivals):
     problem = rivals[0]
     option = next(iter(run_options(problem.readings)))
     readings = expected_readings(option, problem.readings, problem.case)
@@ -131,7 +131,7 @@ def test_a_run_of_the_menu_brings_the_channels_and_noise_of_the_rig(rivals):
     np.testing.assert_allclose(readings.std[torque], 0.01 * np.abs(readings.reading[torque]))
 
 
-def test_suggestions_are_ranked_and_come_with_what_each_explanation_expects(rivals):
+def test_proposals_are_ranked_and_contain_predictions(rivals):
     problem, both = rivals
     found = next_runs(problem, both)
     apart = [run.discrimination for run in found]
@@ -145,7 +145,7 @@ def test_suggestions_are_ranked_and_come_with_what_each_explanation_expects(riva
     assert row["torque_Nm if slip-sinkage"] == pytest.approx(float(force.torque))
 
 
-def test_a_checked_sensor_tells_a_fault_from_physics(rivals, monkeypatch):
+def test_a_sensor_check_distinguishes_a_fault_from_physics(rivals, monkeypatch):
     monkeypatch.setattr("soilml.gap.design.discriminating_runs.LISTED", 99)
     found = {run.kind: run for run in next_runs(*rivals)}
     gain = abs(rivals[1][1].fit.values()["torque-gain.gain"])
@@ -153,12 +153,12 @@ def test_a_checked_sensor_tells_a_fault_from_physics(rivals, monkeypatch):
     assert all(run.rows == () for kind, run in found.items() if kind in SENSOR_CHECKS)
 
 
-def test_with_one_explanation_alone_nothing_is_left_to_separate(rivals):
+def test_one_explanation_gives_no_proposals(rivals):
     problem, both = rivals
     assert next_runs(problem, both[:1]) == []
 
 
-def test_explanations_that_are_the_same_cannot_be_separated(rivals):
+def test_equal_explanations_cannot_be_discriminated(rivals):
     problem, (one, _) = rivals
     twin = replace(one, names=("twin",))
     assert all(run.discrimination < 1e-3 for run in next_runs(problem, [one, twin]) if run.rows)

@@ -1,4 +1,4 @@
-"""An effect that the model has already, at the wrong size, is the first that is to be doubted."""
+"""An effect that the model has already, at the wrong size, is corrected."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def measured(effect):
         (SlipSinkage(n1=0.4), SlipSinkage(n1=0.2), "n1"),
     ],
 )
-def test_an_effect_of_the_wrong_size_is_named_and_put_right(truth, wrong, size):
+def test_an_effect_of_the_wrong_size_is_named_and_corrected(truth, wrong, size):
     table = measured(truth)
     case = Case(WHEEL + wrong, SAND, PRIOR, NOISE)
     report = gap(case, table)
@@ -61,7 +61,7 @@ def test_an_effect_of_the_wrong_size_is_named_and_put_right(truth, wrong, size):
     assert again.status == "no-gap"
 
 
-def test_what_was_added_is_handed_on_with_its_uncertainty():
+def test_added_effects_have_a_prior_with_their_uncertainty():
     report = gap(Case(WHEEL, SAND, PRIOR, NOISE), measured(SlipSinkage(n1=0.4)))
     prior = report.model.prior["slip-sinkage.n1"]
     assert prior.lower < 0.4 < prior.upper and prior.upper - prior.lower < 0.2

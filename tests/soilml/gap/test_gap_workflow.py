@@ -57,7 +57,7 @@ def test_without_the_cause_in_the_catalogue_nothing_is_named_for_sure(dug):
 
 
 @pytest.mark.parametrize("holdout", ["run", "load_N=140", "run=run_4"])
-def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
+def test_held_out_rows_change_only_their_own_figures(dug, holdout):
     case, table = dug
     report = gap(case, table, effects=FEW, holdout=holdout, seed=3)
     (what,) = {s.description for s in report.gap.values() if "held out" in s.description}
@@ -77,7 +77,7 @@ def test_rows_kept_back_touch_nothing_but_their_own_figures(dug, holdout):
     assert report.gap[key].readings == 3 * back.sum()
 
 
-def test_runs_kept_back_change_no_fit(dug):
+def test_held_out_runs_change_no_fit(dug):
     """What is fitted, and which candidates are tried, does not depend on the held-out runs."""
     case, table = dug
     report = gap(case, table, effects=FEW, holdout="run", seed=3)
@@ -92,14 +92,14 @@ def test_runs_kept_back_change_no_fit(dug):
     )
 
 
-def test_the_named_effect_predicts_rows_kept_back(dug):
+def test_the_named_effect_predicts_held_out_rows(dug):
     report = gap(*dug, effects=FEW, holdout="load_N=140")
     region = report.gap["held_out_region"]
     assert region.description == "load_N=140, held out"
     assert region.after < 0.25 * region.before
 
 
-def test_rows_kept_back_whose_noise_nobody_knows_are_no_evidence(dug):
+def test_held_out_rows_without_known_noise_are_ignored(dug):
     table = dug[1]
     quiet = case_of(MODEL.replace('torque_Nm = "1 %"\n', ""))
     std = np.where(table["run"] == "run_3", np.nan, 0.01 * np.abs(table["torque_Nm"]))
@@ -108,7 +108,7 @@ def test_rows_kept_back_whose_noise_nobody_knows_are_no_evidence(dug):
     assert region.after < 5.0
 
 
-def test_rows_that_their_status_says_are_no_answer_are_left_out(dug):
+def test_rows_with_another_status_than_ok_are_excluded(dug):
     case, table = dug
     status = np.asarray(["ok"] * len(table), dtype="<U30")
     plain = gap(case, table, effects=FEW).as_json()
@@ -131,12 +131,12 @@ def test_rows_that_their_status_says_are_no_answer_are_left_out(dug):
         ("run=run_9", TableError, "no row has run = run_9"),
     ],
 )
-def test_rows_that_cannot_be_kept_back(dug, holdout, error, said):
+def test_unusable_holdouts_are_refused(dug, holdout, error, said):
     with pytest.raises(error, match=said):
         gap(*dug, holdout=holdout)
 
 
-def test_too_few_runs_to_keep_some_back():
+def test_too_few_runs_for_a_holdout():
     case = case_of()
     with pytest.raises(InputError, match="needs four runs or more; the table has 3"):
         gap(case, driven(case, loads=(40.0, 60.0, 90.0)), holdout="run")
@@ -144,7 +144,7 @@ def test_too_few_runs_to_keep_some_back():
         gap(case, driven(case, loads=(60.0, 60.0)), holdout="load_N=60")
 
 
-def test_a_checked_sensor_is_no_longer_suspected():
+def test_a_calibrated_sensor_is_not_named():
     """A gain of 10 % that a check rules out at 0.3 % is not what is named."""
     case = case_of()
     table = driven(case, [EFFECTS["torque-gain"](gain=0.1)], slips=6, seed=4)
@@ -168,14 +168,14 @@ def model(dug, tmp_path_factory):
     return folder
 
 
-def test_the_grown_model_can_be_identified_and_simulated(model, capsys):
+def test_the_updated_model_can_be_identified_and_simulated(model, capsys):
     file = str(model / "model.toml")
     assert main(["identify", file, str(model / "runs.csv")]) == 0
     assert main(["simulate", file, "--slip", "0.1,0.5", "--load", "60"]) == 0
     assert "ok" in capsys.readouterr().out
 
 
-def test_the_grown_model_makes_a_recipe(model, capsys):
+def test_the_updated_model_makes_a_recipe(model, capsys):
     text = "rows = 64\nseed = 1\n" + (model / "model.toml").read_text()
     text += "[operating]\nslip = [0.05, 0.6]\nload_N = [30.0, 120.0]\n"
     (model / "recipe.toml").write_text(text)

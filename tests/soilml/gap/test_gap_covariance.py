@@ -1,4 +1,4 @@
-"""How readings scatter: planted noise, run-to-run soil and autocorrelation are found again."""
+"""Covariance: planted noise, run-to-run variation and autocorrelation are recovered."""
 
 import numpy as np
 import pytest
@@ -59,33 +59,33 @@ def scatter(scale=1.0, angle=0.0, bearing=0.0, autocorrelation=0.0):
     )
 
 
-def test_readings_as_declared_are_believed(rig):
+def test_declared_noise_is_confirmed(rig):
     found = typical(rig, scatter())
     assert np.all(found["scale"] < 1.2)
     assert found["angle"] <= 0.25 and found["bearing"] <= 0.25 and found["autocorrelation"] == 0.0
 
 
-def test_soil_that_differs_from_run_to_run_is_found(rig):
+def test_run_to_run_variation_is_estimated(rig):
     found = typical(rig, scatter(angle=1.2, bearing=1.2))
     assert 0.7 < found["angle"] < 1.9
     assert 0.7 < found["bearing"] < 1.9
     assert np.all(found["scale"] < 1.3)
 
 
-def test_samples_that_remember_are_found(rig):
+def test_autocorrelation_is_estimated(rig):
     assert typical(rig, scatter(autocorrelation=0.7))["autocorrelation"] in (0.5, 0.7, 0.85)
 
 
-def test_noise_above_the_declared_is_found(rig):
+def test_noise_above_the_declared_is_estimated(rig):
     np.testing.assert_allclose(typical(rig, scatter(scale=1.8))["scale"], 1.8, rtol=0.25)
 
 
-def test_noise_is_never_believed_smaller_than_declared(rig):
+def test_the_noise_scale_is_at_least_one(rig):
     found = typical(rig, scatter(scale=0.3))
     np.testing.assert_array_equal(found["scale"], 1.0)
 
 
-def test_one_run_alone_tells_nothing_of_scatter_between_runs():
+def test_one_run_gives_no_run_to_run_variation():
     case = case_of()
     readings = stack_readings(case, driven(case, loads=(60.0,), slips=12))
     columns = run_effect_columns(case, readings)
@@ -94,7 +94,7 @@ def test_one_run_alone_tells_nothing_of_scatter_between_runs():
     assert found.friction_angle_std == 0.0 and found.bearing_std == 0.0
 
 
-def test_the_covariance_is_noise_scatter_of_runs_and_memory(rig):
+def test_the_covariance_has_noise_run_effects_and_autocorrelation(rig):
     readings, columns, _ = rig
     made = assemble_covariance(
         readings, columns, scatter(scale=2.0, angle=1.0, autocorrelation=0.5)
@@ -110,7 +110,7 @@ def test_the_covariance_is_noise_scatter_of_runs_and_memory(rig):
     assert made.matrix[i, j] == pytest.approx(shared)
 
 
-def test_the_columns_of_scatter_are_what_the_soil_does(rig):
+def test_run_effect_columns_agree_with_the_model(rig):
     readings, columns, _ = rig
     case = case_of()
     phi = float(case.soil.friction_angle) + RUN_EFFECT_UNITS["friction_angle"]
