@@ -101,7 +101,7 @@ def test_driving_again_tells_more_and_absorbs_as_much(usual, tmp_path):
 
 def test_a_sensor_that_is_not_there_sees_nothing(tmp_path):
     blind = audited(tmp_path, None, MODEL.replace('sinkage_m = "2 %"\n', ""))
-    assert "it changes no reading that there is" in blind["not_testable"]["sinkage-gain"]
+    assert "it changes no measured quantity" in blind["not_testable"]["sinkage-gain"]
 
 
 def test_more_free_parameters_absorb_more(usual, tmp_path):
