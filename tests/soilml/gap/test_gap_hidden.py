@@ -51,7 +51,7 @@ def test_run_to_run_variation_is_reported():
 
 def test_autocorrelation_is_reported():
     assert analysed("memory").variance_components["memory_of_samples"] > 0.0
-    assert any("share their noise" in note for note in analysed("memory").notes)
+    assert any("noise of neighbouring samples" in note for note in analysed("memory").notes)
     assert analysed("nothing").variance_components["memory_of_samples"] == 0.0
 
 
