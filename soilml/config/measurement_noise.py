@@ -58,5 +58,5 @@ def take_noise(settings: Settings, key: str) -> Noise:
         settings.fail(f"{key} is {value!r}; needed is {needed}")
     size = noise.constant + noise.share
     if not (math.isfinite(size) and noise.constant >= 0 and noise.share >= 0 and size > 0):
-        settings.fail(f"{key} is {value!r}; a standard deviation must be positive")
+        settings.fail(f"{key} is {value!r}; a standard deviation must be above zero")
     return noise

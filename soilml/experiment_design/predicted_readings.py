@@ -45,7 +45,7 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
     """
     channels = tuple(name for name in CHANNELS if column(name) in case.noise)
     if not channels:
-        raise InputError("no noise is declared: the value of a measurement needs it in [noise]")
+        raise InputError("the value of a measurement depends on its noise: declare it in [noise]")
     predicted = predict_channels(case, samples.free, samples.u, at)
     y = np.stack([predicted[name].T for name in channels])
     sensor = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
