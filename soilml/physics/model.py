@@ -1,4 +1,4 @@
-"""The model: a running gear and its effects, on any soil, driven in any way."""
+"""The model: a running gear with effects, on any soil under any operating conditions."""
 
 from __future__ import annotations
 
@@ -31,8 +31,18 @@ CHUNK = 1024
 class Model:
     """A running gear with a list of effects; `model + effect` has one more.
 
-    model = Model(Wheel(radius=0.1, width=0.06)) + SlipSinkage(n1=0.4)
-    force = model(soil("wong1989/dry_sand"), Operating(slip=slips, load=60.0))
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from soilml import Model, Operating, SlipSinkage, Wheel, soil
+    >>> model = Model(Wheel(radius=0.15, width=0.12))
+    >>> sand, at = soil("wong1989/dry_sand"), Operating(slip=np.array([0.1, 0.3, 0.6]), load=60.0)
+    >>> force = model(sand, at)
+    >>> force.torque.round(2).tolist()  # N m
+    [1.19, 2.26, 3.31]
+    >>> digging = model + SlipSinkage(n1=0.4)
+    >>> digging(sand, at).sinkage.round(4).tolist()  # m
+    [0.018, 0.0225, 0.0306]
     """
 
     gear: Gear
@@ -58,11 +68,23 @@ class Model:
         return replace(self, effects=(*self.effects, effect))
 
     def __call__(self, soil: Soil, at: Operating) -> Force:
-        """Forces at equilibrium; every number in `soil`, `at` and the model may be an array.
+        """Forces at equilibrium, as the sensors report them.
 
-        They broadcast against each other, and the answer has their common shape. Raises
-        `InputError` for a value outside its bounds; a row without equilibrium is NaN with its
-        reason in `status`.
+        Parameters
+        ----------
+        soil, at
+            Their numbers and those of the model may be arrays, which broadcast.
+
+        Returns
+        -------
+        Force
+            Arrays of the common shape. A row without equilibrium is NaN, with the reason in
+            `status`.
+
+        Raises
+        ------
+        InputError
+            For a value outside its bounds, or a missing field that an effect needs.
         """
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
@@ -71,16 +93,24 @@ class Model:
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
-        """Stresses along the contact at equilibrium, from entry to exit; arrays (points, ...).
+        """Stresses along the contact at equilibrium, from entry to exit.
 
-        NaN in rows without equilibrium. Raises `InputError` as a call does.
+        Returns
+        -------
+        Profile
+            Arrays (points, ...); NaN in rows without equilibrium.
+
+        Raises
+        ------
+        InputError
+            As a call of the model does.
         """
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):
             sinkage = _in_chunks(
                 load_case, equilibrium_forces
-            ).sinkage  # not what a sensor makes of it
+            ).sinkage  # the true one, without sensor errors
             angle, stresses = stress_profile(load_case, sinkage, points)
         parts = (angle, stresses.normal, stresses.shear)
         return Profile(*(xp.reshape(part, (part.shape[0], *shape)) for part in parts))
@@ -103,10 +133,10 @@ class Profile:
 
 def flattened(load_case: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
     """The load case as float64 arrays: (batch,), or () where shared by all rows; and the shape."""
-    given = values(load_case)
-    xp = namespace(*given.values())
-    device = next((v.device for v in given.values() if hasattr(v, "device")), None)
-    arrays = {k: _float64(v, xp, device) for k, v in given.items()}
+    parameters = values(load_case)
+    xp = namespace(*parameters.values())
+    device = next((v.device for v in parameters.values() if hasattr(v, "device")), None)
+    arrays = {k: _float64(v, xp, device) for k, v in parameters.items()}
     shape: tuple[int, ...] = np.broadcast_shapes(*(tuple(v.shape) for v in arrays.values()))
     size = math.prod(shape)
     for path, array in arrays.items():

@@ -1,4 +1,4 @@
-"""How a running gear is driven."""
+"""Operating conditions of a running gear."""
 
 from __future__ import annotations
 
@@ -18,7 +18,17 @@ class Operating:
     """Slip ratio and vertical load; numbers or arrays of any shapes that broadcast.
 
     Slip is 1 - v/(r omega) when driving (0 to 1) and r omega/v - 1 when braking (-1 to 0). The
-    others are None where nobody measured them; an effect that needs one then refuses.
+    other fields are None where they were not measured; an effect that needs one then raises
+    `InputError`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from soilml import Operating
+    >>> speed, rim_speed = 0.07, 0.1  # m/s
+    >>> at = Operating(slip=1.0 - speed / rim_speed, load=np.array([40.0, 60.0]), speed=speed)
+    >>> round(at.slip, 3), at.pass_number is None
+    (0.3, True)
     """
 
     slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
@@ -32,5 +42,5 @@ class Operating:
     )
 
 
-#: Fields of `Operating` that need not be known, and the column of each.
+#: Optional fields of `Operating`, and the column of each.
 COVARIATES = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}

@@ -1,4 +1,4 @@
-"""How well a wheel pulls on a soil, and whether a rover should drive there."""
+"""Pull efficiency of a wheel on a soil, and the traffic class of the ground."""
 
 from __future__ import annotations
 
@@ -21,14 +21,22 @@ CLASSES = ("non-trafficable", "unsafe", "safe", "trafficable")
 
 
 def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
-    r"""What is left of a driving wheel's thrust when the soil has resisted; arrays broadcast.
+    r"""Fraction of a driving wheel's thrust that is not used up by resistance; arrays broadcast.
 
     .. math::
         \eta = \frac{F_T - F_R}{F_T} = \frac{DP}{F_T}, \quad F_T = \int \tau \cos\theta \, dA
 
-    Below zero where the wheel cannot pull itself along; NaN where the soil does not carry the
-    load. What effects take off the drawbar pull counts as resistance. References: Comin and Saaj
-    2017, eq. 32. Raises `InputError` for slip that does not drive: there is no thrust.
+    Negative where the wheel cannot propel itself; NaN where the soil does not carry the load.
+    What effects subtract from the drawbar pull counts as resistance.
+
+    Raises
+    ------
+    InputError
+        For slip that is not above 0: there is no thrust.
+
+    References
+    ----------
+    Comin and Saaj 2017, eq. 32.
     """
     check(at)
     check(soil, "soil ")
@@ -47,7 +55,7 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
 
 
 def traffic_class(efficiency: Real) -> NDArray[np.str_]:
-    """Class of each pull efficiency, of `CLASSES`; NaN (nothing carried) is of the first."""
+    """Traffic class of each pull efficiency, one of `CLASSES`; NaN (no equilibrium) is the first."""
     value = np.nan_to_num(to_numpy(efficiency), nan=-np.inf)
-    place = np.searchsorted(THRESHOLDS, value, side="right")
-    return np.asarray(np.asarray(CLASSES)[place])
+    index = np.searchsorted(THRESHOLDS, value, side="right")
+    return np.asarray(np.asarray(CLASSES)[index])

@@ -38,6 +38,14 @@ class Wheel(RigidWheel):
     eqs. 3-10. Holds for a rim that does not deform, straight travel, sinkage up to the hub, and
     wheels large against the soil's grains. Under the one wheel that Nagatani et al. measured, of
     0.11 m diameter, the stress is narrower and further forward (section IV).
+
+    Examples
+    --------
+    >>> from soilml import Model, Operating, Wheel, soil
+    >>> wheel = Wheel(radius=0.15, width=0.12)  # m
+    >>> force = Model(wheel)(soil("wong1989/dry_sand"), Operating(slip=0.3, load=60.0))
+    >>> f"{force.drawbar_pull:.2f} N at a sinkage of {1000 * force.sinkage:.1f} mm"
+    '1.54 N at a sinkage of 16.3 mm'
     """
 
     name: ClassVar[str] = "wheel"

@@ -1,4 +1,4 @@
-"""Soils: what they are, and the published ones."""
+"""The parameters of a soil, and the catalogue of published soils."""
 
 from soilml.physics.soils.catalogue import SoilEntry, soil, soil_catalogue
 from soilml.physics.soils.soil import Soil

@@ -1,4 +1,4 @@
-"""The catalogue of published soils, one TOML file per paper beside this one."""
+"""The catalogue of published soils, one TOML file per paper in this folder."""
 
 from __future__ import annotations
 
@@ -28,8 +28,16 @@ class SoilEntry:
 
 @cache
 def soil_catalogue() -> dict[str, SoilEntry]:
-    """Every published soil by name, `paper/soil`; one TOML file per paper in `soilml/soils`."""
-    found = {}
+    """Every published soil by name, `paper/soil`, from one TOML file per paper.
+
+    Examples
+    --------
+    >>> from soilml import soil_catalogue
+    >>> entry = soil_catalogue()["comin2017/es-3"]
+    >>> entry.published["friction_angle"], entry.assumed
+    (0.625351, ('kc', 'shear_modulus'))
+    """
+    entries = {}
     for file in sorted(resources.files("soilml.physics.soils").iterdir(), key=str):
         if not file.name.endswith(".toml"):
             continue
@@ -37,31 +45,41 @@ def soil_catalogue() -> dict[str, SoilEntry]:
         assumed_by_all = content.get("assumed", {})
         for key, entry in content["soil"].items():
             name = f"{file.name.removesuffix('.toml')}/{key}"
-            found[name] = _entry(name, content["source"], assumed_by_all, entry)
-    return found
+            entries[name] = _entry(name, content["source"], assumed_by_all, entry)
+    return entries
 
 
 def _entry(name: str, source: str, assumed: dict[str, float], entry: dict[str, Any]) -> SoilEntry:
     own_assumed = assumed | entry.get("assumed", {})
     known = {field.name for field in fields(Soil)}
     published = {key: float(value) for key, value in entry.items() if key in known}
-    # a negative cohesion is an artefact of a straight line through shear tests: models use none
+    # a negative cohesion is an artefact of a straight line through shear tests: models use 0
     usable = {k: max(v, 0.0) if k == "cohesion" else v for k, v in published.items()}
-    given = {key: value for key, value in own_assumed.items() if key not in usable}
+    used = {key: value for key, value in own_assumed.items() if key not in usable}
     return SoilEntry(
         name=name,
-        soil=Soil(**(given | usable)),
+        soil=Soil(**(used | usable)),
         source=source,
         text=entry["text"],
-        assumed=tuple(sorted(given)),
+        assumed=tuple(sorted(used)),
         published=published,
     )
 
 
 def soil(name: str, **changes: Real) -> Soil:
-    """The catalogue's soil `name`, with single values replaced.
+    """The soil `name` of the catalogue, with single values replaced by `changes`.
 
-    Raises `InputError` for a name or a field that does not exist.
+    Raises
+    ------
+    InputError
+        For a name or a field that does not exist.
+
+    Examples
+    --------
+    >>> from soilml import soil
+    >>> sand = soil("wong1989/dry_sand", cohesion=500.0)  # Pa
+    >>> sand.cohesion, sand.friction_angle
+    (500.0, 0.488692)
     """
     catalogue = soil_catalogue()
     if name not in catalogue:

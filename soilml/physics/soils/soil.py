@@ -1,4 +1,4 @@
-"""Soil: what pushes back."""
+"""The parameters of a soil."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from soilml.parameters import Parameter
 @final
 @dataclass(frozen=True, kw_only=True)
 class Soil:
-    r"""Shear strength, pressure-sinkage curve and place of maximum stress of a soil, in SI.
+    r"""Shear strength, pressure-sinkage curve and angle of maximum stress of a soil, in SI units.
 
     .. math::
         \tau_{max} = c + \sigma \tan\varphi, \qquad
