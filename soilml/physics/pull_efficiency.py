@@ -55,7 +55,7 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
 
 
 def traffic_class(efficiency: Real) -> NDArray[np.str_]:
-    """Traffic class of each pull efficiency, one of `CLASSES`; NaN (no equilibrium) is the first."""
+    """Traffic class of each pull efficiency, of `CLASSES`; NaN (no equilibrium) is the first."""
     value = np.nan_to_num(to_numpy(efficiency), nan=-np.inf)
     index = np.searchsorted(THRESHOLDS, value, side="right")
     return np.asarray(np.asarray(CLASSES)[index])
