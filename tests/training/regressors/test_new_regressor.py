@@ -1,0 +1,48 @@
+"""A new regressor needs its class and a line of the catalogue: card, plots and export follow."""
+
+import numpy as np
+
+from soilml import Estimator
+from training import spec as specs
+from training.data.dataset import read_dataset
+from training.export.learning_curves import plot_learning_curves
+from training.export.model_card import model_card
+from training.export.model_file import export_model
+from training.regressors.gaussian_head import GaussianHead, validate_training_data
+from training.regressors.gaussian_regressor import GaussianRegressor
+from training.regressors.standardisation import Standardisation
+from training.train import train
+
+
+class MeanRegressor(GaussianRegressor):
+    """The mean and variance of the training targets, whatever the inputs."""
+
+    type_name = "mean"
+
+    def fit(self, X, y):
+        X, Y, one_output = validate_training_data(self, X, y)
+        self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
+        self.zeros_ = np.zeros((X.shape[1], Y.shape[1]))
+        self.head_ = GaussianHead.of(self.y_scaling_, np.zeros_like(Y), one_output)
+        return self
+
+    def _standardised_outputs(self, x):
+        return x @ self.zeros_, x @ self.zeros_
+
+    def add_to_graph(self, graph, features):
+        zero = graph.affine(features, self.zeros_, self.zeros_[0])
+        return self.head_.add_to_graph(graph, zero, zero)
+
+
+def test_a_new_regressor_is_trained_exported_and_described(tmp_path, small_data, monkeypatch):
+    monkeypatch.setitem(specs.REGRESSORS, "mean", MeanRegressor)
+    (tmp_path / "s.toml").write_text('[[regressor]]\ntype = "mean"\n')
+    spec = specs.read_spec(tmp_path / "s.toml")
+    trained = train(spec, read_dataset(small_data, spec.features, spec.targets))
+    metadata = export_model(trained, tmp_path / "m.onnx", small_data)
+    plot_learning_curves(trained, tmp_path / "m.png")
+    assert "Regressors: mean." in model_card(trained, metadata, "m")
+    estimator = Estimator.load(tmp_path / "m.onnx")
+    estimate = estimator(slip=0.3, torque=3.0, load=60.0)
+    np.testing.assert_allclose(estimate.mean, estimator.prior.mean, rtol=1e-6)
+    np.testing.assert_allclose(estimate.std, estimator.prior.std, rtol=0.05)
