@@ -15,6 +15,8 @@ from training.train import TrainedModel
 
 #: Shares of the training rows at which the validation error is plotted.
 SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)
+#: Fewest training rows of a point of the curve.
+LEAST_ROWS = 40
 
 
 def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) -> None:
@@ -49,7 +51,7 @@ def _plot_rows(axis: Any, trained: TrainedModel, regressors: list[FeatureSubset]
         sizes, errors = [], []
         for share in SHARES:
             size = int(share * len(train))
-            if size < 40:
+            if size < LEAST_ROWS:
                 continue
             refitted = clone(regressor.model).set_params(**fixed)
             refitted.fit(features[:size], train.targets[:size])

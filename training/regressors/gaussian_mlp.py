@@ -17,6 +17,13 @@ from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
 
+#: Penalty of AdamW on the weights: small, against growth without effect on the fit.
+WEIGHT_DECAY = 1e-4
+#: Norm to which larger gradients are scaled down, so that no batch with outliers disrupts the fit.
+LARGEST_GRADIENT = 5.0
+#: Log-variances of standardised outputs in the loss: standard deviations from 0.0025 to 20.
+LOG_VARIANCE_RANGE = (-12.0, 6.0)
+
 
 class GaussianMLP(GaussianRegressor):
     r"""Tanh layers with a Gaussian head, fitted by maximum likelihood.
@@ -126,38 +133,40 @@ class GaussianMLP(GaussianRegressor):
         validation: tuple[Floats, Floats],
         progress: Progress,
     ) -> None:
-        q = z.shape[1]
-        tx, tz = torch.from_numpy(x).float(), torch.from_numpy(z).float()
-        hx, hz = (torch.from_numpy(part).float() for part in validation)
+        train_x, train_z = torch.from_numpy(x).float(), torch.from_numpy(z).float()
+        validation_x, validation_z = (torch.from_numpy(part).float() for part in validation)
         batches = max(math.ceil(len(x) / self.batch), 1)
-        optimiser = torch.optim.AdamW(layers, lr=self.learning_rate, weight_decay=1e-4)
+        optimiser = torch.optim.AdamW(layers, lr=self.learning_rate, weight_decay=WEIGHT_DECAY)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
             optimiser, max(self.epochs * batches, 1)
         )
-        best, waited, self.history_ = math.inf, 0, []
-        self.layers_ = [part.detach().numpy().astype(np.float64) for part in layers]
+        best, epochs_without_gain, self.history_ = math.inf, 0, []
+        self.layers_ = _as_arrays(layers)
         for epoch in range(self.epochs):
             mean_only = epoch < self.warm_up * self.epochs
-            order = torch.randperm(len(tx), generator=generator)
+            order = torch.randperm(len(train_x), generator=generator)
             total = 0.0
             for index in order.split(self.batch):
                 optimiser.zero_grad()
-                loss = _loss(_forward(torch, layers, tx[index]), tz[index], q, mean_only)
+                outputs = _forward(torch, layers, train_x[index])
+                loss = _loss(outputs, train_z[index], mean_only)
                 loss.backward()
-                torch.nn.utils.clip_grad_norm_(layers, 5.0)
+                torch.nn.utils.clip_grad_norm_(layers, LARGEST_GRADIENT)
                 optimiser.step()
                 schedule.step()
                 total += float(loss.detach()) * len(index)
             with torch.no_grad():
-                validation_loss = float(_loss(_forward(torch, layers, hx), hz, q, False))
-            self.history_.append((total / len(tx), validation_loss))
+                outputs = _forward(torch, layers, validation_x)
+                validation_loss = float(_loss(outputs, validation_z, False))
+            self.history_.append((total / len(train_x), validation_loss))
             progress(epoch + 1, self.epochs)
             if mean_only or validation_loss < best:
-                best, waited = (math.inf if mean_only else validation_loss), 0
-                self.layers_ = [part.detach().numpy().astype(np.float64) for part in layers]
+                best = math.inf if mean_only else validation_loss
+                epochs_without_gain = 0
+                self.layers_ = _as_arrays(layers)
             else:
-                waited += 1
-                if waited > self.patience:
+                epochs_without_gain += 1
+                if epochs_without_gain > self.patience:
                     break
 
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
@@ -214,14 +223,22 @@ def _initial_layers(sizes: list[int], generator: Any) -> list[Any]:
 
 
 def _forward(torch: Any, layers: list[Any], h: Any) -> Any:
+    """Outputs (n, 2 q) of inputs (n, d): means and log-variances."""
     for i in range(0, len(layers) - 2, 2):
         h = torch.tanh(h @ layers[i] + layers[i + 1])
     return h @ layers[-2] + layers[-1]
 
 
-def _loss(both: Any, z: Any, q: int, mean_only: bool) -> Any:
-    square = (z - both[:, :q]) ** 2
+def _loss(outputs: Any, z: Any, mean_only: bool) -> Any:
+    """Gaussian negative log likelihood per row, without constants; or half the squared error."""
+    q = z.shape[1]
+    squared_error = (z - outputs[:, :q]) ** 2
     if mean_only:
-        return 0.5 * square.sum(dim=1).mean()
-    logs = both[:, q:].clamp(-12.0, 6.0)
-    return 0.5 * (logs + square * (-logs).exp()).sum(dim=1).mean()
+        return 0.5 * squared_error.sum(dim=1).mean()
+    log_variance = outputs[:, q:].clamp(*LOG_VARIANCE_RANGE)
+    return 0.5 * (log_variance + squared_error * (-log_variance).exp()).sum(dim=1).mean()
+
+
+def _as_arrays(layers: list[Any]) -> list[Floats]:
+    """Copies of weights and biases as float64 arrays."""
+    return [part.detach().numpy().astype(np.float64) for part in layers]
