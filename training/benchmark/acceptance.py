@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.quantities import SHEAR
-from training.benchmark.method_kind import MethodKind
+from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import NOMINAL, PairedResult
 from training.benchmark.table_format import SHEAR_SYMBOLS, SHEAR_UNITS
 

@@ -20,6 +20,11 @@ from soilml.identification.predictions import stacked_readings
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling
+from training.benchmark.bayes_limit_file import (
+    FRACTIONS,
+    HPD_DRAWS,
+    PosteriorSummary,
+)
 from training.benchmark.chebyshev_surrogate import fit_chebyshev_surrogate
 from training.benchmark.designs import (
     DesignSets,
@@ -27,11 +32,6 @@ from training.benchmark.designs import (
     recipe_with_effect,
     select_channels,
     set_hash,
-)
-from training.benchmark.posterior_summary import (
-    FRACTIONS,
-    HPD_DRAWS,
-    PosteriorSummary,
 )
 
 Floats = NDArray[np.float64]

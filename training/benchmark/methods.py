@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import Z_50, Z_90, column
 from training.benchmark.designs import select_channels
-from training.benchmark.method_kind import MethodKind, classify_estimator
+from training.regressors.linear_gaussian import LinearGaussian
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +32,33 @@ POOLED_SUFFIX = ", pooled"
 #: A user's method: slips, torques (N m) and loads (N) of one soil, each (rows,), to the mean (q,)
 #: and the standard deviation (q,) or covariance (q, q) of its parameters, in SI units.
 UserMethod = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
+
+
+class MethodKind(Enum):
+    """What a row of the benchmark is computed by."""
+
+    BAYES_LIMIT = "exact posterior of the same set"
+    PRIOR = "prior alone"
+    SET_POSTERIOR = "model file, posterior of all rows of a set"
+    POOLED = "model file, estimates of single rows pooled although it has a set posterior"
+    REGRESSION = "model file without a set posterior, with a nonlinear regressor"
+    LINEAR_REGRESSION = "model file without a set posterior, linear regressors alone"
+    ANALYTIC = "analytic identification"
+    USER_FUNCTION = "function of the caller"
+
+
+def classify_estimator(estimator: Estimator) -> MethodKind:
+    """The kind of a model file, from its metadata; its file name plays no part.
+
+    A file with a set posterior, for one wheel or for any wheel, answers by it. All others are
+    distinguished by the regressors of the training spec that the file holds.
+    """
+    if estimator.sets is not None:
+        return MethodKind.SET_POSTERIOR
+    regressors = json.loads(estimator.metadata["spec"]).get("regressor", [])
+    if all(entry.get("type") == LinearGaussian.kind for entry in regressors):
+        return MethodKind.LINEAR_REGRESSION
+    return MethodKind.REGRESSION
 
 
 @dataclass(frozen=True)

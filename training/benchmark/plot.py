@@ -8,7 +8,7 @@ from typing import Any
 
 from soilml.io.atomic_files import atomic_output
 from training.benchmark.acceptance import COVERAGE_RANGE
-from training.benchmark.method_kind import MethodKind
+from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import PairedResult
 from training.benchmark.table_format import SHEAR_UNITS
 

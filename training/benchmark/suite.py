@@ -17,11 +17,11 @@ from soilml.quantities import SHEAR
 from training.benchmark.bayes_limit import BenchmarkSet, benchmark_sets
 from training.benchmark.bayes_limit_file import BayesLimit, load_limit, packaged_limit
 from training.benchmark.designs import Design, design_of
-from training.benchmark.method_kind import MethodKind
 from training.benchmark.methods import (
     ANALYTIC_PREFIX,
     Method,
     MethodEstimates,
+    MethodKind,
     UserMethod,
     analytic_method,
     model_file_methods,

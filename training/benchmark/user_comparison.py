@@ -18,10 +18,10 @@ from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import column
-from training.benchmark.method_kind import MethodKind
 from training.benchmark.methods import (
     Method,
     MethodEstimates,
+    MethodKind,
     analytic_method,
     interval_coverage,
     model_file_methods,

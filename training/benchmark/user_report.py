@@ -12,7 +12,7 @@ from soilml.io.atomic_files import atomic_output
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
 from training.benchmark.acceptance import COVERAGE_RANGE
-from training.benchmark.method_kind import MethodKind
+from training.benchmark.methods import MethodKind
 from training.benchmark.table_format import columns_of_rows, display_unit, format_number
 from training.benchmark.user_comparison import MethodScore
 

@@ -24,8 +24,13 @@ from training.benchmark.designs import (
     select_channels,
     set_hash,
 )
-from training.benchmark.method_kind import MethodKind, classify_estimator
-from training.benchmark.methods import ANALYTIC_PREFIX, gaussian_estimate, model_file_methods
+from training.benchmark.methods import (
+    ANALYTIC_PREFIX,
+    MethodKind,
+    classify_estimator,
+    gaussian_estimate,
+    model_file_methods,
+)
 from training.benchmark.suite import (
     ANALYTIC_METHODS,
     LIMIT_LABEL,

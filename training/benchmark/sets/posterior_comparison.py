@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, chisquare
 
-from training.benchmark.jackknife import jackknife_rmse_ratio_std
-from training.benchmark.paired_results import NOMINAL
+from training.benchmark.paired_results import NOMINAL, jackknife_rmse_ratio_std
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

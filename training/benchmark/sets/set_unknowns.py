@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import systematic_resampling
-from training.benchmark.posterior_summary import (
+from training.benchmark.bayes_limit_file import (
     FRACTIONS,
     HPD_DRAWS,
     PosteriorSummary,
