@@ -15,7 +15,7 @@ import gap_pages
 from benchmarks_file import FILE, MARK
 from gap_case import judged
 
-from datagen.blind_sets.factorial_plan import matrix
+from datagen.blind_sets.factorial_plan import plan_matrix
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
@@ -28,7 +28,7 @@ def run() -> None:
     parser.add_argument("--every", type=int, default=1, help="take each n-th plan")
     parser.add_argument("--keep", metavar="FILE.json", help="write what was judged")
     args = parser.parse_args()
-    plans = matrix(not args.few, args.seed)[:: args.every]
+    plans = plan_matrix(not args.few, args.seed)[:: args.every]
     jobs = list(enumerate(plans))
     sets = []
     with ProcessPoolExecutor(os.cpu_count()) as pool, progress_bar("analysing", len(jobs)) as done:

@@ -11,7 +11,7 @@ from typing import Any
 import gap_baselines
 import numpy as np
 
-from datagen.blind_sets.blind_set import draw
+from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.factorial_plan import Plan
 from soilml.config.case import Case, read_case
 from soilml.gap import GapReport, gap
@@ -27,7 +27,7 @@ EVERY = 8
 def judged(job: tuple[int, Plan]) -> dict[str, Any]:
     """Everything that the benchmark wants to know of one plan."""
     number, plan = job
-    drawn = draw(plan)
+    drawn = draw_blind_set(plan)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "model.toml"
         file.write_text(drawn.model)

@@ -1,10 +1,11 @@
-"""Measured runs in which something is hidden, to test an analyst with.
+"""Blind sets: simulated runs with mechanisms that are not in the model given to the analyst.
 
-Own wheel, own causes, nothing of soilml: what finds the causes must not have written them.
+The wheel and the mechanisms are an independent implementation, which imports nothing of soilml, so
+that an error in the analysis cannot hide in the data that test it.
 """
 
-from datagen.blind_sets.blind_set import Drawn, draw, write
-from datagen.blind_sets.catalogue import CAUSES
-from datagen.blind_sets.factorial_plan import Plan, matrix
+from datagen.blind_sets.blind_set import BlindSet, draw_blind_set, write_blind_set
+from datagen.blind_sets.catalogue import MECHANISMS
+from datagen.blind_sets.factorial_plan import Plan, plan_matrix
 
-__all__ = ["CAUSES", "Drawn", "Plan", "draw", "matrix", "write"]
+__all__ = ["MECHANISMS", "BlindSet", "Plan", "draw_blind_set", "plan_matrix", "write_blind_set"]

@@ -1,4 +1,4 @@
-"""Causes that textbooks know, in other forms than the usual one."""
+"""Mechanisms that textbooks describe, in other than their usual forms."""
 
 from __future__ import annotations
 
@@ -7,58 +7,68 @@ from dataclasses import replace
 import numpy as np
 
 from datagen.blind_sets.catalogued import substitute_circle
-from datagen.blind_sets.mechanism import Cause
-from datagen.blind_sets.reference_wheel import pushed, settled
-from datagen.blind_sets.wheel_state import Arc, Floats, Points, Push, Rows
+from datagen.blind_sets.mechanism import Mechanism
+from datagen.blind_sets.reference_wheel import ground_reaction, solve_equilibrium
+from datagen.blind_sets.wheel_state import (
+    ContactArc,
+    ContactPoints,
+    Floats,
+    GroundReaction,
+    WheelState,
+)
 
 
-def _lyasko(rows: Rows, share: float) -> Rows:
-    """z = z0 (1 + s) / (1 - s / 2): soil softened so far that the wheel stands that deep.
+def _lyasko(rows: WheelState, share: float) -> WheelState:
+    """z = z0 (1 + s) / (1 - s / 2), by softening the soil until the sinkage has this value.
 
-    At a given sinkage the load is linear in the modulus, so two evaluations tell how far.
+    At a fixed sinkage the load is linear in the modulus, so two evaluations give the factor.
     """
-    grown = (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
-    z = settled(rows).sinkage * (1.0 + share * (grown - 1.0))
+    ratio = (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
+    z = solve_equilibrium(rows).sinkage * (1.0 + share * (ratio - 1.0))
     with np.errstate(invalid="ignore"):
         x = 2.0 * np.arcsin(np.sqrt(z / (2.0 * rows.radius)))
-    whole = pushed(x, rows).load
+    full_load = ground_reaction(x, rows).load
     none = np.zeros_like(rows.kc)
-    bare = pushed(x, replace(rows, kc=none, kphi=none)).load
-    left = (rows.load - bare) / (whole - bare)
-    left = np.where(left > 0.0, left, np.nan)
-    return replace(rows, kc=rows.kc * left, kphi=rows.kphi * left)
+    cohesive_load = ground_reaction(x, replace(rows, kc=none, kphi=none)).load
+    factor = (rows.load - cohesive_load) / (full_load - cohesive_load)
+    factor = np.where(factor > 0.0, factor, np.nan)
+    return replace(rows, kc=rows.kc * factor, kphi=rows.kphi * factor)
 
 
-def _square(rows: Rows, n2: float) -> Rows:
+def _square(rows: WheelState, n2: float) -> WheelState:
     return replace(rows, n=rows.n + n2 * rows.slip**2)
 
 
-def _root_load(push: Push, arc: Arc, rows: Rows, coefficient: float) -> Push:
-    return replace(push, pull=push.pull - coefficient * np.sqrt(rows.load))
+def _root_load(
+    reaction: GroundReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> GroundReaction:
+    return replace(reaction, pull=reaction.pull - coefficient * np.sqrt(rows.load))
 
 
-def _depth_power(push: Push, arc: Arc, rows: Rows, coefficient: float) -> Push:
-    return replace(push, pull=push.pull - coefficient * push.sinkage**1.5)
+def _depth_power(
+    reaction: GroundReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> GroundReaction:
+    return replace(reaction, pull=reaction.pull - coefficient * reaction.sinkage**1.5)
 
 
-def _saturating_wheel(arc: Arc, rows: Rows, most: float) -> Arc:
+def _saturating_wheel(arc: ContactArc, rows: WheelState, most: float) -> ContactArc:
     return substitute_circle(arc, rows, most * -np.expm1(-rows.load / 60.0))
 
 
-def _constant_exit(arc: Arc, rows: Rows, angle: float) -> Arc:
+def _constant_exit(arc: ContactArc, rows: WheelState, angle: float) -> ContactArc:
     return replace(arc, exit=np.full_like(arc.exit, -angle))
 
 
-def _proportional_exit(arc: Arc, rows: Rows, share: float) -> Arc:
+def _proportional_exit(arc: ContactArc, rows: WheelState, share: float) -> ContactArc:
     return replace(arc, exit=-share * arc.entry)
 
 
-def _saturating_grousers(arc: Arc, rows: Rows, height: float) -> Arc:
+def _saturating_grousers(arc: ContactArc, rows: WheelState, height: float) -> ContactArc:
     out = 0.75 * height * -np.expm1(-rows.slip / 0.15)
     return replace(arc, shear_radius=arc.shear_radius + out, lever=arc.lever + out)
 
 
-def _growing_shift(arc: Arc, rows: Rows, growth: float) -> Arc:
+def _growing_shift(arc: ContactArc, rows: WheelState, growth: float) -> ContactArc:
     shift = np.minimum(growth * rows.slip, 0.9)
     return replace(
         arc,
@@ -67,28 +77,32 @@ def _growing_shift(arc: Arc, rows: Rows, growth: float) -> Arc:
     )
 
 
-def _rate_power(points: Points, arc: Arc, rows: Rows, m: float) -> Floats:
+def _rate_power(points: ContactPoints, arc: ContactArc, rows: WheelState, m: float) -> Floats:
     return np.asarray(points.shear * (rows.speed / 0.05) ** m)
 
 
-def _along_velocity(points: Points, arc: Arc, rows: Rows, share: float) -> Floats:
-    """Shear points along the velocity of slip at each point, not along the displacement."""
+def _along_velocity(
+    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
+) -> Floats:
+    """Shear has the direction of the slip velocity at each point, not of the displacement."""
     aside = (1.0 - rows.slip) * np.tan(rows.slip_angle) * share
-    j = np.hypot(points.sheared, arc.shear_radius * points.gone * aside)
+    j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
     along = 1.0 - (1.0 - rows.slip) * np.cos(points.theta)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
     return np.asarray(tau * along / np.hypot(along, aside))
 
 
-def _saturating_passes(rows: Rows, growth: float) -> Rows:
+def _saturating_passes(rows: WheelState, growth: float) -> WheelState:
     stiffer = 1.0 - growth * np.expm1(-(rows.pass_number - 1.0) / 1.5)
     return replace(rows, kc=rows.kc * stiffer, kphi=rows.kphi * stiffer)
 
 
-FORMS = (
-    Cause(name="slip-sinkage", form="lyasko", size="share", reference=1.0, unit="1", soil=_lyasko),
-    Cause(name="slip-sinkage", form="square", size="n2", reference=0.8, unit="1", soil=_square),
-    Cause(
+ALTERNATIVE_FORMS = (
+    Mechanism(
+        name="slip-sinkage", form="lyasko", size="share", reference=1.0, unit="1", soil=_lyasko
+    ),
+    Mechanism(name="slip-sinkage", form="square", size="n2", reference=0.8, unit="1", soil=_square),
+    Mechanism(
         name="bulldozing",
         form="root-load",
         size="coefficient",
@@ -96,7 +110,7 @@ FORMS = (
         unit="N^0.5",
         force=_root_load,
     ),
-    Cause(
+    Mechanism(
         name="bulldozing",
         form="depth-power",
         size="coefficient",
@@ -104,7 +118,7 @@ FORMS = (
         unit="N/m^1.5",
         force=_depth_power,
     ),
-    Cause(
+    Mechanism(
         name="wheel-flexibility",
         form="saturating",
         size="delta_max",
@@ -112,7 +126,7 @@ FORMS = (
         unit="m",
         arc=_saturating_wheel,
     ),
-    Cause(
+    Mechanism(
         name="exit-angle",
         form="constant",
         size="b",
@@ -120,7 +134,7 @@ FORMS = (
         unit="rad",
         arc=_constant_exit,
     ),
-    Cause(
+    Mechanism(
         name="exit-angle",
         form="proportional",
         size="b0",
@@ -128,7 +142,7 @@ FORMS = (
         unit="1",
         arc=_proportional_exit,
     ),
-    Cause(
+    Mechanism(
         name="grousers",
         form="saturating",
         size="height",
@@ -136,7 +150,7 @@ FORMS = (
         unit="m",
         arc=_saturating_grousers,
     ),
-    Cause(
+    Mechanism(
         name="stress-shift",
         form="with-slip",
         size="growth",
@@ -144,7 +158,7 @@ FORMS = (
         unit="1",
         arc=_growing_shift,
     ),
-    Cause(
+    Mechanism(
         name="rate",
         form="power",
         size="m",
@@ -153,7 +167,7 @@ FORMS = (
         shear=_rate_power,
         needs="speed",
     ),
-    Cause(
+    Mechanism(
         name="multipass",
         form="saturating",
         size="growth",
@@ -162,7 +176,7 @@ FORMS = (
         soil=_saturating_passes,
         needs="pass_number",
     ),
-    Cause(
+    Mechanism(
         name="lateral-slip",
         form="velocity",
         size="share",

@@ -1,4 +1,4 @@
-"""Causes of soil and wheel, in the forms that textbooks print."""
+"""Mechanisms of soil and wheel, in the forms of textbooks."""
 
 from __future__ import annotations
 
@@ -6,22 +6,30 @@ from dataclasses import replace
 
 import numpy as np
 
-from datagen.blind_sets.mechanism import Cause
-from datagen.blind_sets.wheel_state import Arc, Floats, Points, Push, Rows
+from datagen.blind_sets.mechanism import Mechanism
+from datagen.blind_sets.wheel_state import (
+    ContactArc,
+    ContactPoints,
+    Floats,
+    GroundReaction,
+    WheelState,
+)
 
 
-def _slip_sinkage(rows: Rows, n1: float) -> Rows:
+def _slip_sinkage(rows: WheelState, n1: float) -> WheelState:
     """Ding et al. 2011: n = n0 + n1 |s|."""
     return replace(rows, n=rows.n + n1 * np.abs(rows.slip))
 
 
-def _grousers(arc: Arc, rows: Rows, height: float) -> Arc:
-    """Ding et al. 2011: soil is sheared at r + 0.75 h."""
+def _grousers(arc: ContactArc, rows: WheelState, height: float) -> ContactArc:
+    """Ding et al. 2011: soil is shear_displacement at r + 0.75 h."""
     out = 0.75 * height
     return replace(arc, shear_radius=arc.shear_radius + out, lever=arc.lever + out)
 
 
-def _bulldozing(push: Push, arc: Arc, rows: Rows, share: float) -> Push:
+def _bulldozing(
+    reaction: GroundReaction, arc: ContactArc, rows: WheelState, share: float
+) -> GroundReaction:
     """Bekker 1969 with the factors of local shear failure."""
     phi = np.arctan(2.0 / 3.0 * np.tan(rows.friction_angle))
     n_q = np.exp(np.pi * np.tan(phi)) * np.tan(0.25 * np.pi + 0.5 * phi) ** 2
@@ -29,18 +37,18 @@ def _bulldozing(push: Push, arc: Arc, rows: Rows, share: float) -> Push:
     n_gamma = 2.0 * (n_q + 1.0) * np.tan(phi)
     k_c = (n_c - np.tan(phi)) * np.cos(phi) ** 2
     k_gamma = (2.0 * n_gamma / np.tan(phi) + 1.0) * np.cos(phi) ** 2
-    z = push.sinkage
+    z = reaction.sinkage
     wall = 0.67 * rows.cohesion * z * k_c + 0.5 * z**2 * rows.unit_weight * k_gamma
-    return replace(push, pull=push.pull - share * rows.width * wall)
+    return replace(reaction, pull=reaction.pull - share * rows.width * wall)
 
 
-def _exit_angle(arc: Arc, rows: Rows, kappa: float) -> Arc:
+def _exit_angle(arc: ContactArc, rows: WheelState, kappa: float) -> ContactArc:
     """Ishigami et al. 2007: theta_2 = -acos(1 - kappa z / r)."""
     return replace(arc, exit=-np.arccos(1.0 - kappa * arc.sinkage / rows.radius))
 
 
-def _stress_shift(arc: Arc, rows: Rows, shift: float) -> Arc:
-    """The stressed part moves towards the entry (Nagatani et al. 2009, section IV)."""
+def _stress_shift(arc: ContactArc, rows: WheelState, shift: float) -> ContactArc:
+    """The stressed part of the rim moves towards the entry (Nagatani et al. 2009, section IV)."""
     return replace(
         arc,
         peak=arc.peak + shift * (arc.entry - arc.peak),
@@ -48,8 +56,8 @@ def _stress_shift(arc: Arc, rows: Rows, shift: float) -> Arc:
     )
 
 
-def substitute_circle(arc: Arc, rows: Rows, deflection: Floats) -> Arc:
-    """A wheel flattened by `deflection` (m, (n,)) stands in the soil as a larger circle.
+def substitute_circle(arc: ContactArc, rows: WheelState, deflection: Floats) -> ContactArc:
+    """A wheel flattened by `deflection` (m, (n,)) has a contact like that of a larger circle.
 
     r* = r (1 + delta / z); the axle keeps its height, and the torque its lever arm r. Source:
     Schmid, J. Terramechanics 32(1), 1995.
@@ -61,19 +69,23 @@ def substitute_circle(arc: Arc, rows: Rows, deflection: Floats) -> Arc:
     return replace(arc, entry=entry, peak=peak, radius=radius, shear_radius=radius)
 
 
-def _wheel_flexibility(arc: Arc, rows: Rows, compliance: float) -> Arc:
+def _wheel_flexibility(arc: ContactArc, rows: WheelState, compliance: float) -> ContactArc:
     return substitute_circle(arc, rows, compliance * rows.load)
 
 
-def _shear_softening(points: Points, arc: Arc, rows: Rows, share: float) -> Floats:
+def _shear_softening(
+    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
+) -> Floats:
     """Wong's hump, K_r = 0.7 and K_w = 1.5 K, blended in by its share."""
-    x, k_r = points.sheared / (1.5 * rows.shear_modulus), 0.7
+    x, k_r = points.shear_displacement / (1.5 * rows.shear_modulus), 0.7
     height = 1.0 + (1.0 / (k_r * (1.0 - np.exp(-1.0))) - 1.0) * np.exp(1.0 - x)
     hump = points.strength * k_r * height * -np.expm1(-x)
     return np.asarray((1.0 - share) * points.shear + share * hump)
 
 
-def _sidewall_shear(push: Push, arc: Arc, rows: Rows, share: float) -> Push:
+def _sidewall_shear(
+    reaction: GroundReaction, arc: ContactArc, rows: WheelState, share: float
+) -> GroundReaction:
     """The buried halves of both side walls, forward of the axle, each a segment at its centroid."""
     t, r, phi = arc.entry, rows.radius, rows.friction_angle
     part = np.maximum(t - np.sin(t) * np.cos(t), 1e-300)
@@ -83,49 +95,51 @@ def _sidewall_shear(push: Push, arc: Arc, rows: Rows, share: float) -> Push:
     j = r * (t - (1.0 - rows.slip) * np.sin(t))
     tau = (rows.cohesion + pressure * np.tan(phi)) * -np.expm1(-j / rows.shear_modulus)
     both = 2.0 * share * tau * area
-    return replace(push, pull=push.pull + both, torque=push.torque + both * y)
+    return replace(reaction, pull=reaction.pull + both, torque=reaction.torque + both * y)
 
 
-def _depth_cohesion(points: Points, arc: Arc, rows: Rows, c1: float) -> Floats:
-    mobilised = -np.expm1(-points.sheared / rows.shear_modulus)
+def _depth_cohesion(points: ContactPoints, arc: ContactArc, rows: WheelState, c1: float) -> Floats:
+    mobilised = -np.expm1(-points.shear_displacement / rows.shear_modulus)
     return np.asarray(points.shear + c1 * points.depth * mobilised)
 
 
-def _rate(points: Points, arc: Arc, rows: Rows, a: float) -> Floats:
+def _rate(points: ContactPoints, arc: ContactArc, rows: WheelState, a: float) -> Floats:
     return np.asarray(points.shear * (1.0 + a * np.log(rows.speed / 0.05)))
 
 
-def _multipass(rows: Rows, growth: float) -> Rows:
+def _multipass(rows: WheelState, growth: float) -> WheelState:
     stiffer = rows.pass_number**growth
     return replace(rows, kc=rows.kc * stiffer, kphi=rows.kphi * stiffer)
 
 
-def _lateral_slip(points: Points, arc: Arc, rows: Rows, share: float) -> Floats:
-    """Shear grows with both displacements and points along their sum."""
+def _lateral_slip(points: ContactPoints, arc: ContactArc, rows: WheelState, share: float) -> Floats:
+    """Shear grows with both displacements and has the direction of their sum."""
     aside = share * (1.0 - rows.slip) * np.tan(rows.slip_angle)
-    j = np.hypot(points.sheared, arc.shear_radius * points.gone * aside)
+    j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
-    return np.asarray(tau * points.sheared / j)
+    return np.asarray(tau * points.shear_displacement / j)
 
 
-KNOWN = (
-    Cause(name="slip-sinkage", size="n1", reference=0.4, unit="1", soil=_slip_sinkage),
-    Cause(name="grousers", size="height", reference=0.01, unit="m", arc=_grousers),
-    Cause(name="bulldozing", size="share", reference=1.0, unit="1", force=_bulldozing),
-    Cause(name="exit-angle", size="kappa", reference=0.15, unit="1", arc=_exit_angle),
-    Cause(name="stress-shift", size="shift", reference=0.2, unit="1", arc=_stress_shift),
-    Cause(
+TEXTBOOK_FORMS = (
+    Mechanism(name="slip-sinkage", size="n1", reference=0.4, unit="1", soil=_slip_sinkage),
+    Mechanism(name="grousers", size="height", reference=0.01, unit="m", arc=_grousers),
+    Mechanism(name="bulldozing", size="share", reference=1.0, unit="1", force=_bulldozing),
+    Mechanism(name="exit-angle", size="kappa", reference=0.15, unit="1", arc=_exit_angle),
+    Mechanism(name="stress-shift", size="shift", reference=0.2, unit="1", arc=_stress_shift),
+    Mechanism(
         name="wheel-flexibility",
         size="compliance",
         reference=2e-5,
         unit="m/N",
         arc=_wheel_flexibility,
     ),
-    Cause(name="shear-softening", size="share", reference=0.5, unit="1", shear=_shear_softening),
-    Cause(name="sidewall-shear", size="share", reference=1.0, unit="1", force=_sidewall_shear),
-    Cause(name="depth-cohesion", size="c1", reference=2e4, unit="Pa/m", shear=_depth_cohesion),
-    Cause(name="rate", size="a", reference=0.05, unit="1", shear=_rate, needs="speed"),
-    Cause(
+    Mechanism(
+        name="shear-softening", size="share", reference=0.5, unit="1", shear=_shear_softening
+    ),
+    Mechanism(name="sidewall-shear", size="share", reference=1.0, unit="1", force=_sidewall_shear),
+    Mechanism(name="depth-cohesion", size="c1", reference=2e4, unit="Pa/m", shear=_depth_cohesion),
+    Mechanism(name="rate", size="a", reference=0.05, unit="1", shear=_rate, needs="speed"),
+    Mechanism(
         name="multipass",
         size="growth",
         reference=0.5,
@@ -133,7 +147,7 @@ KNOWN = (
         soil=_multipass,
         needs="pass_number",
     ),
-    Cause(
+    Mechanism(
         name="lateral-slip",
         size="share",
         reference=1.0,

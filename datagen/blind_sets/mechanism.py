@@ -1,4 +1,4 @@
-"""What a hidden cause is: functions that act where the physics does."""
+"""A hidden mechanism: functions that act at the stages of the wheel model."""
 
 from __future__ import annotations
 
@@ -6,17 +6,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from datagen.blind_sets.wheel_state import Arc, Floats, Points, Push, Rows
+from datagen.blind_sets.wheel_state import (
+    ContactArc,
+    ContactPoints,
+    Floats,
+    GroundReaction,
+    WheelState,
+)
 
 
 @final
 @dataclass(frozen=True, kw_only=True)
-class Cause:
-    """A cause by its name, the form it takes, its size and where it acts.
+class Mechanism:
+    """A mechanism: its name, the form of its law, its size and the stages at which it acts.
 
-    Each function takes the value of its stage, what that value belongs to, and last the size of
-    the cause in `unit`; None where the cause does not act. Of a cause that stands in a catalogue
-    under the same name, `form` says how its law differs; it is empty where it does not.
+    Each function takes the value of its stage, the states that the value belongs to, and last the
+    size of the mechanism in `unit`; None at stages where it does not act. `form` names a law that
+    differs from that of the analyst's effect of the same name; it is empty where they agree.
     """
 
     name: str
@@ -24,19 +30,19 @@ class Cause:
     reference: float
     unit: str
     form: str = ""
-    #: reported slip and load -> what the wheel does
-    driven: Callable[[Rows, float], Rows] | None = None
-    #: the soil as this wheel meets it
-    soil: Callable[[Rows, float], Rows] | None = None
-    arc: Callable[[Arc, Rows, float], Arc] | None = None
-    #: normal stress and the depth it stands at, (points, n)
-    pressure: Callable[[Floats, Floats, Rows, float], Floats] | None = None
-    shear: Callable[[Points, Arc, Rows, float], Floats] | None = None
-    #: inside the search for equilibrium
-    force: Callable[[Push, Arc, Rows, float], Push] | None = None
-    #: at equilibrium -> what is reported; the rows are those that were driven
-    reading: Callable[[Push, Rows, float], Push] | None = None
-    #: the covariate that must vary for the cause to show, a field of `Rows`
+    #: from reported to true slip and load
+    driven: Callable[[WheelState, float], WheelState] | None = None
+    #: the soil under this wheel
+    soil: Callable[[WheelState, float], WheelState] | None = None
+    arc: Callable[[ContactArc, WheelState, float], ContactArc] | None = None
+    #: normal stress and its depth, (points, n)
+    pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
+    shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
+    #: within the search for equilibrium
+    force: Callable[[GroundReaction, ContactArc, WheelState, float], GroundReaction] | None = None
+    #: from the forces at equilibrium to the readings, for the true slip and load
+    reading: Callable[[GroundReaction, WheelState, float], GroundReaction] | None = None
+    #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
     needs: str = ""
 
     @property
@@ -45,5 +51,5 @@ class Cause:
         return f"{self.name}/{self.form}" if self.form else self.name
 
 
-#: Causes that act together, each with its size.
-Acting = tuple[tuple[Cause, float], ...]
+#: Mechanisms that act together, each with its size.
+ActiveMechanisms = tuple[tuple[Mechanism, float], ...]

@@ -1,4 +1,4 @@
-"""How the readings of a hidden set stray from the truth."""
+"""Noise of the readings of a blind set."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from datagen.blind_sets.wheel_state import Floats
 FLOOR = {"torque_Nm": 0.0, "drawbar_pull_N": 0.2, "sinkage_m": 0.0}
 CHANNELS = tuple(FLOOR)
 #: Correlation of a sample with the one before, in tier N2.
-RHO = 0.7
-#: Share of readings that are outliers in tier N3, and how many standard deviations they are off.
-OUTLIERS, FAR = 0.02, 8.0
+AUTOCORRELATION = 0.7
+#: Share of readings that are outliers in tier N3, and their distance in standard deviations.
+OUTLIER_FRACTION, OUTLIER_SIGMA = 0.02, 8.0
 #: Declared noise / true noise in tier N4.
-UNDERSTATED = 0.85
+DECLARED_OVER_TRUE = 0.85
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def sensors(level: float) -> dict[str, Sensor]:
     return {name: Sensor(level, 100.0 * level * floor) for name, floor in FLOOR.items()}
 
 
-def strayed(
+def simulate_readings(
     true: Floats,
     sensor: Sensor,
     run: NDArray[np.int64],
@@ -52,18 +52,20 @@ def strayed(
 ) -> Floats:
     """Readings (n,) of true values; `run` numbers the run of each row, in the order of sampling.
 
-    Each tier strays in its own way: N2 from sample to sample, N3 with outliers, N4 by more than is
-    declared, all others independently by what is declared.
+    Noise is autocorrelated in tier N2, has outliers in tier N3, and is larger than declared in tier
+    N4. In all other tiers it is independent, with the declared standard deviation.
     """
     std = sensor.std(true)
     unit = generator.standard_normal(true.size)
     if tier == "N2":
         for i in range(1, true.size):
             if run[i] == run[i - 1]:
-                unit[i] = RHO * unit[i - 1] + np.sqrt(1.0 - RHO**2) * unit[i]
+                unit[i] = (
+                    AUTOCORRELATION * unit[i - 1] + np.sqrt(1.0 - AUTOCORRELATION**2) * unit[i]
+                )
     if tier == "N3":
-        struck = generator.random(true.size) < OUTLIERS
-        unit = np.where(struck, FAR * np.where(unit < 0.0, -1.0, 1.0), unit)
+        outlier = generator.random(true.size) < OUTLIER_FRACTION
+        unit = np.where(outlier, OUTLIER_SIGMA * np.where(unit < 0.0, -1.0, 1.0), unit)
     if tier == "N4":
-        unit = unit / UNDERSTATED
+        unit = unit / DECLARED_OVER_TRUE
     return np.asarray(true + std * unit)

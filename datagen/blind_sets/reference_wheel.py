@@ -1,4 +1,4 @@
-"""A rigid wheel in soil, with causes acting on it."""
+"""A rigid wheel in soil, with mechanisms acting on it: the reference model of blind sets."""
 
 from __future__ import annotations
 
@@ -6,43 +6,53 @@ from dataclasses import replace
 
 import numpy as np
 
-from datagen.blind_sets.mechanism import Acting
-from datagen.blind_sets.wheel_state import Arc, Floats, Points, Push, Rows
+from datagen.blind_sets.mechanism import ActiveMechanisms
+from datagen.blind_sets.wheel_state import (
+    ContactArc,
+    ContactPoints,
+    Floats,
+    GroundReaction,
+    WheelState,
+)
 
 NODES = 40
-#: Depths looked at for the first that carries the load, and halvings between two of them.
-LOOKS, HALVINGS = 40, 46
+#: Depths among which the first that carries the load is searched, and bisections between two.
+SEARCH_DEPTHS, HALVINGS = 40, 46
 
 
-def _crowded() -> tuple[Floats, Floats]:
+def _quadrature() -> tuple[Floats, Floats]:
     """Gauss-Legendre nodes and weights on 0 to 1 in t, with x = t^2: dense where stress begins."""
     x, w = np.polynomial.legendre.leggauss(NODES)
     t = 0.5 * (x + 1.0)
     return (t * t)[:, None], (w * t)[:, None]
 
 
-NODE, WEIGHT = _crowded()
+NODE, WEIGHT = _quadrature()
 
 
-def settled(rows: Rows, acting: Acting = ()) -> Push:
-    """What the sensors report of a wheel at rest under its load; arrays (n,), SI.
+def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> GroundReaction:
+    """Noise-free readings of a wheel in vertical equilibrium; arrays (n,), SI.
 
-    The wheel stands at the first sinkage at which the soil carries the load, searched from the
-    surface to the hub and then halved. NaN where there is none. Sources: Wong and Reece,
-    J. Terramechanics 4(1), 1967, for the wheel; causes bring their own.
+    The equilibrium is the smallest sinkage at which the soil carries the load, searched from the
+    surface to the hub and refined by bisection. NaN where there is none. Source: Wong and Reece,
+    J. Terramechanics 4(1), 1967, for the wheel; mechanisms have their own.
     """
-    for cause, size in acting:
-        rows = rows if cause.driven is None else cause.driven(rows, size)
-    for cause, size in acting:
-        rows = rows if cause.soil is None else cause.soil(rows, size)
-    push = _at_rest(rows, acting)
-    for cause, size in acting:
-        push = push if cause.reading is None else cause.reading(push, rows, size)
-    return push
+    for mechanism, size in active:
+        rows = rows if mechanism.driven is None else mechanism.driven(rows, size)
+    for mechanism, size in active:
+        rows = rows if mechanism.soil is None else mechanism.soil(rows, size)
+    reaction = _equilibrium(rows, active)
+    for mechanism, size in active:
+        reaction = (
+            reaction if mechanism.reading is None else mechanism.reading(reaction, rows, size)
+        )
+    return reaction
 
 
-def pushed(depth_angle: Floats, rows: Rows, acting: Acting = ()) -> Push:
-    r"""Forces at a given sinkage, whatever load that carries; arrays (n,).
+def ground_reaction(
+    depth_angle: Floats, rows: WheelState, active: ActiveMechanisms = ()
+) -> GroundReaction:
+    r"""Forces at a fixed sinkage, for any load; arrays (n,).
 
     .. math::
         z = r (1 - \cos x), \quad
@@ -53,29 +63,31 @@ def pushed(depth_angle: Floats, rows: Rows, acting: Acting = ()) -> Push:
     x is `depth_angle`, the entry angle (rad) of a rim that does not deform; the depth delta is
     mirrored behind the angle of maximum stress. For slip above zero. Source: Wong and Reece 1967.
     """
-    arc = _arc(depth_angle, rows, acting)
+    arc = _arc(depth_angle, rows, active)
     front, rear = arc.entry - arc.peak, arc.peak - arc.exit
-    passed = np.concatenate([NODE * front, front + (1.0 - NODE) * rear])
+    swept_angle = np.concatenate([NODE * front, front + (1.0 - NODE) * rear])
     mapped = np.concatenate([NODE * front, NODE * front])
     span = np.concatenate([WEIGHT * front, WEIGHT * rear])
-    theta = arc.entry - passed
-    points = _points(theta, passed, mapped, arc, rows, acting)
+    theta = arc.entry - swept_angle
+    points = _points(theta, swept_angle, mapped, arc, rows, active)
     area = arc.radius * rows.width * span
     sin, cos = np.sin(theta), np.cos(theta)
-    push = Push(
+    reaction = GroundReaction(
         load=np.sum((points.normal * cos + points.shear * sin) * area, axis=0),
         pull=np.sum((points.shear * cos - points.normal * sin) * area, axis=0),
         torque=np.sum(points.shear * arc.lever * area, axis=0),
         sinkage=arc.sinkage,
     )
-    for cause, size in acting:
-        push = push if cause.force is None else cause.force(push, arc, rows, size)
+    for mechanism, size in active:
+        reaction = (
+            reaction if mechanism.force is None else mechanism.force(reaction, arc, rows, size)
+        )
     inside = (arc.exit < arc.peak) & (arc.peak < arc.entry)
-    return replace(push, load=np.where(inside, push.load, np.nan))
+    return replace(reaction, load=np.where(inside, reaction.load, np.nan))
 
 
-def _arc(depth_angle: Floats, rows: Rows, acting: Acting) -> Arc:
-    arc = Arc(
+def _arc(depth_angle: Floats, rows: WheelState, active: ActiveMechanisms) -> ContactArc:
+    arc = ContactArc(
         entry=depth_angle,
         exit=np.zeros_like(depth_angle),
         peak=(rows.a0 + rows.a1 * rows.slip) * depth_angle,
@@ -84,54 +96,62 @@ def _arc(depth_angle: Floats, rows: Rows, acting: Acting) -> Arc:
         shear_radius=rows.radius,
         lever=rows.radius,
     )
-    for cause, size in acting:
-        arc = arc if cause.arc is None else cause.arc(arc, rows, size)
+    for mechanism, size in active:
+        arc = arc if mechanism.arc is None else mechanism.arc(arc, rows, size)
     return arc
 
 
 def _points(
-    theta: Floats, passed: Floats, mapped: Floats, arc: Arc, rows: Rows, acting: Acting
-) -> Points:
-    depth = _fallen(arc.entry - mapped, mapped, arc.entry) * arc.radius
+    theta: Floats,
+    swept_angle: Floats,
+    mapped: Floats,
+    arc: ContactArc,
+    rows: WheelState,
+    active: ActiveMechanisms,
+) -> ContactPoints:
+    depth = _cosine_difference(arc.entry - mapped, mapped, arc.entry) * arc.radius
     normal = (rows.kc / rows.width + rows.kphi) * depth**rows.n
-    for cause, size in acting:
-        if cause.pressure is not None:
-            normal = cause.pressure(normal, depth, rows, size)
+    for mechanism, size in active:
+        if mechanism.pressure is not None:
+            normal = mechanism.pressure(normal, depth, rows, size)
     strength = rows.cohesion + normal * np.tan(rows.friction_angle)
-    climbed = 2.0 * np.cos(0.5 * (arc.entry + theta)) * np.sin(0.5 * passed)
-    sheared = arc.shear_radius * (passed - (1.0 - rows.slip) * climbed)
-    shear = strength * -np.expm1(-sheared / rows.shear_modulus)
-    points = Points(theta, passed, depth, sheared, normal, strength, shear)
-    for cause, size in acting:
-        if cause.shear is not None:
-            points = replace(points, shear=cause.shear(points, arc, rows, size))
+    sine_difference = 2.0 * np.cos(0.5 * (arc.entry + theta)) * np.sin(0.5 * swept_angle)
+    shear_displacement = arc.shear_radius * (swept_angle - (1.0 - rows.slip) * sine_difference)
+    shear = strength * -np.expm1(-shear_displacement / rows.shear_modulus)
+    points = ContactPoints(theta, swept_angle, depth, shear_displacement, normal, strength, shear)
+    for mechanism, size in active:
+        if mechanism.shear is not None:
+            points = replace(points, shear=mechanism.shear(points, arc, rows, size))
     return points
 
 
-def _fallen(theta: Floats, gone: Floats, entry: Floats) -> Floats:
+def _cosine_difference(theta: Floats, angle_from_entry: Floats, entry: Floats) -> Floats:
     """cos(theta) - cos(theta_1), as a product that keeps its digits."""
-    return np.asarray(2.0 * np.sin(0.5 * (entry + theta)) * np.sin(0.5 * gone))
+    return np.asarray(2.0 * np.sin(0.5 * (entry + theta)) * np.sin(0.5 * angle_from_entry))
 
 
-def _at_rest(rows: Rows, acting: Acting) -> Push:
-    """Forces at the first sinkage at which the load is carried."""
+def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> GroundReaction:
+    """Forces at the smallest sinkage at which the soil carries the load."""
     with np.errstate(all="ignore"):
-        looks = 0.5 * np.pi * (np.arange(1, LOOKS + 1) / LOOKS) ** 1.5
-        carries = np.stack(
-            [pushed(np.full_like(rows.load, x), rows, acting).load >= rows.load for x in looks]
+        depths = 0.5 * np.pi * (np.arange(1, SEARCH_DEPTHS + 1) / SEARCH_DEPTHS) ** 1.5
+        carries_load = np.stack(
+            [
+                ground_reaction(np.full_like(rows.load, x), rows, active).load >= rows.load
+                for x in depths
+            ]
         )
-        first = np.argmax(carries, axis=0)
-        high = looks[first]
-        low = np.where(first > 0, looks[np.maximum(first - 1, 0)], 0.0)
+        first = np.argmax(carries_load, axis=0)
+        high = depths[first]
+        low = np.where(first > 0, depths[np.maximum(first - 1, 0)], 0.0)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            enough = pushed(middle, rows, acting).load >= rows.load
+            enough = ground_reaction(middle, rows, active).load >= rows.load
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        push = pushed(0.5 * (low + high), rows, acting)
-    ok = carries.any(axis=0) & (np.abs(push.load / rows.load - 1.0) < 1e-8)
-    return Push(
-        load=np.where(ok, push.load, np.nan),
-        pull=np.where(ok, push.pull, np.nan),
-        torque=np.where(ok, push.torque, np.nan),
-        sinkage=np.where(ok, push.sinkage, np.nan),
+        reaction = ground_reaction(0.5 * (low + high), rows, active)
+    ok = carries_load.any(axis=0) & (np.abs(reaction.load / rows.load - 1.0) < 1e-8)
+    return GroundReaction(
+        load=np.where(ok, reaction.load, np.nan),
+        pull=np.where(ok, reaction.pull, np.nan),
+        torque=np.where(ok, reaction.torque, np.nan),
+        sinkage=np.where(ok, reaction.sinkage, np.nan),
     )

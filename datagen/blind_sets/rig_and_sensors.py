@@ -1,4 +1,4 @@
-"""Causes that sit in sensors and in the rig, not in the soil."""
+"""Mechanisms of the sensors and of the rig."""
 
 from __future__ import annotations
 
@@ -7,64 +7,68 @@ from dataclasses import replace
 
 import numpy as np
 
-from datagen.blind_sets.mechanism import Cause
-from datagen.blind_sets.wheel_state import Arc, Push, Rows
+from datagen.blind_sets.mechanism import Mechanism
+from datagen.blind_sets.wheel_state import ContactArc, GroundReaction, WheelState
 
 
-def _slope_driven(rows: Rows, angle: float) -> Rows:
+def _slope_driven(rows: WheelState, angle: float) -> WheelState:
     return replace(rows, load=rows.load * math.cos(angle))
 
 
-def _slope_reading(push: Push, rows: Rows, angle: float) -> Push:
-    """The driven rows hold the part of the weight that stands on the bed."""
-    return replace(push, pull=push.pull - rows.load * math.tan(angle))
+def _slope_reading(reaction: GroundReaction, rows: WheelState, angle: float) -> GroundReaction:
+    """The load of `rows` is the component of the weight normal to the slope."""
+    return replace(reaction, pull=reaction.pull - rows.load * math.tan(angle))
 
 
-def _load_transfer(push: Push, arc: Arc, rows: Rows, ratio: float) -> Push:
+def _load_transfer(
+    reaction: GroundReaction, arc: ContactArc, rows: WheelState, ratio: float
+) -> GroundReaction:
     """The soil carries W + ratio DP where W is reported."""
-    return replace(push, load=push.load - ratio * push.pull)
+    return replace(reaction, load=reaction.load - ratio * reaction.pull)
 
 
-def _bearing_friction(push: Push, rows: Rows, coefficient: float) -> Push:
-    return replace(push, torque=push.torque + coefficient * rows.load * rows.radius)
+def _bearing_friction(
+    reaction: GroundReaction, rows: WheelState, coefficient: float
+) -> GroundReaction:
+    return replace(reaction, torque=reaction.torque + coefficient * rows.load * rows.radius)
 
 
-def _torque_gain(push: Push, rows: Rows, gain: float) -> Push:
-    return replace(push, torque=push.torque * (1.0 + gain))
+def _torque_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+    return replace(reaction, torque=reaction.torque * (1.0 + gain))
 
 
-def _torque_offset(push: Push, rows: Rows, offset: float) -> Push:
-    return replace(push, torque=push.torque + offset)
+def _torque_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+    return replace(reaction, torque=reaction.torque + offset)
 
 
-def _drawbar_gain(push: Push, rows: Rows, gain: float) -> Push:
-    return replace(push, pull=push.pull * (1.0 + gain))
+def _drawbar_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+    return replace(reaction, pull=reaction.pull * (1.0 + gain))
 
 
-def _drawbar_offset(push: Push, rows: Rows, offset: float) -> Push:
-    return replace(push, pull=push.pull + offset)
+def _drawbar_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+    return replace(reaction, pull=reaction.pull + offset)
 
 
-def _sinkage_gain(push: Push, rows: Rows, gain: float) -> Push:
-    return replace(push, sinkage=push.sinkage * (1.0 + gain))
+def _sinkage_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+    return replace(reaction, sinkage=reaction.sinkage * (1.0 + gain))
 
 
-def _sinkage_offset(push: Push, rows: Rows, offset: float) -> Push:
-    return replace(push, sinkage=push.sinkage + offset)
+def _sinkage_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+    return replace(reaction, sinkage=reaction.sinkage + offset)
 
 
-def _load_gain(rows: Rows, gain: float) -> Rows:
+def _load_gain(rows: WheelState, gain: float) -> WheelState:
     return replace(rows, load=rows.load / (1.0 + gain))
 
 
-def _slip_scale(rows: Rows, scale: float) -> Rows:
-    """1 - s' = (1 - s)(1 + e), s what the wheel does and s' what is reported."""
+def _slip_scale(rows: WheelState, scale: float) -> WheelState:
+    """1 - s' = (1 - s)(1 + e), s the true slip and s' the reported one."""
     return replace(rows, slip=np.asarray(1.0 - (1.0 - rows.slip) / (1.0 + scale)))
 
 
 #: The rig: an unmeasured slope, load carried by the pull, friction in the wheel's bearing.
-RIG = (
-    Cause(
+RIG_MECHANISMS = (
+    Mechanism(
         name="slope",
         size="angle",
         reference=math.radians(1.0),
@@ -72,8 +76,8 @@ RIG = (
         driven=_slope_driven,
         reading=_slope_reading,
     ),
-    Cause(name="load-transfer", size="ratio", reference=0.1, unit="1", force=_load_transfer),
-    Cause(
+    Mechanism(name="load-transfer", size="ratio", reference=0.1, unit="1", force=_load_transfer),
+    Mechanism(
         name="bearing-friction",
         size="coefficient",
         reference=0.01,
@@ -83,13 +87,19 @@ RIG = (
 )
 
 #: Sensors alone.
-SENSORS = (
-    Cause(name="torque-gain", size="gain", reference=0.03, unit="1", reading=_torque_gain),
-    Cause(name="torque-offset", size="offset", reference=0.1, unit="N m", reading=_torque_offset),
-    Cause(name="drawbar-gain", size="gain", reference=0.03, unit="1", reading=_drawbar_gain),
-    Cause(name="drawbar-offset", size="offset", reference=0.5, unit="N", reading=_drawbar_offset),
-    Cause(name="sinkage-gain", size="gain", reference=0.03, unit="1", reading=_sinkage_gain),
-    Cause(name="sinkage-offset", size="offset", reference=0.001, unit="m", reading=_sinkage_offset),
-    Cause(name="load-gain", size="gain", reference=0.03, unit="1", driven=_load_gain),
-    Cause(name="slip-scale", size="scale", reference=0.015, unit="1", driven=_slip_scale),
+SENSOR_MECHANISMS = (
+    Mechanism(name="torque-gain", size="gain", reference=0.03, unit="1", reading=_torque_gain),
+    Mechanism(
+        name="torque-offset", size="offset", reference=0.1, unit="N m", reading=_torque_offset
+    ),
+    Mechanism(name="drawbar-gain", size="gain", reference=0.03, unit="1", reading=_drawbar_gain),
+    Mechanism(
+        name="drawbar-offset", size="offset", reference=0.5, unit="N", reading=_drawbar_offset
+    ),
+    Mechanism(name="sinkage-gain", size="gain", reference=0.03, unit="1", reading=_sinkage_gain),
+    Mechanism(
+        name="sinkage-offset", size="offset", reference=0.001, unit="m", reading=_sinkage_offset
+    ),
+    Mechanism(name="load-gain", size="gain", reference=0.03, unit="1", driven=_load_gain),
+    Mechanism(name="slip-scale", size="scale", reference=0.015, unit="1", driven=_slip_scale),
 )

@@ -1,4 +1,4 @@
-"""Three families of soil, and what an analyst is told of one of them."""
+"""Three families of soil, and the nominal soil that the analyst receives."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 RADIUS, WIDTH = 0.15, 0.12  # m, of the wheel
 
-#: Parameters in the order in which they are freed: the first three, or all five.
-FREE = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
+#: Parameters that can be unknown to the analyst: the first three, or all five.
+FREE_PARAMETERS = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
 
-#: What may be taken for granted of a soil nobody has looked at.
+#: Prior ranges of an unknown soil, SI.
 PRIOR = {
     "cohesion": (0.0, 6000.0),
     "friction_angle": (0.25, 0.9),
@@ -22,8 +22,8 @@ PRIOR = {
 
 
 @dataclass(frozen=True)
-class Family:
-    """Ranges of the soil parameters, SI; what is no range is the same in all of the family."""
+class SoilFamily:
+    """Ranges of the soil parameters, SI; those with one value are constant within the family."""
 
     cohesion: tuple[float, float]
     friction_angle: tuple[float, float]
@@ -35,32 +35,34 @@ class Family:
 
     def soil(self, generator: np.random.Generator) -> dict[str, float]:
         """One soil of the family, parameter by name, SI."""
-        made = {name: float(generator.uniform(*getattr(self, name))) for name in FREE}
-        return made | {"kc": self.kc, "a0": 0.4, "a1": 0.15, "unit_weight": self.unit_weight}
+        values = {name: float(generator.uniform(*getattr(self, name))) for name in FREE_PARAMETERS}
+        return values | {"kc": self.kc, "a0": 0.4, "a1": 0.15, "unit_weight": self.unit_weight}
 
 
 FAMILIES = {
-    "dry-sand": Family(
+    "dry-sand": SoilFamily(
         (200.0, 1400.0), (0.47, 0.59), (0.010, 0.025), (1.0e6, 2.0e6), (1.0, 1.15), 990.0, 15000.0
     ),
-    "loam": Family(
+    "loam": SoilFamily(
         (1000.0, 3000.0), (0.38, 0.52), (0.006, 0.015), (4e5, 9e5), (0.65, 0.8), 5000.0, 14000.0
     ),
-    "lunar": Family(
+    "lunar": SoilFamily(
         (100.0, 600.0), (0.57, 0.72), (0.012, 0.022), (6e5, 1.1e6), (0.95, 1.05), 1400.0, 16000.0
     ),
 }
 
 
-def nominal(soil: dict[str, float], free: int, generator: np.random.Generator) -> dict[str, float]:
-    """The soil with its first `free` parameters a little wrong, inside what is taken for granted.
+def nominal_soil(
+    soil: dict[str, float], free: int, generator: np.random.Generator
+) -> dict[str, float]:
+    """The soil with errors in its first `free` parameters, clipped to the prior ranges.
 
-    The others are as they are: an analyst who holds them fixed is right to do so.
+    The other parameters are exact, so that the analyst can fix them.
     """
-    wrong = dict(soil)
-    for name in FREE[:free]:
+    result = dict(soil)
+    for name in FREE_PARAMETERS[:free]:
         spread = 0.05 if name in ("friction_angle", "n") else 0.15
         low, high = PRIOR[name]
         value = soil[name] * (1.0 + spread * generator.uniform(-1.0, 1.0))
-        wrong[name] = float(np.clip(value, low + 0.01 * (high - low), high))
-    return wrong
+        result[name] = float(np.clip(value, low + 0.01 * (high - low), high))
+    return result

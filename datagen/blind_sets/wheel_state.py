@@ -1,4 +1,4 @@
-"""What is passed along while the forces on a wheel are worked out."""
+"""Quantities passed between the stages of the wheel model."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rows:
-    """Wheel, soil and driving of a batch; every field is an array (n,), in SI."""
+class WheelState:
+    """Wheel, soil and operating point of a batch; every field is an array (n,), in SI."""
 
     slip: Floats
     load: Floats  # N
@@ -33,36 +33,36 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Arc:
+class ContactArc:
     """The part of the rim that touches the soil; arrays (n,), angles from straight down, rad."""
 
     entry: Floats
     exit: Floats
     peak: Floats
     sinkage: Floats  # m
-    radius: Floats  # m, of the circle that stands in the soil
+    radius: Floats  # m, of the circle in contact with the soil
     shear_radius: Floats  # m
     lever: Floats  # m
 
 
 @dataclass(frozen=True)
-class Points:
+class ContactPoints:
     """Stresses (Pa) at points of the arc; arrays (points, n)."""
 
     theta: Floats  # rad
-    gone: Floats  # rad, entry angle less theta
+    angle_from_entry: Floats  # rad, entry angle less theta
     depth: Floats  # m, that sets the pressure
-    sheared: Floats  # m, shear displacement
+    shear_displacement: Floats  # m, shear displacement
     normal: Floats
     strength: Floats  # c + sigma tan(phi)
     shear: Floats
 
 
 @dataclass(frozen=True)
-class Push:
+class GroundReaction:
     """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
 
-    NaN where the soil does not carry the load down to the hub.
+    NaN where the soil does not carry the load at any sinkage down to the hub.
     """
 
     load: Floats

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.blind_sets.blind_set import Drawn, draw
+from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.factorial_plan import Plan
 from soilml.cli import main
 from soilml.io.text_tables import csv_text, format_table
@@ -49,7 +49,7 @@ def run_gap(folder: Path, model: str, columns: dict[str, Any], *options: str) ->
     return found
 
 
-def both(drawn: Drawn) -> dict[str, Any]:
+def both(drawn: BlindSet) -> dict[str, Any]:
     """The runs and the region held out from them, in one table."""
     names = [name for name in drawn.columns if name in drawn.region]
     region = {n: drawn.region[n] for n in names}
@@ -60,14 +60,14 @@ def both(drawn: Drawn) -> dict[str, Any]:
 def hidden_story(name: str, folder: Path) -> Story:
     """A story whose data come from the generator of blind sets."""
     plan = PLANS[name]
-    drawn = draw(replace(plan))
+    drawn = draw_blind_set(replace(plan))
     report = run_gap(folder / name, drawn.model, drawn.columns)
     return Story(plan.cause or "nothing", report, drawn.truth["soil"])
 
 
 def slip_sinkage(folder: Path) -> Story:
     """Slip-sinkage by a law outside the catalogue, with soil that varies from run to run."""
-    drawn = draw(PLANS["slip-sinkage"])
+    drawn = draw_blind_set(PLANS["slip-sinkage"])
     columns = both(drawn)
     heaviest = max(columns["load_N"])
     report = run_gap(

@@ -100,9 +100,13 @@ FAULTS = {
     "no load": ({}, ["--load", "much"], "start:stop:count"),
     "many loads": ({}, ["--load", "10:90:9"], "at most 8"),
     "unknown parameter": ({}, ["--free", "stickiness"], "no such parameter"),
-    "two unknowns": ({}, ["--free", "cohesion", "--from", "x.onnx"], "--free is for the posterior"),
+    "two unknowns": (
+        {},
+        ["--free", "cohesion", "--from", "x.onnx"],
+        "--free applies to the posterior",
+    ),
     "no such file": ({}, ["--from", "none.onnx"], "no such file"),
-    "picture of runs": ({}, ["--by", "run", "--picture", "p.png"], "shows one soil"),
+    "picture of runs": ({}, ["--by", "run", "--picture", "p.png"], "draws one soil"),
     "no picture": ({}, ["--picture", "p.csv"], "the output is a .png file"),
 }
 

@@ -7,26 +7,26 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from datagen.blind_sets import CAUSES, Plan, draw, matrix, write
-from datagen.blind_sets.catalogue import hidden, keys
+from datagen.blind_sets import MECHANISMS, Plan, draw_blind_set, plan_matrix, write_blind_set
+from datagen.blind_sets.catalogue import active_mechanisms, mechanism_keys
 from datagen.blind_sets.noise_processes import CHANNELS, sensors
-from datagen.blind_sets.reference_wheel import settled
-from datagen.blind_sets.run_schedules import COLUMN
-from datagen.blind_sets.soil_families import FAMILIES, FREE, RADIUS, WIDTH
-from datagen.blind_sets.wheel_state import Rows
+from datagen.blind_sets.reference_wheel import solve_equilibrium
+from datagen.blind_sets.run_schedules import COVARIATE_COLUMNS
+from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, WIDTH
+from datagen.blind_sets.wheel_state import WheelState
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
 from soilml.config.case import read_case
 
 PLAN = Plan("A", "slip-sinkage", 1.0, 0.01, 8, "dry-sand", 3, 7)
-OF_SOILML = {**CAUSES["A"], **CAUSES["S"]}
-PUSHED = ("torque", "pull", "sinkage")
+OF_SOILML = {**MECHANISMS["A"], **MECHANISMS["S"]}
+CHANNEL_FIELDS = ("torque", "pull", "sinkage")
 
 
 def batch(count, seed):
     """Rows all over the families, with every covariate varied."""
     rng = np.random.default_rng(seed)
     soils = [list(FAMILIES.values())[i % 3].soil(rng) for i in range(count)]
-    return Rows(
+    return WheelState(
         slip=rng.uniform(0.05, 0.6, count),
         load=rng.uniform(40.0, 240.0, count),
         radius=np.full(count, RADIUS),
@@ -47,8 +47,8 @@ def of_soilml(rows, effects=()):
 
 
 def of_hidden(rows, acting=()):
-    push = settled(rows, acting)
-    return np.stack([getattr(push, name) for name in PUSHED])
+    push = solve_equilibrium(rows, acting)
+    return np.stack([getattr(push, name) for name in CHANNEL_FIELDS])
 
 
 def apart(one, other):
@@ -80,9 +80,11 @@ def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
     assert apart(of_soilml(rows), theirs).max() > 1e-4  # it does act
 
 
-@pytest.mark.parametrize(("tier", "key"), [(tier, key) for tier in CAUSES for key in CAUSES[tier]])
+@pytest.mark.parametrize(
+    ("tier", "key"), [(tier, key) for tier in MECHANISMS for key in MECHANISMS[tier]]
+)
 def test_a_cause_acts_and_without_size_does_not(tier, key):
-    (cause,) = hidden(tier, key)
+    (cause,) = active_mechanisms(tier, key)
     rows = batch(60, seed=4)
     bare = of_hidden(rows)
     if cause.form not in ("constant", "proportional"):
@@ -95,15 +97,19 @@ def test_a_cause_acts_and_without_size_does_not(tier, key):
 
 def test_lyasko_s_wheel_stands_as_deep_as_he_says():
     rows = batch(40, seed=5)
-    deep = settled(rows, ((CAUSES["B"]["slip-sinkage/lyasko"], 1.0),))
-    expected = settled(rows).sinkage * (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
+    deep = solve_equilibrium(rows, ((MECHANISMS["B"]["slip-sinkage/lyasko"], 1.0),))
+    expected = solve_equilibrium(rows).sinkage * (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
     ok = np.isfinite(deep.sinkage)
     assert ok.mean() > 0.9
     np.testing.assert_allclose(deep.sinkage[ok], expected[ok], rtol=1e-9)
 
 
 def test_the_same_plan_gives_the_same_set_and_another_seed_another():
-    one, again, other = draw(PLAN), draw(PLAN), draw(replace(PLAN, seed=8))
+    one, again, other = (
+        draw_blind_set(PLAN),
+        draw_blind_set(PLAN),
+        draw_blind_set(replace(PLAN, seed=8)),
+    )
     assert one.truth == again.truth and one.model == again.model
     for name, values in one.columns.items():
         np.testing.assert_array_equal(values, again.columns[name])
@@ -112,7 +118,7 @@ def test_the_same_plan_gives_the_same_set_and_another_seed_another():
 
 @pytest.mark.parametrize("runs", [4, 8, 16])
 def test_runs_sweep_the_slip_at_one_of_several_loads(runs):
-    drawn = draw(replace(PLAN, runs=runs))
+    drawn = draw_blind_set(replace(PLAN, runs=runs))
     columns = drawn.columns
     assert list(columns)[:6] == ["run", "slip", "load_N", *CHANNELS]
     assert {v.shape for v in columns.values()} == {(64,)}
@@ -133,16 +139,20 @@ def test_runs_sweep_the_slip_at_one_of_several_loads(runs):
 
 @pytest.mark.parametrize("tier", ["A", "B"])
 def test_what_a_cause_needs_varies(tier):
-    needy = [key for key in keys(tier) if hidden(tier, key)[0].needs]
+    needy = [key for key in mechanism_keys(tier) if active_mechanisms(tier, key)[0].needs]
     assert needy
     for key in needy:
         plan = replace(PLAN, tier=tier, cause=key)
-        column = draw(plan).columns[COLUMN[hidden(tier, key)[0].needs]]
+        column = draw_blind_set(plan).columns[
+            COVARIATE_COLUMNS[active_mechanisms(tier, key)[0].needs]
+        ]
         assert len(np.unique(column)) > 1
 
 
 def test_a_column_betrays_no_cause():
-    drawn = [draw(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)]
+    drawn = [
+        draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)
+    ]
     share = np.mean([len(d.columns) > 6 for d in drawn])
     assert 0.1 < share < 0.6
 
@@ -152,7 +162,7 @@ def strays(tier, count=60):
     found = []
     for i in range(count):
         plan = replace(PLAN, tier=tier, cause="", size=0.0, noise=0.02, seed=i)
-        drawn, declared = draw(plan), sensors(0.02)
+        drawn, declared = draw_blind_set(plan), sensors(0.02)
         true = {name: np.array(drawn.truth["runs_true"][name]) for name in CHANNELS}
         found.append([(drawn.columns[c] - true[c]) / declared[c].std(true[c]) for c in CHANNELS])
     return np.array(found)
@@ -171,22 +181,22 @@ def test_readings_stray_as_the_tier_says():
 
 
 def test_soil_differs_from_run_to_run_where_the_tier_says_so():
-    drawn = draw(replace(PLAN, tier="N1", cause="", size=0.0, runs=16))
+    drawn = draw_blind_set(replace(PLAN, tier="N1", cause="", size=0.0, runs=16))
     scatter = drawn.truth["scatter"]["runs"]
     assert len(scatter["modulus_factor"]) == 16
     assert 0.02 < np.std(scatter["modulus_factor"]) < 0.09
     assert drawn.truth["runs_true"] != drawn.truth["runs_without"]
-    calm = draw(replace(PLAN, tier="N0", cause="", size=0.0))
+    calm = draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0))
     assert not calm.truth["scatter"]
     assert calm.truth["runs_true"] == calm.truth["runs_without"]
 
 
 def test_what_is_written_is_read_by_the_package_and_the_truth_lies_apart(tmp_path):
     given, kept = tmp_path / "given", tmp_path / "kept"
-    write(replace(PLAN, free=5), given, kept)
+    write_blind_set(replace(PLAN, free=5), given, kept)
     assert sorted(p.name for p in given.iterdir()) == ["model.toml", "region.csv", "runs.csv"]
     case = read_case(given / "model.toml")
-    assert tuple(case.prior) and set(case.prior) == set(FREE)
+    assert tuple(case.prior) and set(case.prior) == set(FREE_PARAMETERS)
     assert set(case.noise) == set(CHANNELS)
     for name, prior in case.prior.items():
         assert prior.lower < getattr(case.soil, name) < prior.upper
@@ -196,28 +206,28 @@ def test_what_is_written_is_read_by_the_package_and_the_truth_lies_apart(tmp_pat
     assert truth["causes"][0]["name"] == "slip-sinkage"
     assert truth["causes"][0]["parameters"]["n1"]["value"] == pytest.approx(0.4)
     assert "sinkage" not in (given / "model.toml").read_text().split("[noise]")[0]
-    for name in FREE:
+    for name in FREE_PARAMETERS:
         assert getattr(case.soil, name) == pytest.approx(truth["soil"][name], rel=0.16)
         assert case.prior[name].lower < truth["soil"][name] < case.prior[name].upper
-    with pytest.raises(ValueError, match="apart"):
-        write(PLAN, given, given)
+    with pytest.raises(ValueError, match="another folder"):
+        write_blind_set(PLAN, given, given)
 
 
 def test_only_what_is_free_is_wrong_in_the_model(tmp_path):
-    write(PLAN, tmp_path / "given", tmp_path / "kept")
+    write_blind_set(PLAN, tmp_path / "given", tmp_path / "kept")
     soil = read_case(tmp_path / "given" / "model.toml").soil
     truth = json.loads((tmp_path / "kept" / "truth.json").read_text())["soil"]
     right = {n for n in truth if getattr(soil, n) == pytest.approx(truth[n], rel=1e-5)}
-    assert right == set(truth) - set(FREE[:3])
+    assert right == set(truth) - set(FREE_PARAMETERS[:3])
 
 
 def test_the_matrix_is_balanced():
-    plans = matrix(True)
+    plans = plan_matrix(True)
     assert 1400 < len(plans) < 1700
     assert len({plan.seed for plan in plans}) == len(plans)
-    assert plans == matrix(True)
+    assert plans == plan_matrix(True)
     for tier in ("A", "B", "C", "S", "M"):
-        for key in keys(tier):
+        for key in mechanism_keys(tier):
             own = [p for p in plans if (p.tier, p.cause) == (tier, key)]
             for field in ("noise", "size", "runs", "soil_family"):
                 assert set(Counter(getattr(p, field) for p in own).values()) == {len(own) // 3}
@@ -225,6 +235,6 @@ def test_the_matrix_is_balanced():
             assert abs(frees[3] - frees[5]) <= 1
     scattered = [p.scattered for p in plans if p.tier == "B"]
     assert np.mean(scattered) == pytest.approx(0.5, abs=0.02)
-    few = matrix(False)
+    few = plan_matrix(False)
     assert len(few) == 40 and set(few) <= set(plans)
-    assert {p.cause for p in few if p.tier == "A"} == set(keys("A"))
+    assert {p.cause for p in few if p.tier == "A"} == set(mechanism_keys("A"))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from datagen.blind_sets import draw, matrix
+from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
 from soilml.gap import gap
 from soilml.gap.data.stacked_readings import stack_readings
@@ -113,12 +113,12 @@ def hidden(kind: str):
     tier, cause, size, noise, free = KINDS[kind]
     plan = next(
         p
-        for p in matrix(True, seed=3)
+        for p in plan_matrix(True, seed=3)
         if (p.tier, p.cause, p.size) == (tier, cause, size)
         and noise in (None, p.noise)
         and free in (None, p.free)
     )
-    drawn = draw(plan)
+    drawn = draw_blind_set(plan)
     columns, region = Table(dict(drawn.columns)), Table(dict(drawn.region))
     return case_of(drawn.model), columns, region, drawn.truth
 
