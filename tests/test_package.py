@@ -54,6 +54,7 @@ def test_the_wheel_holds_the_packages_and_their_data(wheel):
     assert not [n for n in names if n.startswith(("tests/", "bench/", "exported/"))]
 
 
+@pytest.mark.network
 def test_a_bare_install_brings_numpy_and_onnxruntime_alone(board, tmp_path):
     done = run(board / "python", "-m", "pip", "list", "--format=freeze", cwd=tmp_path)
     installed = {line.split("==")[0].lower() for line in done.stdout.splitlines()}
@@ -62,6 +63,7 @@ def test_a_bare_install_brings_numpy_and_onnxruntime_alone(board, tmp_path):
         assert ground not in installed
 
 
+@pytest.mark.network
 def test_the_board_estimates_as_the_ground_does(board, tmp_path, small_model):
     from soilml import Estimator
 
@@ -75,6 +77,7 @@ def test_the_board_estimates_as_the_ground_does(board, tmp_path, small_model):
     np.testing.assert_allclose(found, expected.mean[:, 0], rtol=1e-5)
 
 
+@pytest.mark.network
 def test_the_board_simulates_and_says_what_it_lacks(board, tmp_path):
     from conftest import MODEL
 
