@@ -1,4 +1,4 @@
-"""`python -m soilml`: the command line where no script is on the path."""
+"""`python -m soilml`: the command line, where the script `soilml` is not on the path."""
 
 import sys
 

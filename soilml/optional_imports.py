@@ -1,4 +1,4 @@
-"""Modules that need more than the board has."""
+"""Modules that need libraries which are not installed on board."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from soilml.errors import MissingLibraryError
 
 
 def need(module: str, command: str, extra: str = "ground") -> None:
-    """Import a module; a library that it lacks raises `MissingLibraryError` naming the extra."""
+    """Import a module; raises `MissingLibraryError`, naming the extra, for a missing library."""
     try:
         importlib.import_module(module)
     except MissingLibraryError:

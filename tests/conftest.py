@@ -28,6 +28,24 @@ shear_modulus = [0.005, 0.03]
 torque_Nm = "2 %"
 """
 
+#: A model with wider priors, whose noise is declared for three channels.
+THREE_CHANNEL_MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.3, 0.8]
+shear_modulus = [0.005, 0.04]
+[noise]
+torque_Nm = "2 %"
+drawbar_pull_N = "2 % + 0.2"
+sinkage_m = "2 %"
+"""
+
 RECIPE = (
     """\
 rows = {rows}

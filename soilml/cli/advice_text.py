@@ -1,4 +1,4 @@
-"""What `identify` and `estimate` say of the row to drive next."""
+"""The advised next measurement in the output of `identify` and `estimate`."""
 
 from __future__ import annotations
 
@@ -33,31 +33,31 @@ from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 
-#: Samples and simulated readings of an advice that comes along with an answer: half a second.
+#: Samples and simulated readings of an advice that accompanies a result: takes half a second.
 QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
-#: Rows up to which an estimate's exact posterior takes no more than half a second too.
-FEW = 4
-#: Rows that the sequence of such an advice plans.
-AHEAD = 2
-#: Tables of a recipe that a case holds, or that say only how rows are drawn.
-HELD = {"gear", "soil", "effect", "noise", "operating", "rows", "seed", "runs"}
-#: Slips and loads of a recipe's ranges that are tried.
-ALONG = 4
+#: Rows up to which the exact posterior after an estimate takes at most half a second too.
+MAX_EXACT_ROWS = 4
+#: Rows in the planned sequence of such an advice.
+SEQUENCE_LENGTH = 2
+#: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
+CASE_KEYS = {"gear", "soil", "effect", "noise", "operating", "rows", "seed", "runs"}
+#: Candidate slips, and loads, in the ranges of a recipe.
+GRID_SIZE = 4
 
 
 def advice_after_fit(
     case: Case, table: Table, free: Sequence[str] | None, fit: Fit
 ) -> Advice | None:
-    """Advice after rows that the posterior method answered with `fit`; None where there is none.
+    """Advice after the posterior method gave `fit`; None where none is possible.
 
-    That is where [noise] names no channel, or no row that could be driven is known to be possible.
+    That is the case where [noise] declares no channel, or no candidate is known to be feasible.
     """
     try:
         data = read_observations(case, table)
-        belief = samples_of_rows(case, data, select_free(case, free), QUICK_SAMPLES)
-        current = np.asarray([fit.remaining_fraction[f.path] for f in belief.free])
+        samples = samples_of_rows(case, data, select_free(case, free), QUICK_SAMPLES)
+        current = np.asarray([fit.remaining_fraction[f.path] for f in samples.free])
         return _quick(
-            case, belief, candidate_grid(None, None, data.load), data.at, current_fraction=current
+            case, samples, candidate_grid(None, None, data.load), data.at, current_fraction=current
         )
     except (FitError, InputError):
         return None
@@ -69,30 +69,30 @@ def advice_after_estimate(
     covariance: Floats,
     readings: Mapping[str, Floats],
 ) -> list[str]:
-    """Lines on what to drive after one estimate, (q,) and (q, q), of readings (rows,); or none.
+    """Lines on the next measurement after an estimate, (q,) and (q, q), of readings (rows,).
 
-    The width that is left now is the file's; what a next row does to it is judged by the exact
-    posterior of up to `FEW` rows, and by the file's mean and covariance where there are more.
-    Model, prior and noise are those of the recipe in the file; slips, loads and sensors those that
-    it was trained for. Nothing is said where the recipe holds what a case does not: drift of
-    sensors, vibration, speed, a slip to be estimated.
+    The present width is that of the estimate. The effect of a next row on it follows from the exact
+    posterior of up to `MAX_EXACT_ROWS` rows, and for more rows from mean and covariance. Model,
+    prior and noise are those of the recipe in the file; slips, loads and sensors are those of its
+    training. No lines where the recipe has what a case lacks: sensor bias, vibration, speed, or
+    slip as a target.
     """
-    found = _trained_for(estimator)
-    if found is None:
+    trained = _trained_for(estimator)
+    if trained is None:
         return []
-    case, ranges = found
+    case, ranges = trained
     slip, load = (np.atleast_1d(readings[key]) for key in ("slip", "load"))
     current = np.sqrt(np.diag(covariance)) / estimator.prior.std
     try:
         free = select_free(case, None)
-        if slip.size <= FEW:
+        if slip.size <= MAX_EXACT_ROWS:
             rows = Table({column(n): np.atleast_1d(readings[n]) for n in estimator.inputs})
-            belief = samples_of_rows(case, read_observations(case, rows), free, QUICK_SAMPLES)
+            samples = samples_of_rows(case, read_observations(case, rows), free, QUICK_SAMPLES)
         else:
-            belief = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
+            samples = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
         advice = _quick(
             case,
-            belief,
+            samples,
             ranges,
             Operating(slip=slip, load=load),
             channels=estimator.inputs,
@@ -104,32 +104,32 @@ def advice_after_estimate(
     return next_row_messages(advice, "this row" if slip.size == 1 else "these rows")
 
 
-def _shares(estimate: Estimate) -> NDArray[np.float64]:
-    """Width over the prior's of all parameters together, (rows,); NaN out of range."""
-    shares = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))
-    return np.where(estimate.in_range, shares, np.nan)
+def _relative_width(estimate: Estimate) -> NDArray[np.float64]:
+    """RMS over the parameters of posterior width / prior width, (rows,); NaN out of range."""
+    widths = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))
+    return np.where(estimate.in_range, widths, np.nan)
 
 
 def median_row(estimate: Estimate) -> int:
-    """The row in range that stands in the middle by its width."""
-    shares = _shares(estimate)
-    return int(np.argsort(shares)[(int(estimate.in_range.sum()) - 1) // 2])
+    """The row in range with the median width."""
+    widths = _relative_width(estimate)
+    return int(np.argsort(widths)[(int(estimate.in_range.sum()) - 1) // 2])
 
 
 def widest_row(estimate: Estimate) -> int:
-    """The row in range that is widest."""
-    return int(np.nanargmax(_shares(estimate)))
+    """The row in range with the largest width."""
+    return int(np.nanargmax(_relative_width(estimate)))
 
 
 def mean_covariates(at: Operating) -> dict[str, float]:
-    """Further fields of how rows were driven, at their means: the next row is driven so too."""
-    given = {field: getattr(at, field) for field in COVARIATES}
-    return {field: float(np.mean(value)) for field, value in given.items() if value is not None}
+    """Means of the covariates of measured rows, which are assumed for the next row."""
+    values = {field: getattr(at, field) for field in COVARIATES}
+    return {field: float(np.mean(value)) for field, value in values.items() if value is not None}
 
 
 def _quick(
     case: Case,
-    belief: ParameterSamples,
+    samples: ParameterSamples,
     ranges: CandidateGrid,
     driven: Operating,
     *,
@@ -139,10 +139,10 @@ def _quick(
 ) -> Advice:
     return advise(
         case,
-        belief,
+        samples,
         ranges,
         measured=driven,
-        count=AHEAD,
+        count=SEQUENCE_LENGTH,
         covariates=mean_covariates(driven),
         channels=channels,
         parameters=parameters,
@@ -152,18 +152,18 @@ def _quick(
 
 
 def _trained_for(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
-    """The case of a model file and the ranges of slip and load; None where no case can hold it."""
+    """The case and the candidate grid of a model file; None where no case can represent it."""
     read = {*estimator.inputs}
     if estimator.per_row or not {"slip", "load"} < read <= {"slip", "load", *CHANNELS}:
         return None
     try:
         recipe = json.loads(estimator.metadata["recipe"])
-        if recipe.keys() - HELD or recipe["operating"].keys() - {"slip", "load_N"}:
+        if recipe.keys() - CASE_KEYS or recipe["operating"].keys() - {"slip", "load_N"}:
             return None
         case = take_case(Settings(recipe, estimator.path, Path()))
         ends = [recipe["operating"][key] for key in ("slip", "load_N")]
         pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
-        slips, loads = ([float(x) for x in np.linspace(a, b, ALONG)] for a, b in pairs)
+        slips, loads = ([float(x) for x in np.linspace(a, b, GRID_SIZE)] for a, b in pairs)
         return case, CandidateGrid(tuple(slips), tuple(loads))
     except (SoilmlError, AttributeError, KeyError, TypeError, ValueError):
         return None

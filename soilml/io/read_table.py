@@ -1,4 +1,4 @@
-"""Reading tables, with every fault named by file, line and column."""
+"""Tables from CSV and Parquet files; every error names file, line and column."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from soilml.io.parquet import own_columns, plain_column, read_parquet
 from soilml.io.table import TEXT, Column, Table
 from soilml.quantities import COLUMNS
 
-#: What a table of measured runs must hold; a blank cell is not measured.
+#: Required columns of a table of measured runs; a blank cell is a missing measurement.
 RUNS = ("run", "slip", "load_N", "torque_Nm")
 #: Columns in which every row must have a value.
 FILLED = ("run", "slip", "load_N")
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
 _LIMITS = {
-    "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a share and not in percent"),
+    "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a fraction and not in percent"),
     "load_N": (0.0, np.inf, "a load above zero, in N"),
     "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
     "slip_angle_rad": (-3.2, 3.2, "an angle in rad"),
@@ -40,11 +40,44 @@ def read_table(
     filled: Sequence[str] = FILLED,
     ignore_extra: bool = False,
 ) -> Table:
-    """A CSV or Parquet file of measured rows; raises `TableError` for the first fault.
+    """Read a table of measured rows from a CSV or Parquet file.
 
-    `need` names columns that must be there, `filled` those that may not have blank cells. A column
-    that soilml does not know is an error unless `ignore_extra`: a misspelt one would otherwise be
-    dropped in silence.
+    Parameters
+    ----------
+    path
+        A Parquet file where the name ends in `.parquet`, otherwise a CSV file with a header and
+        comma as separator. Column names carry their units, such as load_N and torque_Nm.
+    need
+        Columns that must be present.
+    filled
+        Columns that must not have blank cells, where they are present.
+    ignore_extra
+        Ignore columns with unknown names. By default they are an error, because a misspelt column
+        would otherwise be ignored without notice.
+
+    Returns
+    -------
+    Table
+        Text columns (run, status, source, wheel) with "" and numbers with NaN for a blank cell.
+
+    Raises
+    ------
+    TableError
+        For the first error in the file: a missing file, column or value, an unknown column, a cell
+        that is not a number, or a value outside the limits of its quantity, such as a slip of 1.
+    MissingLibraryError
+        For a Parquet file where pyarrow is not installed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "runs.csv"
+    ...     _ = file.write_text("run,slip,load_N,torque_Nm\\na,0.2,60,3.0\\na,0.4,60,\\n")
+    ...     table = read_table(file, need=("run", "slip", "load_N"))
+    >>> len(table), table["torque_Nm"]
+    (2, array([ 3., nan]))
     """
     file = Path(path)
     read = _read_parquet if file.suffix == ".parquet" else _read_csv
@@ -58,7 +91,7 @@ def read_table(
         if name not in table:
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
     if len(table) == 0:
-        raise TableError(f"{file}: there is a header but no row")
+        raise TableError(f"{file}: the table has a header but no row")
     _check_values(table, filled)
     return table
 
@@ -69,7 +102,7 @@ def _read_csv(file: Path, ignore_extra: bool) -> Table:
     except UnicodeDecodeError as error:
         raise TableError(f"{file} cannot be read as text: {error}") from None
     if "\0" in text:
-        raise TableError(f"{file} is not a CSV file: it holds binary data")
+        raise TableError(f"{file} is not a CSV file: it contains binary data")
     reader = csv.reader(io.StringIO(text))
     try:
         header = [name.strip() for name in next(reader)]
@@ -84,7 +117,8 @@ def _read_csv(file: Path, ignore_extra: bool) -> Table:
                 continue
             if len(row) != len(header):
                 raise TableError(
-                    f"{file} line {reader.line_num}: {len(row)} cells, the header has {len(header)}"
+                    f"{file} line {reader.line_num}: {len(row)} cells; needed are {len(header)}, "
+                    "as in the header"
                 )
             lines.append(reader.line_num)
             for name, cell in zip(header, row, strict=True):
@@ -102,7 +136,7 @@ def _known_columns(
     kept = []
     for name in header:
         if header.count(name) > 1:
-            raise TableError(f"{file}: column {name} stands twice")
+            raise TableError(f"{file}: column {name} occurs twice")
         base = name.removesuffix("_std")
         if name in own or (base in COLUMNS and (base == name or base not in TEXT)):
             kept.append(name)
@@ -110,13 +144,13 @@ def _known_columns(
             raise TableError(f"{file}: column {name!r}: {hint}")
         elif not ignore_extra:
             raise TableError(
-                f"{file}: column {name!r} is not known; take it out, or pass --ignore-extra"
+                f"{file}: column {name!r} is not known; remove it, or pass --ignore-extra"
             )
     return kept
 
 
 def _misnamed(name: str) -> str:
-    """What a column's name should have been, in words; nothing where it is like no other."""
+    """A hint at the intended name of a column; empty where no name is similar."""
     if ";" in name or "\t" in name:
         return "the separator must be a comma"
     for quantity in COLUMNS.values():
@@ -148,7 +182,7 @@ def _column(file: Path, name: str, cells: list[str], lines: list[int]) -> Column
             if not np.isfinite(values[i]):
                 raise TableError(
                     f"{file} line {lines[i]}, column {name}: {cell!r} is not a number; "
-                    "needed is a finite number, or nothing where it was not measured"
+                    "needed is a finite number, or a blank cell where it was not measured"
                 )
     return values
 
@@ -166,7 +200,9 @@ def _check_values(table: Table, filled: Sequence[str]) -> None:
             bad = ~blank & ~((values > low) & (values < high))
         if name in filled and blank.any():
             row = int(np.argmax(blank))
-            raise TableError(f"{table.place(row)}, column {name}: is blank; needed is {needed}")
+            raise TableError(
+                f"{table.place(row)}, column {name}: the cell is blank; needed is {needed}"
+            )
         if name not in TEXT and bad.any():
             row = int(np.argmax(bad))
             raise TableError(
@@ -178,7 +214,7 @@ def _instead(name: str, table: Table) -> str:
     if name == "torque_Nm":
         return " add it, with blank cells where torque was not measured"
     if name == "run":
-        return " add it, with one name for all rows that were driven together"
+        return " add it, with one name for all rows that were measured together"
     return f" found: {', '.join(table.columns) or 'no column'}"
 
 

@@ -20,7 +20,28 @@ TEXT = ("run", "status", "source", "wheel")
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one length, by name; `line` is where each row stands in its file."""
+    """Columns of equal length by name.
+
+    Parameters
+    ----------
+    columns
+        Arrays (rows,) by name: text for `TEXT`, otherwise numbers with NaN for a blank cell. Names
+        carry the unit, as in load_N.
+    source
+        Name of the file, for messages.
+    line
+        Line of each row in its file, (rows,); empty for a table that is not from a file.
+    metadata
+        Metadata of the file, such as the recipe of simulated data.
+
+    Examples
+    --------
+    >>> table = Table({"run": np.array(["a", "a", "b"]), "slip": np.array([0.1, 0.3, 0.2])})
+    >>> [(name, len(rows)) for name, rows in table.groups()]
+    [('a', 2), ('b', 1)]
+    >>> table.where("run", "b")["slip"]
+    array([0.2])
+    """
 
     columns: dict[str, Column]
     source: str = "table"
@@ -43,7 +64,7 @@ class Table:
 
     @property
     def answered(self) -> NDArray[np.bool_]:
-        """Rows whose status, where there is one, is not that they have no answer."""
+        """Rows whose status is ok or blank, (rows,); all rows of a table without the column."""
         if "status" not in self:
             return np.ones(len(self), dtype=bool)
         return np.isin(self["status"], ("", Status.OK.reason))
@@ -67,23 +88,25 @@ class Table:
                 mask = column == float(value)
             except ValueError:
                 raise TableError(
-                    f"{self.source}: column {name} holds numbers, {value!r} is none"
+                    f"{self.source}: column {name} contains numbers; {value!r} is not a number"
                 ) from None
         if not mask.any():
             some = ", ".join(str(v) for v in np.unique(column)[:6])
-            raise TableError(f"{self.source}: no row has {name} = {value}; there are: {some}, ...")
+            raise TableError(f"{self.source}: no row has {name} = {value}; values are: {some}, ...")
         return self.rows(mask)
 
     def groups(self, name: str = "run") -> Iterator[tuple[str, Table]]:
         """(value, rows) for each value of a column, in order of first appearance.
 
-        Raises `TableError` for a blank cell: its row belongs to no group.
+        Raises `TableError` for a blank cell, whose row would have no group.
         """
         column = self[name]
         blank = column == "" if name in TEXT else np.isnan(column)
         if blank.any():
             place = self.place(int(np.argmax(blank)))
-            raise TableError(f"{place}, column {name}: is blank; rows cannot be grouped by it")
+            raise TableError(
+                f"{place}, column {name}: the cell is blank; rows cannot be grouped by it"
+            )
         values, first, code = np.unique(column, return_index=True, return_inverse=True)
         order = np.argsort(code, kind="stable")
         ends = np.cumsum(np.bincount(code))
@@ -92,5 +115,5 @@ class Table:
             yield str(values[position]), self.rows(members[position])
 
     def place(self, row: int) -> str:
-        """Where a row stands, for a message."""
+        """File and line of a row, for a message."""
         return f"{self.source} line {self.line[row]}" if len(self.line) else f"row {row + 1}"

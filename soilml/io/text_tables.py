@@ -34,7 +34,7 @@ def format_table(
     text_columns: int = 1,
     last_left: bool = False,
 ) -> str:
-    """A table for people: texts (the first columns, the last) to the left, numbers to the right."""
+    """An aligned table: text (the first columns, or the last) to the left, numbers to the right."""
     table = [list(header), *[list(row) for row in rows]]
     widths = [max(len(row[i]) for row in table) for i in range(len(header))]
     left = {*range(text_columns), *([len(header) - 1] if last_left else [])}

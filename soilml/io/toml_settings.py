@@ -1,4 +1,4 @@
-"""TOML settings, read key by key so that every mistake is named with its place."""
+"""TOML settings, read key by key; every error names file, table and key."""
 
 from __future__ import annotations
 
@@ -13,31 +13,31 @@ from soilml.errors import InputError
 
 
 class Settings:
-    """One table of a TOML file; each key is taken once, and `finish` names those nobody took."""
+    """One table of a TOML file; each key is taken once, and `finish` rejects the others."""
 
     def __init__(self, content: dict[str, Any], where: str, folder: Path) -> None:
         self.content = content
-        self._left = dict(content)
+        self._remaining = dict(content)
         self._all = tuple(content)
         self.where = where
         self.folder = folder
         self._known: list[str] = []
 
     def __contains__(self, key: str) -> bool:
-        return key in self._left
+        return key in self._remaining
 
     def take(
         self, key: str, kind: type | tuple[type, ...], needed: str, default: Any = None
     ) -> Any:
-        """The value of `key`; `needed` says what it must be. Without a default it must be there."""
+        """The value of `key`, required without a default; `needed` describes it in messages."""
         self._known.append(key)
-        if key not in self._left:
+        if key not in self._remaining:
             if default is None:
-                near = difflib.get_close_matches(key, self._left, 1, 0.6)
+                near = difflib.get_close_matches(key, self._remaining, 1, 0.6)
                 hint = f" (did you misspell it as {near[0]!r}?)" if near else ""
                 self.fail(f"{key} is missing{hint}; needed is {needed}")
             return default
-        value = self._left.pop(key)
+        value = self._remaining.pop(key)
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             self.fail(f"{key} is {value!r}; needed is {needed}")
         return value
@@ -73,24 +73,24 @@ class Settings:
         ]
 
     def knows(self, keys: Iterable[str]) -> None:
-        """Keys that may stand here, for the hint about one that may not."""
+        """Add permitted keys, which the message about an unknown key suggests."""
         self._known.extend(keys)
 
     def finish(self) -> None:
-        """Raise `InputError` for the first key that nobody took."""
-        for key in self._left:
+        """Raise `InputError` for the first key that was not taken."""
+        for key in self._remaining:
             near = difflib.get_close_matches(key, self._known, 1, 0.6)
             known = ", ".join(dict.fromkeys(self._known))
             hint = f"did you mean {near[0]!r}?" if near else f"known: {known}"
             self.fail(f"unknown key {key!r}; {hint}")
 
     def fail(self, text: str) -> None:
-        """Raise `InputError` with this place in front."""
+        """Raise `InputError` with file and table before the text."""
         raise InputError(f"{self.where}: {text}")
 
 
 def read_settings(path: str | os.PathLike[str]) -> Settings:
-    """The TOML file at `path`; raises `InputError` where it is missing or no TOML."""
+    """The TOML file at `path`; raises `InputError` where it is missing or not valid TOML."""
     file = Path(path)
     try:
         content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
@@ -105,7 +105,7 @@ def read_settings(path: str | os.PathLike[str]) -> Settings:
     except ValueError:  # more digits than Python turns into a number
         raise InputError(f"{file} is not valid TOML: a number has thousands of digits") from None
     except RecursionError:
-        raise InputError(f"{file} is not valid TOML: tables or lists nest too deep") from None
+        raise InputError(f"{file} is not valid TOML: tables or lists are nested too deep") from None
     _check_whole_numbers(content, str(file))
     return Settings(content, str(file), file.parent)
 

@@ -4,27 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from conftest import THREE_CHANNEL_MODEL as MODEL
 
 from soilml import Wheel
 from soilml.cli import main
 from soilml.physics.effects import EFFECTS
-
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-shear_modulus = [0.005, 0.04]
-[noise]
-torque_Nm = "2 %"
-drawbar_pull_N = "2 % + 0.2"
-sinkage_m = "2 %"
-"""
 
 
 def design(loads=(40, 60, 90, 140), slips=5, speeds=None):

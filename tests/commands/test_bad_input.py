@@ -101,7 +101,7 @@ OTHERS = {
     "unknown method": (["identify", "model.toml", "runs.csv", "--method", "best"], "best"),
     "no such rows": (["identify", "model.toml", "runs.csv", "--where", "run=z"], "run = z"),
     "where without value": (["identify", "model.toml", "runs.csv", "--where", "run"], "COLUMN="),
-    "truncated data": (["train", "spec.toml", "cut.parquet", "o.onnx"], "not a whole Parquet"),
+    "truncated data": (["train", "spec.toml", "cut.parquet", "o.onnx"], "not a complete Parquet"),
     "data that is no data": (["train", "spec.toml", "runs.csv", "o.onnx"], "cohesion_Pa"),
     "out that is no ONNX": (["train", "spec.toml", "good.parquet", "o.pkl"], "must end in .onnx"),
     "recipe that is none": (["generate", "model.toml", "o.parquet"], "is missing"),

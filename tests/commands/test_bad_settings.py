@@ -14,7 +14,7 @@ MODELS = {
     "digits of noise": (MODEL.replace('"2 %"', "9" * 400), "noise torque_Nm: the whole number"),
     "digits of a prior": (MODEL.replace("0.005", "9" * 400), "soil prior shear_modulus: the whole"),
     "5000 digits": (MODEL.replace("0.15", "9" * 5000), "a number has thousands of digits"),
-    "nested": ("x = " + "[" * 20_000, "nest too deep"),
+    "nested": ("x = " + "[" * 20_000, "nested too deep"),
     "effect twice": (MODEL + EFFECT + EFFECT, "bad.toml [[effect]] number 2: the model has"),
     "folder": (None, "Is a directory"),
 }

@@ -136,7 +136,7 @@ FAULTS = {
     ),
     "blank speed": (
         lambda r, s: (of_run(r, "speed_m_s", "4deg_1", np.nan), s),
-        "runs.csv line 6, column speed_m_s: is blank",
+        "runs.csv line 6, column speed_m_s: the cell is blank",
     ),
     "NaN": (
         lambda r, s: (of_run(r, "slope_rad", "4deg_1", "NaN"), s),

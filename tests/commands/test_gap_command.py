@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from conftest import THREE_CHANNEL_MODEL as MODEL
 
 from soilml.cli import main
 from soilml.config.case import read_case
@@ -13,22 +14,6 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.user_effects import load_effects
 from soilml.physics.operating_point import Operating
 
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-shear_modulus = [0.005, 0.04]
-[noise]
-torque_Nm = "2 %"
-drawbar_pull_N = "2 % + 0.2"
-sinkage_m = "2 %"
-"""
 FILES = ["gap.json", "model.toml", "next_runs.csv", "report.html"]
 COLUMNS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
 

@@ -1,22 +1,11 @@
 """What `soilml gap` and `soilml audit` refuse: one line, status 2, and nothing left behind."""
 
 import pytest
+from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
 
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-[noise]
-torque_Nm = "2 %"
-"""
+MODEL = THREE_CHANNEL_MODEL.partition("shear_modulus")[0] + '[noise]\ntorque_Nm = "2 %"\n'
 #: Two rows: whatever reaches the analysis is bad data at once.
 RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\nb,0.3,80,3.0\n"
 RATE = MODEL + '[[effect]]\nname = "rate"\na = 0.1\n'
@@ -71,7 +60,7 @@ ROWS = {
     "blank run": (RUNS.replace("b,", ","), "line 3, column run"),
     "NaN": (RUNS.replace("3.0", "NaN"), "line 3, column torque_Nm"),
     "slip of one": (RUNS.replace("0.3", "1"), "line 3, column slip"),
-    "slip in percent": (RUNS.replace("0.3", "30"), "as a share and not in percent"),
+    "slip in percent": (RUNS.replace("0.3", "30"), "as a fraction and not in percent"),
     "no load": (RUNS.replace("80", "0"), "line 3, column load_N"),
     "noise of nothing": (
         RUNS.replace("torque_Nm", "torque_Nm,torque_Nm_std").replace("1.5", "1.5,1").replace(
@@ -109,7 +98,10 @@ OPTIONS = {
     "unknown holdout column": (["--holdout", "pass=2"], "column pass is missing"),
     "holdout without value": (["--holdout", "load_N"], "needed is run, or COLUMN=VALUE"),
     "holdout of no row": (["--holdout", "load_N=61"], "no row has load_N = 61"),
-    "holdout of text": (["--holdout", "load_N=x"], "column load_N holds numbers, 'x' is none"),
+    "holdout of text": (
+        ["--holdout", "load_N=x"],
+        "column load_N contains numbers; 'x' is not a number",
+    ),
     "too few runs": (["--holdout", "run"], "needs four runs or more; the table has 2"),
     "unknown parameter": (["--free", "phi"], "'phi': no such parameter"),
     "checked physics": (["--checked", "bulldozing=1"], "needed is EFFECT=STD, with one of"),

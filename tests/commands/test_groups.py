@@ -69,4 +69,4 @@ def test_a_blank_cell_is_no_group(folder, capsys, small_model):
         assert main([*command, "timed.csv", "--by", "time_s"]) == 2
         captured = capsys.readouterr()
         assert captured.err.count("\n") == 1 and captured.out == ""
-        assert "timed.csv line 3, column time_s: is blank" in captured.err
+        assert "timed.csv line 3, column time_s: the cell is blank" in captured.err

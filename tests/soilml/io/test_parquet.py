@@ -35,21 +35,27 @@ FAULTS = {
     "wrong unit": ({"load_kN": [1.0, 1.0]}, "load is read in N"),
     "misspelt column": ({"torqe_Nm": [1.0, 1.0]}, "did you mean 'torque_Nm'"),
     "extra column": ({"weather": ["dry", "wet"]}, "'weather' is not known"),
-    "run missing": ({"run": ["a", None]}, "line 2, column run: is blank"),
-    "booleans": ({"torque_Nm": [True, False]}, "column torque_Nm: holds bool, not numbers"),
-    "digits in quotes": ({"torque_Nm": ["1", "2"]}, "column torque_Nm: holds string, not numbers"),
+    "run missing": ({"run": ["a", None]}, "line 2, column run: the cell is blank"),
+    "booleans": (
+        {"torque_Nm": [True, False]},
+        "column torque_Nm: has type bool; needed are numbers",
+    ),
+    "digits in quotes": (
+        {"torque_Nm": ["1", "2"]},
+        "column torque_Nm: has type string; needed are numbers",
+    ),
     "times": (
         {"torque_Nm": [datetime.datetime(2024, 1, 1)] * 2},
-        "column torque_Nm: holds timestamp",
+        "column torque_Nm: has type timestamp",
     ),
-    "lists of runs": ({"run": [["a"], ["b"]]}, "column run: holds list"),
+    "lists of runs": ({"run": [["a"], ["b"]]}, "column run: has type list"),
     "bytes that are no text": (
         {
             "run": pa.StringArray.from_buffers(
                 2, pa.py_buffer(np.asarray([0, 1, 2], np.int32)), pa.py_buffer(b"\xff\xfe")
             )
         },
-        "column run: holds text that is not UTF-8",
+        "column run: has text that is not UTF-8",
     ),
     "infinity": ({"torque_Nm": [np.inf, 1.0]}, "line 1, column torque_Nm: inf given"),
 }
@@ -67,7 +73,7 @@ def test_faults_are_named_by_file_and_column(tmp_path, what):
 def test_a_column_that_stands_twice_is_refused(tmp_path):
     table = pa.table([[1.0], [2.0]], names=["slip", "slip"])
     pq.write_table(table, tmp_path / "twice.parquet")
-    with pytest.raises(TableError, match="slip stands twice"):
+    with pytest.raises(TableError, match="slip occurs twice"):
         read_table(tmp_path / "twice.parquet")
 
 
@@ -88,7 +94,7 @@ def test_a_changed_byte_of_a_generated_file_is_found(tmp_path, small_data):
         damaged = bytearray(whole)
         damaged[place] ^= 1
         (tmp_path / "damaged.parquet").write_bytes(damaged)
-        with pytest.raises(TableError, match=r"not a whole Parquet file"):
+        with pytest.raises(TableError, match=r"not a complete Parquet file"):
             read_table(tmp_path / "damaged.parquet")
     content = pq.ParquetFile(small_data).read()
     pq.write_table(content, tmp_path / "plain.parquet", compression="none")

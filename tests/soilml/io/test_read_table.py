@@ -41,16 +41,16 @@ FAULTS = {
     "wrong unit": (GOOD.replace("load_N", "load_kN"), "load is read in N"),
     "wrong unit of length": (GOOD.replace("sinkage_m", "sinkage_mm"), "sinkage is read in m"),
     "extra column": (GOOD.replace("sinkage_m", "weather"), "'weather' is not known"),
-    "column twice": (GOOD.replace("sinkage_m", "slip"), "slip stands twice"),
+    "column twice": (GOOD.replace("sinkage_m", "slip"), "slip occurs twice"),
     "text in a number": (GOOD.replace("0.013", "deep"), "line 3, column sinkage_m: 'deep'"),
     "NaN": (GOOD.replace("0.013", "nan"), "line 3, column sinkage_m: 'nan'"),
     "infinity": (GOOD.replace("2.5", "inf"), "line 4, column torque_Nm: 'inf'"),
     "slip of one": (GOOD.replace("0.3,80", "1.0,80"), "line 4, column slip: 1 given"),
     "slip in percent": (GOOD.replace("0.3,80", "30,80"), "line 4, column slip: 30 given"),
-    "slip blank": (GOOD.replace("0.3,80", ",80"), "line 4, column slip: is blank"),
+    "slip blank": (GOOD.replace("0.3,80", ",80"), "line 4, column slip: the cell is blank"),
     "negative load": (GOOD.replace("0.3,80", "0.3,-80"), "line 4, column load_N: -80 given"),
-    "run blank": (GOOD.replace("b,", ","), "line 4, column run: is blank"),
-    "cells missing": (GOOD.replace("a,0.2,60,", "a,0.2,"), "line 3: 4 cells, the header has 5"),
+    "run blank": (GOOD.replace("b,", ","), "line 4, column run: the cell is blank"),
+    "cells missing": (GOOD.replace("a,0.2,60,", "a,0.2,"), "line 3: 4 cells; needed are 5"),
     "semicolons": (GOOD.replace(",", ";"), "separator must be a comma"),
     "no rows": (GOOD.splitlines()[0] + "\n", "no row"),
     "empty file": ("", "is empty"),
@@ -82,7 +82,7 @@ def test_extra_columns_can_be_passed_over(tmp_path):
 def test_a_truncated_parquet_file_is_refused(tmp_path, small_data):
     whole = small_data.read_bytes()
     for cut in (len(whole) // 2, 10, 0):
-        with pytest.raises(TableError, match="not a whole Parquet file"):
+        with pytest.raises(TableError, match="not a complete Parquet file"):
             read_table(written(tmp_path, whole[:cut], "cut.parquet"), RUNS)
 
 
