@@ -156,18 +156,18 @@ def _text(report: ClimbingReport) -> str:
 
     fit, ability = report.ground.fit, report.ability
     best, where = quantile_band(ability.steepest), quantile_band(ability.steepest_slip)
-    found = [
+    slopes_text = [
         f"steepest slope {_band_text(best, _UNITS['rad'][0], '.1f')} deg, at slip "
         f"{_band_text(where, 1.0, '.2f')}"
     ]
     if report.slip_limit is not None:
         within = quantile_band(ability.steepest_within(report.slip_limit))
         text = _band_text(within, _UNITS["rad"][0], ".1f")
-        found.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
+        slopes_text.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
     climbs, slopes = fit.rows_used, report.ground.distinct_slopes
     parts = [
         f"{climbs} climb{'s'[: climbs > 1]} on {slopes} slope{'s'[: slopes > 1]}",
-        format_table(("parameter", "value", "std", "unit", "left of range"), _parameters(report)),
+        format_table(("parameter", "value", "std", "unit", "posterior/prior"), _parameters(report)),
         format_table(
             ("slip", "pull_N", "p05", "p95", "slope_deg", "p05", "p95"),
             [
@@ -176,7 +176,7 @@ def _text(report: ClimbingReport) -> str:
             ],
             text_columns=0,
         ),
-        "\n".join(found),
+        "\n".join(slopes_text),
         "\n".join(f"! {text}" for text in report.warnings),
     ]
     return "\n\n".join(part for part in parts if part)
@@ -189,23 +189,23 @@ def _parameters(report: ClimbingReport) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     units = {"cohesion": "Pa", "friction_angle": "rad", "shear_modulus": "m"}
     for (name, unit), value in zip(units.items(), report.ground.shear, strict=True):
-        factor, shown = _UNITS.get(unit, (1.0, unit))
+        factor, unit_text = _UNITS.get(unit, (1.0, unit))
         if name in fit.names:
             std = f"{factor * fit.std[fit.names.index(name)]:.2g}"
             left = fit.remaining_fraction[name]
-            said = "not identified" if left > NOT_IDENTIFIED_ABOVE else f"{factor * value:.4g}"
-            rows.append((name, said, std, shown, f"{left:.0%}"))
+            text = "not identified" if left > NOT_IDENTIFIED_ABOVE else f"{factor * value:.4g}"
+            rows.append((name, text, std, unit_text, f"{left:.0%}"))
         else:
-            rows.append((name, f"{factor * value:.4g}", "given", shown, ""))
+            rows.append((name, f"{factor * value:.4g}", "fixed", unit_text, ""))
     return rows
 
 
 def _point(report: ClimbingReport, i: int) -> tuple[str, ...]:
     """A line of the curve."""
-    cells = [f"{report.ability.slip[i]:.3f}"]
+    line = [f"{report.ability.slip[i]:.3f}"]
     for values, factor in ((report.pull, 1.0), (report.slope, _UNITS["rad"][0])):
-        cells += [f"{factor * v[i]:.1f}" for v in (values.middle, values.lower, values.upper)]
-    return tuple(cells)
+        line += [f"{factor * v[i]:.1f}" for v in (values.middle, values.lower, values.upper)]
+    return tuple(line)
 
 
 def _band_text(found: QuantileBand, factor: float, form: str) -> str:

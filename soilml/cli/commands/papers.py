@@ -78,10 +78,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it, then what the table omits."""
-    shown = [c for c in found if every or c.verdict in ("yes", "known", "NO")]
-    notes = list(dict.fromkeys(c.row.reason for c in shown if c.row.reason))
+    rows = [c for c in found if every or c.verdict in ("yes", "known", "NO")]
+    notes = list(dict.fromkeys(c.row.reason for c in rows if c.row.reason))
     lines = []
-    for c in shown:
+    for c in rows:
         row = c.row
         mark = f" [{notes.index(row.reason) + 1}]" if row.reason else ""
         allowed = f"{100 * row.tolerance:.3g} %" if row.relative else f"{row.tolerance:.3g}"
@@ -90,25 +90,27 @@ def _page(paper: str, found: list[Comparison], every: bool) -> str:
         lines.append((f"{c.verdict}{mark}", row.unit, *numbers, f"{row.what} ({row.source})"))
     header = ("holds", "unit", "printed", "computed", "tolerance", "what (where)")
     page = [PAPERS[paper].title, format_table(header, lines, text_columns=2, last_left=True)]
-    page += [_wrapped(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
-    return "\n".join(page + ([] if every else _rest(found)))
+    page += [_wrap(f"[{i}] {note}") for i, note in enumerate(notes, 1)]
+    return "\n".join(page + ([] if every else _omitted(found)))
 
 
-def _rest(found: list[Comparison]) -> list[str]:
+def _omitted(found: list[Comparison]) -> list[str]:
     """What the table omits: inputs, and numbers that are not computed, by reason."""
-    given = [c.row.what for c in found if c.verdict == "given"]
-    said = [_wrapped(f"{len(given)} given, kept as printed: {', '.join(given)}")] if given else []
+    inputs = [c.row.what for c in found if c.verdict == "given"]
+    lines = []
+    if inputs:
+        lines.append(_wrap(f"{len(inputs)} given, kept as printed: {', '.join(inputs)}"))
     why: dict[str, list[str]] = {}
     for c in found:
         if c.verdict == "not computed":
             why.setdefault(c.row.reason, []).append(c.row.source)
     for reason, sources in why.items():
         where = "; ".join(dict.fromkeys(sources))
-        said.append(_wrapped(f"{len(sources)} not computed ({where}): {reason}"))
-    return said
+        lines.append(_wrap(f"{len(sources)} not computed ({where}): {reason}"))
+    return lines
 
 
-def _wrapped(text: str) -> str:
+def _wrap(text: str) -> str:
     return textwrap.fill(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
