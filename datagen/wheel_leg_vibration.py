@@ -78,7 +78,9 @@ class StickSlip:
         """
         if self.stiffness is None or self.drop is None:
             stiffness = normal_stiffness(soil, width)
-            found = np.broadcast_arrays(*soil_spring(soil.friction_angle, stiffness), u[:, 0])
+            found = np.broadcast_arrays(
+                *soil_spring(np.asarray(soil.friction_angle), stiffness), u[:, 0]
+            )
             return {"stiffness": found[1], "increment": found[0]}
         increment = self.drop.at(u[:, 1]) * np.asarray(soil.friction_angle)
         return {"stiffness": self.stiffness.at(u[:, 0]), "increment": increment}

@@ -28,7 +28,7 @@ def predict_channels(
     values = {f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)}
     changed = case.with_values(values)
     force = changed.model(changed.soil, at)
-    shape = (len(u), len(at.slip))
+    shape = (len(u), np.shape(at.slip)[0])
     return {
         "torque": np.broadcast_to(force.torque, shape),
         "drawbar_pull": np.broadcast_to(force.drawbar_pull, shape),

@@ -53,7 +53,7 @@ def torque_fit() -> SlipModelFit[TorqueSlip]:
     return fit_torque_slip(
         midstance_torques(known),
         SLIPS,
-        known.soil.friction_angle,
+        np.asarray(known.soil.friction_angle),
         known.normal_stiffness,
         "terramechanics",
     )
@@ -96,7 +96,8 @@ def efficiency(name: str) -> float:
 def constant_intercept() -> float:
     """Mean intercept of the empirical model over the four soils of table I."""
     known = four_soils()
-    a, _ = TORQUE_SLIP["empirical"].line(known.soil.friction_angle, known.normal_stiffness)
+    angle = np.asarray(known.soil.friction_angle)
+    a, _ = TORQUE_SLIP["empirical"].line(angle, known.normal_stiffness)
     return float(a.mean())
 
 

@@ -1,4 +1,4 @@
-"""A gear on a soil, driven so: one batch of cases, and how to take rows of it."""
+"""A batch of load cases: a gear on a soil under operating conditions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from soilml.physics.soils.soil import Soil
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Everything that the forces on a gear depend on, but its sinkage.
+    """Everything that the forces on a gear depend on, except its sinkage.
 
     Inside a computation each parameter is an array of shape () or (batch,).
     """
@@ -22,14 +22,11 @@ class LoadCase:
     gear: Gear
     soil: Soil
     at: Operating
-    effects: tuple[Any, ...] = ()
+    effects: tuple[Any, ...] = ()  # of `Effect`, whose module needs this one
 
 
 def rows(load_case: LoadCase, index: Array) -> LoadCase:
-    """The rows `index` of a load_case; a parameter shared by all rows stays as it is."""
-    taken = {
-        path: value[index]
-        for path, value in values(load_case).items()
-        if getattr(value, "ndim", 0) > 0
-    }
+    """The rows `index` of a load case; a parameter shared by all rows stays as it is."""
+    parameters: dict[str, Any] = dict(values(load_case))
+    taken = {path: v[index] for path, v in parameters.items() if getattr(v, "ndim", 0) > 0}
     return with_values(load_case, taken)

@@ -153,9 +153,14 @@ def _float64(value: Real, xp: Any, device: Any) -> Array:
 
 
 def _in_chunks(load_case: LoadCase, solve: Callable[[LoadCase], Force]) -> Force:
-    """Rows that truly drive and rows that brake apart: they are cut into different points."""
+    """The forces of all rows, solved in chunks of driving and of braking rows.
+
+    Driving and braking (by the true slip) are kept apart, because their contacts are discretised
+    differently.
+    """
     xp = namespace(load_case.at.slip)
-    braking = apply_stage(load_case.effects, "on_operating", load_case.at, load_case).slip < 0
+    at = apply_stage(load_case.effects, "on_operating", load_case.at, load_case)
+    braking: Array = at.slip < 0
     size = braking.shape[0]
     parts, order = [], []
     for group in (xp.nonzero(~braking)[0], xp.nonzero(braking)[0]):

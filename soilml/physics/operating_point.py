@@ -34,12 +34,14 @@ class Operating:
     slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
     load: Annotated[Real, Parameter("N", 1e-6, 1e7, "vertical load")]
     speed: Annotated[
-        Real, Parameter("m/s", -100.0, 100.0, "travel speed, below zero in reverse")
+        Real | None, Parameter("m/s", -100.0, 100.0, "travel speed, below zero in reverse")
     ] = None
-    pass_number: Annotated[Real, Parameter("1", 1.0, 1e4, "1 on virgin soil, 2 in a rut")] = None
-    slip_angle: Annotated[Real, Parameter("rad", -1.6, 1.6, "between wheel plane and travel")] = (
-        None
-    )
+    pass_number: Annotated[
+        Real | None, Parameter("1", 1.0, 1e4, "1 on virgin soil, 2 in a rut")
+    ] = None
+    slip_angle: Annotated[
+        Real | None, Parameter("rad", -1.6, 1.6, "between wheel plane and travel")
+    ] = None
 
 
 #: Optional fields of `Operating`, and the column of each.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, final
 
-from soilml.arrays import Real, namespace
+from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
@@ -27,7 +27,7 @@ class SlipLoadScaling(Effect):
     by_load: Annotated[Real, Parameter("1", -5.0, 5.0, "power of load that the size has")] = 0.0
 
     @final
-    def scaled(self, size: Real, load_case: LoadCase) -> Real:
+    def scaled(self, size: Real, load_case: LoadCase) -> Array:
         """The size at the slip and load of a load case; unchanged, to the last bit, by default."""
         xp = namespace(load_case.at.slip)
         power = self.by_slip * (xp.abs(load_case.at.slip) - REFERENCE_SLIP)

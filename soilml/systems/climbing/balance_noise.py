@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Real
+from soilml.arrays import Array
 from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
 from soilml.systems.climbing.rover import Rover
 from soilml.systems.climbing.wheel_force_components import (
@@ -106,7 +106,7 @@ def _load_and_stress_terms(
     return [float(value) for value in terms]
 
 
-def _pull_ratio(wheels: tuple[ForceComponents, ...], tan_friction: float) -> Real:
+def _pull_ratio(wheels: tuple[ForceComponents, ...], tan_friction: float) -> Array:
     """Pull over load of wheels with one magnification, on soil without cohesion."""
     pull = sum(w.pressure_pull + tan_friction * w.friction_pull for w in wheels)
     return pull / sum(w.pressure_lift + tan_friction * w.friction_lift for w in wheels)

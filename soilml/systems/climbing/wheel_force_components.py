@@ -38,17 +38,17 @@ class ForceComponents:
     cohesion_pull: Array  # m^2
     cohesion_lift: Array
 
-    def magnification(self, load: Real, cohesion: Real, tan_friction: Real) -> Real:
+    def magnification(self, load: Real, cohesion: Real, tan_friction: Real) -> Array:
         """M with which the wheel carries `load` (N) at cohesion (Pa) and tan(phi)."""
         lift = self.pressure_lift + tan_friction * self.friction_lift
         return (load - cohesion * self.cohesion_lift) / lift
 
-    def pull(self, magnification: Real, cohesion: Real, tan_friction: Real) -> Real:
+    def pull(self, magnification: Real, cohesion: Real, tan_friction: Real) -> Array:
         """Drawbar pull of the wheel, N."""
         stress = self.pressure_pull + tan_friction * self.friction_pull
         return magnification * stress + cohesion * self.cohesion_pull
 
-    def load(self, magnification: Real, cohesion: Real, tan_friction: Real) -> Real:
+    def load(self, magnification: Real, cohesion: Real, tan_friction: Real) -> Array:
         """Vertical load that the wheel carries, N."""
         stress = self.pressure_lift + tan_friction * self.friction_lift
         return magnification * stress + cohesion * self.cohesion_lift
@@ -90,7 +90,7 @@ def pull_of_rover(
     wheels: tuple[ForceComponents, ForceComponents],
     cohesion: Real,
     tan_friction: Real,
-) -> Real:
+) -> Array:
     r"""Drawbar pull 2 (F_xf + F_xr) (N) of a rover whose wheels carry its weight on the slope.
 
     The vertical balance, :math:`2 (F_{zf} + F_{zr}) = m g \cos\alpha`, gives the magnification: one
@@ -118,7 +118,7 @@ def shared_magnification(
     wheels: tuple[ForceComponents, ForceComponents],
     cohesion: Real,
     tan_friction: Real,
-) -> Real:
+) -> Array:
     """The common M of both wheels, from the vertical balance of the rover."""
     carried = 0.5 * rover.weight * np.cos(slope)
     lift = sum(w.pressure_lift + tan_friction * w.friction_lift for w in wheels)

@@ -60,7 +60,7 @@ def bin_stress(readings: SensorReadings, wheel: SensingWheel) -> BinnedStress:
     bins = math.ceil(2.0 * math.pi / wheel.step)
     bin_index = np.minimum((readings.angle.ravel() + math.pi) // wheel.step, bins - 1).astype(int)
 
-    def sum_by_bin(value: Floats) -> Floats:
+    def sum_by_bin(value: NDArray[np.float64] | np.float64) -> Floats:
         return np.bincount(bin_index, value.ravel(), minlength=bins).astype(np.float64)
 
     count = np.bincount(bin_index, minlength=bins)

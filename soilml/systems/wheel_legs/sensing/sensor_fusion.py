@@ -109,7 +109,9 @@ def _score(mean: Floats, std: Floats, truth: Floats) -> EstimatorScore:
 
 def _true_values(stances: StanceReadings, name: str) -> Floats:
     ground = stances.ground
-    return ground.normal_stiffness if name == PROPERTIES[1] else ground.soil.friction_angle
+    if name == PROPERTIES[1]:
+        return np.asarray(ground.normal_stiffness)
+    return np.asarray(ground.soil.friction_angle)
 
 
 def _features(stances: StanceReadings, name: str) -> dict[str, Floats]:

@@ -98,7 +98,7 @@ def simulate_stances(count: int, seed: int, noise: float = 0.03) -> StanceReadin
     ground = sample_soils(count, seed)
     slip = rng.uniform(0.1, 0.5, count)
     force = Model(FOOT)(ground.soil, Operating(slip=slip, load=LOAD))
-    angle = ground.soil.friction_angle
+    angle = np.asarray(ground.soil.friction_angle)
     drop = angle * rng.uniform(0.2, 0.3, count)
     vibration = vibration_amplitude(SpringLeg(stiffness=np.full(count, 4000.0)), slip, angle, drop)
     readings = np.stack([force.torque, force.sinkage, vibration])
