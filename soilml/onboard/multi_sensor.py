@@ -71,43 +71,70 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
     if rule not in ACROSS_FILES:
         raise InputError(f"rule is {rule!r}; for estimates of several files: {_join(ACROSS_FILES)}")
     _check_compatible(estimates)
-    first = estimates[0]
-    q, shape = len(first.names), first.in_range.shape
+    stacked = _stack_rows(estimates)
     used = np.stack([e.in_range.reshape(-1) for e in estimates])
-    mean = np.stack([e.mean.reshape(-1, q) for e in estimates])
-    covariance = np.stack([e.covariance.reshape(-1, q, q) for e in estimates])
-    ends = np.stack([np.stack([e.low, e.high]).reshape(2, -1, q) for e in estimates])
-    used = used & ~_contradictory(mean, covariance, used)
-    prior, n = first.prior, used.shape[1]
-    out_mean = np.tile(prior.mean, (n, 1))
-    out_covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
-    out_ends = np.stack([out_mean - Z_90 * prior.std, out_mean + Z_90 * prior.std])
+    used = used & ~_contradictory(stacked.mean, stacked.covariance, used)
+    fused = _fuse_rows(stacked, used, estimates[0].prior, rule)
+    return _as_estimate(fused, used, estimates[0])
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Mean (..., n, q), covariance (..., n, q, q) and ends of the interval (..., 2, n, q)."""
+
+    mean: Floats
+    covariance: Floats
+    ends: Floats
+
+
+def _stack_rows(estimates: Sequence[Estimate]) -> _Rows:
+    """All m estimates with their leading dimensions flattened to n rows."""
+    q = len(estimates[0].names)
+    return _Rows(
+        mean=np.stack([e.mean.reshape(-1, q) for e in estimates]),
+        covariance=np.stack([e.covariance.reshape(-1, q, q) for e in estimates]),
+        ends=np.stack([np.stack([e.low, e.high]).reshape(2, -1, q) for e in estimates]),
+    )
+
+
+def _fuse_rows(stacked: _Rows, used: NDArray[np.bool_], prior: PriorSummary, rule: str) -> _Rows:
+    """Fused rows from the estimates that are used in each, (m, n); the prior where none is."""
+    n = used.shape[1]
+    mean = np.tile(prior.mean, (n, 1))
+    covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
+    ends = np.stack([mean - Z_90 * prior.std, mean + Z_90 * prior.std])
     for pattern in np.unique(used, axis=1).T:
         rows, members = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
         if members.size == 1:
             (only,) = members
-            out_mean[rows], out_covariance[rows] = mean[only, rows], covariance[only, rows]
-            out_ends[:, rows] = ends[only][:, rows]
+            mean[rows] = stacked.mean[only, rows]
+            covariance[rows] = stacked.covariance[only, rows]
+            ends[:, rows] = stacked.ends[only][:, rows]
         elif members.size > 1:
-            parts = mean[members][:, rows], covariance[members][:, rows]
-            out_mean[rows], out_covariance[rows] = _fuse(*parts, prior, rule)
-            half = Z_90 * np.sqrt(np.diagonal(out_covariance[rows], axis1=1, axis2=2))
-            out_ends[:, rows] = out_mean[rows] - half, out_mean[rows] + half
-    low, high = np.clip(out_ends, prior.lower, prior.upper).reshape(2, *shape, q)
-    return MultiSensorEstimate(
-        Estimate(
-            names=first.names,
-            units=first.units,
-            mean=np.clip(out_mean, prior.lower, prior.upper).reshape(*shape, q),
-            std=np.sqrt(np.diagonal(out_covariance, axis1=1, axis2=2)).reshape(*shape, q),
-            covariance=out_covariance.reshape(*shape, q, q),
-            low=low,
-            high=high,
-            in_range=np.asarray(used.any(axis=0).reshape(shape)),
-            prior=prior,
-        ),
-        used.reshape(len(estimates), *shape),
+            parts = stacked.mean[members][:, rows], stacked.covariance[members][:, rows]
+            mean[rows], covariance[rows] = _fuse(*parts, prior, rule)
+            half = Z_90 * np.sqrt(np.diagonal(covariance[rows], axis1=1, axis2=2))
+            ends[:, rows] = mean[rows] - half, mean[rows] + half
+    return _Rows(mean, covariance, ends)
+
+
+def _as_estimate(fused: _Rows, used: NDArray[np.bool_], first: Estimate) -> MultiSensorEstimate:
+    """The fused rows with the leading dimensions, names and prior of the first estimate."""
+    q, shape, prior = len(first.names), first.in_range.shape, first.prior
+    low, high = np.clip(fused.ends, prior.lower, prior.upper).reshape(2, *shape, q)
+    std = np.sqrt(np.diagonal(fused.covariance, axis1=1, axis2=2))
+    estimate = Estimate(
+        names=first.names,
+        units=first.units,
+        mean=np.clip(fused.mean, prior.lower, prior.upper).reshape(*shape, q),
+        std=std.reshape(*shape, q),
+        covariance=fused.covariance.reshape(*shape, q, q),
+        low=low,
+        high=high,
+        in_range=np.asarray(used.any(axis=0).reshape(shape)),
+        prior=prior,
     )
+    return MultiSensorEstimate(estimate, used.reshape(len(used), *shape))
 
 
 def _fuse(

@@ -1,4 +1,4 @@
-"""Training: splits, calibration, specs, cards, pictures."""
+"""Training: split, calibration, specs, cards and plots."""
 
 import re
 from dataclasses import replace
@@ -26,7 +26,7 @@ def data(small_data):
     return read_dataset(small_data, FEATURES, TARGETS)
 
 
-def test_no_soil_stands_in_two_parts_and_nothing_is_lost(data):
+def test_the_split_is_by_run_and_complete(data):
     parts = split_by_run(data, seed=3)
     runs = [set(p.run) for p in (parts.train, parts.validation, parts.calibration)]
     assert not (runs[0] & runs[1] or runs[0] & runs[2] or runs[1] & runs[2])
@@ -36,7 +36,7 @@ def test_no_soil_stands_in_two_parts_and_nothing_is_lost(data):
     assert len(parts.calibration.limit_rows_per_run(2)) < len(parts.calibration)
 
 
-def test_figures_of_a_known_case():
+def test_metrics_of_a_known_case():
     rng = np.random.default_rng(0)
     mean, std = rng.normal(size=(20000, 1)), np.full((20000, 1), 0.5)
     s = compute_metrics(mean + 0.5 * rng.normal(size=mean.shape), mean, std, np.asarray([2.0]))
@@ -47,10 +47,10 @@ def test_figures_of_a_known_case():
     assert s.nll[0] == pytest.approx(0.5 * np.log(2 * np.pi * np.e) + np.log(0.25), abs=0.02)
 
 
-def test_recalibration_makes_errors_as_large_as_claimed(data):
+def test_recalibration_matches_std_to_the_errors(data):
     parts = split_by_run(data, seed=0)
-    machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    shrunken = recalibrate(_Overconfident(machine), parts.validation)
+    regressor = LinearGaussian().fit(parts.train.features, parts.train.targets)
+    shrunken = recalibrate(_Overconfident(regressor), parts.validation)
     s = compute_metrics(
         parts.calibration.limit_rows_per_run().targets,
         *shrunken.predict(parts.calibration.limit_rows_per_run().features),
@@ -61,18 +61,18 @@ def test_recalibration_makes_errors_as_large_as_claimed(data):
 
 
 class _Overconfident:
-    def __init__(self, machine):
-        self.machine = machine
+    def __init__(self, regressor):
+        self.regressor = regressor
 
     def predict(self, x, return_std=False):
-        mean, std = self.machine.predict(x, return_std=True)
+        mean, std = self.regressor.predict(x, return_std=True)
         return mean, std / 5.0
 
 
-def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
+def test_fusing_a_regressor_with_itself_does_not_reduce_std(data):
     parts = split_by_run(data, seed=0)
-    machine = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    member = recalibrate(machine, parts.validation)
+    regressor = LinearGaussian().fit(parts.train.features, parts.train.targets)
+    member = recalibrate(regressor, parts.validation)
     single = member.predict(parts.calibration.features)[1]
     twice = fuse_members([member, member], "best-linear", parts.validation)
     np.testing.assert_allclose(twice.predict(parts.calibration.features)[1], single, rtol=0.02)
@@ -82,7 +82,7 @@ def test_fusing_the_same_regressor_twice_gains_no_certainty(data):
     )
 
 
-def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
+def test_pooling_is_calibrated_on_held_out_runs(data):
     parts = split_by_run(data, seed=0)
     member = recalibrate(
         LinearGaussian().fit(parts.train.features, parts.train.targets), parts.validation
@@ -98,7 +98,11 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     steady, one_slip, one_load, free = calibration.patterns
     np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
     assert (free.information[1:] <= free.information[0]).all()
-    for pattern in (steady, one_slip, one_load):  # none in the data: rows narrow nothing
+    for pattern in (
+        steady,
+        one_slip,
+        one_load,
+    ):  # none in the data: pooling does not reduce the uncertainty
         assert pattern.rows.tolist() == [1.0]
         assert np.exp(pattern.interpolate(32)[0]) == pytest.approx(1 / 32)
     alone = parts.calibration.rows(parts.calibration.run_length == 1)
@@ -109,7 +113,7 @@ def test_joined_rows_are_widened_by_what_held_out_runs_need(data):
     assert all(np.exp(p.interpolate(32)[0]) == pytest.approx(1 / 32) for p in unknown.patterns)
 
 
-def test_rows_of_a_run_are_taken_from_anywhere_in_it(data):
+def test_runs_are_shuffled(data):
     many = data.rows(data.run_length == 32)
     for start in (0, 1):
         first = np.asarray([run[start] for run in many.runs()])
@@ -132,8 +136,8 @@ def test_train_writes_model_card_and_picture(small_model):
     from matplotlib.image import imread
 
     card = small_model.with_suffix(".md").read_text()
-    for said in ("cohesion", "in_range", "sha256", "best-linear", "90 %", "mostly the prior"):
-        assert said in card
+    for text in ("cohesion", "in_range", "sha256", "best-linear", "90 %", "mostly the prior"):
+        assert text in card
     picture = imread(small_model.with_suffix(".png"))
     assert picture.shape[0] > 200 and picture[..., :3].std() > 0.01
 
@@ -160,7 +164,7 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "regressor]] is missing"),
         ('[[regressor]]\ntype = "forest"\n', "lssvm, fixed-size-lssvm, mlp, linear"),
@@ -173,12 +177,12 @@ def test_the_exported_intervals_hold_on_data_of_another_seed(small_model, tmp_pa
         ('targets = ["depth"]\n[[regressor]]\ntype = "mlp"\n', "'depth' cannot be estimated"),
     ],
 )
-def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
+def test_invalid_entries_of_a_spec_are_named(tmp_path, text, message):
     path = tmp_path / "spec.toml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
         read_spec(path)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_data_without_targets_or_with_too_few_rows_is_refused(tmp_path, small_data):

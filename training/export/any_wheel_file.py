@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from typing import Any
+
+import numpy as np
 
 from soilml import __version__
-from soilml.onboard.model_file import FORMAT
+from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
+from soilml.onboard.model_file import FORMAT, write_pooling
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
@@ -20,16 +22,14 @@ from training.spec import AnyWheelSpec
 
 #: The input that the prior of an output scales with.
 SCALES = {"cohesion": "cohesion_max", "shear_modulus": "shear_modulus_max"}
-#: Metadata entry "together" of a file without estimates of single rows: nothing is pooled.
-NO_POOLING: dict[str, Any] = {
-    "over": [],
-    "lower": [],
-    "upper": [],
-    "std": [],
-    "kinds": [],
-    "alone": [round(Z_90, 3)] * len(SHEAR),
-    "doubt": [],
-}
+NONE = np.zeros(0)
+#: Pooling of a file without estimates of single rows: nothing is pooled.
+NO_POOLING = PoolingCalibration(
+    conditions=RunConditions((), NONE, NONE, NONE),
+    patterns=(),
+    single_row_coverage_factor=np.full(len(SHEAR), round(Z_90, 3)),
+    inconsistency_limits=NONE,
+)
 
 
 def export_any_wheel(
@@ -65,7 +65,7 @@ def export_any_wheel(
         ),
         "outputs": json.dumps(outputs),
         "gear": json.dumps({"type": "wheel"}),
-        "together": json.dumps(NO_POOLING),
+        "together": json.dumps(write_pooling(NO_POOLING)),
         "set": json.dumps(metadata_of(posterior, spec.noise, sets_only=True)),
         "probe": json.dumps(probe_of_sets(posterior)),
         "spec": spec.text,

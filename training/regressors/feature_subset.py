@@ -50,8 +50,8 @@ class FeatureSubset:
         progress: Progress,
     ) -> None:
         """Fit the regressor to features and targets, with others for early stopping."""
-        held_out = (self.select(validation[0]), validation[1])
-        self.model.fit_with_validation(self.select(training[0]), training[1], held_out, progress)
+        subset = (self.select(validation[0]), validation[1])
+        self.model.fit_with_validation(self.select(training[0]), training[1], subset, progress)
 
     def predict(self, features: Floats, return_std: bool = False) -> Any:
         """Mean (n, q); with `return_std` a tuple with the standard deviation."""

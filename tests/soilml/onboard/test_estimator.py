@@ -1,4 +1,4 @@
-"""The onboard runtime: answers, flags, and files that are not ours."""
+"""The onboard runtime: estimates, flags, and files that are refused."""
 
 import json
 import shutil
@@ -66,7 +66,7 @@ def test_impossible_readings_are_refused(estimator):
         estimator(**good, speed=0.1)
 
 
-def test_rows_of_one_soil_together_say_more_than_one(estimator):
+def test_several_rows_of_one_soil_reduce_the_uncertainty(estimator):
     rng = np.random.default_rng(0)
     slip, load = rng.uniform(0.1, 0.55, 12), rng.uniform(35.0, 110.0, 12)
     from soilml import Model, Operating, Wheel, soil
@@ -80,7 +80,7 @@ def test_rows_of_one_soil_together_say_more_than_one(estimator):
     assert (together.std <= estimator.prior.std * 1.0001).all()
 
 
-def test_rows_that_no_one_soil_gives_are_flagged_and_get_the_prior(estimator):
+def test_inconsistent_rows_are_flagged_and_get_the_prior(estimator):
     slip, load = np.asarray([0.1, 0.3, 0.5] * 4), np.asarray([40.0, 60.0, 80.0] * 4)
     torque = load * 0.15 * np.asarray([0.45, 0.40, 0.35] * 4)  # falls where it must rise
     wild = estimator.run(slip=slip, torque=torque, load=load)
@@ -89,7 +89,7 @@ def test_rows_that_no_one_soil_gives_are_flagged_and_get_the_prior(estimator):
     np.testing.assert_allclose(wild.std, estimator.prior.std)
 
 
-def test_a_stray_row_is_left_out_and_many_are_not_forgiven(estimator):
+def test_one_outlier_is_left_out_and_many_flag_the_run(estimator):
     good = {"slip": np.full(20, 0.3), "torque": np.full(20, 3.0), "load": np.full(20, 60.0)}
     stray = {name: values.copy() for name, values in good.items()}
     stray["torque"][0] = 90.0
@@ -99,7 +99,7 @@ def test_a_stray_row_is_left_out_and_many_are_not_forgiven(estimator):
     assert not bool(estimator.run(**stray).in_range)
 
 
-def test_joined_answers_stay_inside_the_prior_and_inside_their_interval(estimator):
+def test_pooled_estimates_stay_inside_the_prior_and_inside_their_interval(estimator):
     rng = np.random.default_rng(0)
     for _ in range(60):
         slip, load = rng.uniform(0.06, 0.59, 6), rng.uniform(31.0, 119.0, 6)
@@ -119,7 +119,7 @@ def test_no_reading_and_readings_of_two_lengths_are_refused(estimator):
         estimator(slip=[0.1, 0.2], torque=[1.0, 2.0, 3.0], load=60.0)
 
 
-def test_a_reading_repeated_tells_what_it_tells_once(estimator):
+def test_a_repeated_reading_counts_once(estimator):
     alone = estimator(slip=0.3, torque=3.0, load=60.0)
     again = estimator.run(slip=np.full(500, 0.3), torque=np.full(500, 3.0), load=np.full(500, 60.0))
     assert bool(again.in_range)
@@ -132,14 +132,14 @@ def test_a_reading_repeated_tells_what_it_tells_once(estimator):
         np.testing.assert_allclose(getattr(often, field), getattr(once, field), rtol=0.02)
 
 
-def test_one_row_together_is_that_row(estimator):
+def test_a_run_of_one_row_is_that_row(estimator):
     alone = estimator(slip=0.3, torque=3.0, load=60.0)
     together = estimator.run(slip=0.3, torque=3.0, load=60.0)
     for field in ("mean", "std", "covariance", "low", "high"):
         np.testing.assert_array_equal(getattr(together, field), getattr(alone, field))
 
 
-def test_files_that_are_not_ours_are_refused(tmp_path, small_model):
+def test_files_of_another_origin_are_refused(tmp_path, small_model):
     whole = small_model.read_bytes()
     files = {
         "none.onnx": None,
@@ -180,7 +180,7 @@ def test_every_single_damaged_byte_is_found(tmp_path, small_model):
         assert "\n" not in str(caught.value)
 
 
-def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
+def test_additional_bytes_are_refused_wherever_they_are(tmp_path, small_model):
     whole = small_model.read_bytes()
     model = onnx.load(small_model)
     more = onnx.ModelProto()
@@ -208,19 +208,19 @@ def test_a_byte_more_is_refused_wherever_it_stands(tmp_path, small_model):
             Estimator.load(tmp_path / "more.onnx")
 
 
-def test_what_is_mostly_the_prior_abstains(estimator):
+def test_estimates_close_to_the_prior_abstain(estimator):
     near = estimator(slip=0.3, torque=3.0, load=60.0)
     assert (near.abstains == (near.std > 0.8 * near.prior_std)).all()
     assert near.abstains.any()
     assert estimator(slip=0.3, torque=3000.0, load=60.0).abstains.all()
 
 
-def test_the_probe_asks_for_a_row_out_of_range(estimator):
-    asked = json.loads(estimator.metadata["probe"])[0]["in_range"]
-    assert asked == [True] * 8 + [False]
+def test_the_probe_has_a_row_out_of_range(estimator):
+    in_range = json.loads(estimator.metadata["probe"])[0]["in_range"]
+    assert in_range == [True] * 8 + [False]
 
 
-def test_a_runtime_that_computes_otherwise_is_found_by_the_probe(tmp_path, small_model):
+def test_the_probe_detects_a_runtime_with_other_results(tmp_path, small_model):
     from soilml.onboard.model_file import metadata_checksum
 
     model = onnx.load(small_model)
@@ -253,7 +253,7 @@ def test_damaged_metadata_is_refused(tmp_path, small_model):
             Estimator.load(tmp_path / "damaged.onnx")
 
 
-def test_metadata_tells_where_the_file_comes_from(estimator):
+def test_metadata_has_the_provenance_of_the_file(estimator):
     metadata = estimator.metadata
     for entry in json.loads(metadata["inputs"]):
         assert set(entry) == {"name", "column", "unit", "lower", "upper"}
@@ -271,7 +271,7 @@ def test_the_file_holds_no_path_of_the_machine_it_was_made_on(small_model):
         assert trace not in content
 
 
-def test_the_runtime_loads_numpy_and_onnxruntime_and_nothing_of_the_ground(small_model, tmp_path):
+def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
     shutil.copy(small_model, tmp_path / "m.onnx")
     code = (
         "import sys; from soilml.onboard.estimator import Estimator; e = Estimator.load('m.onnx');"

@@ -1,4 +1,4 @@
-"""The in-range flag: genuine rows pass, torques that no soil gives do not."""
+"""The training domain contains genuine rows, and no torques beyond any soil of the prior."""
 
 import numpy as np
 import pytest

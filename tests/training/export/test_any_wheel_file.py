@@ -30,13 +30,13 @@ def test_a_range_that_is_missing_is_named(tmp_path, key):
         read_any_wheel_spec(spec_of(tmp_path, "\n".join(lines)))
 
 
-def test_a_key_that_nobody_reads_is_named(tmp_path):
+def test_an_unknown_key_is_named(tmp_path):
     with pytest.raises(InputError, match="hiden"):
         read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("hidden", "hiden")))
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("designs = 10", "designs"),
         ("designs = 60000000000", "designs"),
@@ -44,8 +44,8 @@ def test_a_key_that_nobody_reads_is_named(tmp_path):
         ('designs = "many"', "designs"),
     ],
 )
-def test_a_size_that_learns_nothing_is_refused(tmp_path, text, said):
-    with pytest.raises(InputError, match=said):
+def test_impossible_settings_are_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
         read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("designs = 60000", text)))
 
 

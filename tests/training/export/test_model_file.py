@@ -52,7 +52,7 @@ def specs():
 
 
 @pytest.mark.parametrize("text", list(specs()))
-def test_the_file_answers_as_the_original_over_the_whole_box(tmp_path, few_rows, text):
+def test_the_file_agrees_with_the_original_over_the_whole_box(tmp_path, few_rows, text):
     original = trained(tmp_path, few_rows, text)
     metadata = export_model(original, tmp_path / "m.onnx", few_rows)
     estimator = Estimator.load(tmp_path / "m.onnx")
@@ -107,7 +107,7 @@ def test_versions_are_pinned_where_old_runtimes_still_read_them(small_model):
     assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.FLOAT}
 
 
-def test_other_inputs_can_be_learned_from(tmp_path, few_rows):
+def test_other_inputs_can_be_used(tmp_path, few_rows):
     text = 'features = ["slip", "torque/load", "load", "sinkage", "drawbar_pull/load"]\n'
     original = trained(tmp_path, few_rows, text + MEMBERS["fixed-size-lssvm"])
     export_model(original, tmp_path / "m.onnx", few_rows)

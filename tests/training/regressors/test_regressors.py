@@ -23,9 +23,9 @@ def curve(count, seed=0, noise=0.1):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("machine", ALL, ids=lambda m: m.type_name)
-def test_passes_the_checks_of_scikit_learn(machine):
-    results = check_estimator(machine, on_fail="raise", on_skip=None)
+@pytest.mark.parametrize("regressor", ALL, ids=lambda m: m.type_name)
+def test_passes_the_checks_of_scikit_learn(regressor):
+    results = check_estimator(regressor, on_fail="raise", on_skip=None)
     assert sum(r["status"] == "passed" for r in results) > 40
 
 
@@ -83,11 +83,13 @@ def test_fixed_size_with_all_rows_as_centres_is_the_exact_machine():
     np.testing.assert_allclose(fixed.predict(probe), exact.predict(probe), atol=2e-3)
 
 
-@pytest.mark.parametrize("machine", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=80)])
-def test_learns_a_curve_better_than_a_line_and_knows_the_noise(machine):
+@pytest.mark.parametrize(
+    "regressor", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=80)]
+)
+def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
     x, y, _ = curve(900)
     probe, noisy, clean = curve(600, seed=1)
-    mean, std = clone(machine).fit(x, y).predict(probe, return_std=True)
+    mean, std = clone(regressor).fit(x, y).predict(probe, return_std=True)
     error = np.sqrt(np.mean((mean - clean) ** 2))
     straight = LinearGaussian().fit(x, y).predict(probe)
     assert error < 0.2 * np.sqrt(np.mean((straight - clean) ** 2))
@@ -96,38 +98,43 @@ def test_learns_a_curve_better_than_a_line_and_knows_the_noise(machine):
     assert 0.82 < inside < 0.96
 
 
-def test_noise_that_varies_is_seen_to_vary():
+def test_varying_noise_is_estimated():
     rng = np.random.default_rng(0)
     x = rng.uniform(-1, 1, (2000, 1))
     y = np.sin(3 * x) + (0.05 + 0.4 * (x > 0)) * rng.normal(size=x.shape)
-    for machine in (FixedSizeLSSVM(centres=40), GaussianMLP(epochs=60)):
-        _, std = machine.fit(x, y).predict(np.asarray([[-0.7], [0.7]]), return_std=True)
+    for regressor in (FixedSizeLSSVM(centres=40), GaussianMLP(epochs=60)):
+        _, std = regressor.fit(x, y).predict(np.asarray([[-0.7], [0.7]]), return_std=True)
         assert std[1, 0] > 2.0 * std[0, 0]
 
 
-def test_far_from_the_data_no_machine_claims_more_than_it_did_on_it():
+def test_std_does_not_shrink_far_from_the_data():
     x, y, _ = curve(400)
-    for machine in (LSSVM(), FixedSizeLSSVM(centres=50), GaussianMLP(epochs=20), LinearGaussian()):
-        fitted = machine.fit(x, y)
+    for regressor in (
+        LSSVM(),
+        FixedSizeLSSVM(centres=50),
+        GaussianMLP(epochs=20),
+        LinearGaussian(),
+    ):
+        fitted = regressor.fit(x, y)
         near = fitted.predict(x, return_std=True)[1]
         far = fitted.predict(50.0 * x, return_std=True)[1]
         assert (far >= 0.98 * near.min(axis=0)).all()
         assert np.isfinite(far).all()
 
 
-def test_seeds_decide_everything():
+def test_the_seed_determines_the_fit():
     x, y, _ = curve(300)
-    for machine in (FixedSizeLSSVM(centres=30), GaussianMLP(epochs=5)):
-        first, second = (clone(machine).fit(x, y).predict(x) for _ in range(2))
+    for regressor in (FixedSizeLSSVM(centres=30), GaussianMLP(epochs=5)):
+        first, second = (clone(regressor).fit(x, y).predict(x) for _ in range(2))
         np.testing.assert_array_equal(first, second)
-        other = clone(machine).set_params(random_state=1).fit(x, y).predict(x)
+        other = clone(regressor).set_params(random_state=1).fit(x, y).predict(x)
         assert not np.array_equal(first, other)
 
 
 def test_training_stops_early_when_held_out_rows_get_worse():
     x, y, _ = curve(40, noise=1.0)
-    machine = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
-    assert len(machine.history_) < 400
+    regressor = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
+    assert len(regressor.history_) < 400
 
 
 def test_selected_rows_spread_more_than_random_ones():
