@@ -89,7 +89,7 @@ def estimate_shear_modulus(
     >>> arc = balanced_arc(math.radians(30.0), run, wheel, sand, shear_modulus=0.0072)
     >>> found = estimate_shear_modulus(simulate_readings(arc, wheel), run, wheel, sand)
     >>> round(1e3 * found.shear_modulus, 1), round(1e3 * found.shear_modulus_std, 1)  # mm
-    (7.2, 0.1)
+    (7.3, 0.1)
     """
     binned = bin_stress(readings, wheel)
     start = fit_stress_arc(binned, wheel)
