@@ -10,7 +10,7 @@ import numpy as np
 from faults import Readings
 from scipy.stats import qmc
 
-from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.monomials import derivative, monomial_terms, monomials
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]

@@ -35,8 +35,8 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.quantities import SHEAR
-from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.recipe_family import RecipeFamily
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 Order = np.ndarray[Any, np.dtype[np.int64]]

@@ -13,13 +13,18 @@ from scipy.stats import qmc
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
-MODEL = """\
+#: The reference wheel on dry sand.
+WHEEL_ON_SAND = """\
 [gear]
 type = "wheel"
 radius = 0.15
 width = 0.12
 [soil]
 name = "wong1989/dry_sand"
+"""
+MODEL = (
+    WHEEL_ON_SAND
+    + """\
 [soil.prior]
 cohesion = [0.0, 3000.0]
 friction_angle = [0.436332, 0.785398]
@@ -27,15 +32,12 @@ shear_modulus = [0.005, 0.03]
 [noise]
 torque_Nm = "2 %"
 """
+)
 
 #: A model with wider priors, whose noise is declared for three channels.
-THREE_CHANNEL_MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
+THREE_CHANNEL_MODEL = (
+    WHEEL_ON_SAND
+    + """\
 [soil.prior]
 cohesion = [0.0, 3000.0]
 friction_angle = [0.3, 0.8]
@@ -45,6 +47,7 @@ torque_Nm = "2 %"
 drawbar_pull_N = "2 % + 0.2"
 sinkage_m = "2 %"
 """
+)
 
 RECIPE = (
     """\
@@ -153,10 +156,10 @@ def wheel_posterior():
     """The set posterior of the packaged wheel, learned from few designs."""
     from datagen.recipe import read_recipe
     from soilml.quantities import SHEAR
+    from training.set_posterior.families.recipe_family import RecipeFamily
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.misfit_test import MisfitLimits
-    from training.set_posterior.recipe_family import RecipeFamily
     from training.set_posterior.response_surface import ResponseSettings, fit_response
+    from training.set_posterior.sampler.misfit_test import MisfitLimits
 
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
     response = fit_response(family, ResponseSettings(768, 32, 120, 0), lambda *_: None)
@@ -176,10 +179,10 @@ def any_posterior():
     """The set posterior of wheels of any size, learned from so few designs that it is coarse."""
     from datagen.recipe import packaged_file
     from soilml.io.toml_settings import read_settings
-    from training.set_posterior.dimensionless_family import DimensionlessFamily
+    from training.set_posterior.families.dimensionless_family import DimensionlessFamily
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.misfit_test import MisfitLimits
     from training.set_posterior.response_surface import ResponseSettings, fit_response
+    from training.set_posterior.sampler.misfit_test import MisfitLimits
 
     settings = read_settings(packaged_file("any_wheel", "training", "specs"))
     family = DimensionlessFamily.take(settings.table("any_wheel"))

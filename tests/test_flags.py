@@ -12,7 +12,7 @@ from soilml.errors import InputError
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
-from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
 
 CASE = read_recipe("wheel").case
 SLIP = np.tile([0.08, 0.14, 0.21, 0.29, 0.38, 0.48], 2)

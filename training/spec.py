@@ -22,7 +22,7 @@ from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM
-from training.set_posterior.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
 from training.set_posterior.settings import take_response_settings
 

@@ -35,8 +35,8 @@ from training.calibration.training_domain import TrainingDomain
 from training.data.dataset import Dataset, DataSplit, split_by_run
 from training.ensemble import fuse_members
 from training.regressors.feature_subset import FeatureSubset
+from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import fit_response
 from training.set_posterior.validation import (
     SetFigures,

@@ -13,7 +13,7 @@ from datagen.blind_sets.wheel_state import (
     ContactArc,
     ContactPoints,
     Floats,
-    GroundReaction,
+    SoilReaction,
     WheelState,
 )
 
@@ -40,14 +40,14 @@ def _square(rows: WheelState, n2: float) -> WheelState:
 
 
 def _root_load(
-    reaction: GroundReaction, arc: ContactArc, rows: WheelState, coefficient: float
-) -> GroundReaction:
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> SoilReaction:
     return replace(reaction, pull=reaction.pull - coefficient * np.sqrt(rows.load))
 
 
 def _depth_power(
-    reaction: GroundReaction, arc: ContactArc, rows: WheelState, coefficient: float
-) -> GroundReaction:
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> SoilReaction:
     return replace(reaction, pull=reaction.pull - coefficient * reaction.sinkage**1.5)
 
 

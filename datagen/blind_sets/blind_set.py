@@ -36,7 +36,7 @@ from datagen.blind_sets.soil_families import (
     WIDTH,
     nominal_soil,
 )
-from datagen.blind_sets.wheel_state import Floats, GroundReaction, WheelState
+from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
 
 #: Run-to-run scatter, one standard deviation: rad of phi, fraction of the modulus.
 SCATTER_PHI, SCATTER_K = np.deg2rad(0.5), 0.05
@@ -179,7 +179,7 @@ def _simulate(
 
 def _channels(rows: WheelState, active: ActiveMechanisms) -> list[Floats]:
     """Torque (N m), drawbar pull (N) and sinkage (m), in the order of the channels."""
-    reaction: GroundReaction = solve_equilibrium(rows, active)
+    reaction: SoilReaction = solve_equilibrium(rows, active)
     return [reaction.torque, reaction.pull, reaction.sinkage]
 
 

@@ -11,7 +11,7 @@ from datagen.blind_sets.wheel_state import (
     ContactArc,
     ContactPoints,
     Floats,
-    GroundReaction,
+    SoilReaction,
     WheelState,
 )
 
@@ -28,8 +28,8 @@ def _grousers(arc: ContactArc, rows: WheelState, height: float) -> ContactArc:
 
 
 def _bulldozing(
-    reaction: GroundReaction, arc: ContactArc, rows: WheelState, share: float
-) -> GroundReaction:
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, share: float
+) -> SoilReaction:
     """Bekker 1969 with the factors of local shear failure."""
     phi = np.arctan(2.0 / 3.0 * np.tan(rows.friction_angle))
     n_q = np.exp(np.pi * np.tan(phi)) * np.tan(0.25 * np.pi + 0.5 * phi) ** 2
@@ -84,8 +84,8 @@ def _shear_softening(
 
 
 def _sidewall_shear(
-    reaction: GroundReaction, arc: ContactArc, rows: WheelState, share: float
-) -> GroundReaction:
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, share: float
+) -> SoilReaction:
     """The buried halves of both side walls, forward of the axle, each a segment at its centroid."""
     t, r, phi = arc.entry, rows.radius, rows.friction_angle
     part = np.maximum(t - np.sin(t) * np.cos(t), 1e-300)

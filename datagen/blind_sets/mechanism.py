@@ -10,7 +10,7 @@ from datagen.blind_sets.wheel_state import (
     ContactArc,
     ContactPoints,
     Floats,
-    GroundReaction,
+    SoilReaction,
     WheelState,
 )
 
@@ -39,9 +39,9 @@ class Mechanism:
     pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
     shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
     #: within the search for equilibrium
-    force: Callable[[GroundReaction, ContactArc, WheelState, float], GroundReaction] | None = None
+    force: Callable[[SoilReaction, ContactArc, WheelState, float], SoilReaction] | None = None
     #: from the forces at equilibrium to the readings, for the true slip and load
-    reading: Callable[[GroundReaction, WheelState, float], GroundReaction] | None = None
+    reading: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
     #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
     needs: str = ""
 

@@ -11,7 +11,7 @@ from datagen.blind_sets.wheel_state import (
     ContactArc,
     ContactPoints,
     Floats,
-    GroundReaction,
+    SoilReaction,
     WheelState,
 )
 
@@ -30,7 +30,7 @@ def _quadrature() -> tuple[Floats, Floats]:
 NODE, WEIGHT = _quadrature()
 
 
-def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> GroundReaction:
+def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> SoilReaction:
     """Noise-free readings of a wheel in vertical equilibrium; arrays (n,), SI.
 
     The equilibrium is the smallest sinkage at which the soil carries the load, searched from the
@@ -51,7 +51,7 @@ def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> Ground
 
 def ground_reaction(
     depth_angle: Floats, rows: WheelState, active: ActiveMechanisms = ()
-) -> GroundReaction:
+) -> SoilReaction:
     r"""Forces at a fixed sinkage, for any load; arrays (n,).
 
     .. math::
@@ -72,7 +72,7 @@ def ground_reaction(
     points = _points(theta, swept_angle, mapped, arc, rows, active)
     area = arc.radius * rows.width * span
     sin, cos = np.sin(theta), np.cos(theta)
-    reaction = GroundReaction(
+    reaction = SoilReaction(
         load=np.sum((points.normal * cos + points.shear * sin) * area, axis=0),
         pull=np.sum((points.shear * cos - points.normal * sin) * area, axis=0),
         torque=np.sum(points.shear * arc.lever * area, axis=0),
@@ -130,7 +130,7 @@ def _cosine_difference(theta: Floats, angle_from_entry: Floats, entry: Floats) -
     return np.asarray(2.0 * np.sin(0.5 * (entry + theta)) * np.sin(0.5 * angle_from_entry))
 
 
-def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> GroundReaction:
+def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> SoilReaction:
     """Forces at the smallest sinkage at which the soil carries the load."""
     with np.errstate(all="ignore"):
         depths = 0.5 * np.pi * (np.arange(1, SEARCH_DEPTHS + 1) / SEARCH_DEPTHS) ** 1.5
@@ -149,7 +149,7 @@ def _equilibrium(rows: WheelState, active: ActiveMechanisms) -> GroundReaction:
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         reaction = ground_reaction(0.5 * (low + high), rows, active)
     ok = carries_load.any(axis=0) & (np.abs(reaction.load / rows.load - 1.0) < 1e-8)
-    return GroundReaction(
+    return SoilReaction(
         load=np.where(ok, reaction.load, np.nan),
         pull=np.where(ok, reaction.pull, np.nan),
         torque=np.where(ok, reaction.torque, np.nan),

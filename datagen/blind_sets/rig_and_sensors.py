@@ -8,52 +8,50 @@ from dataclasses import replace
 import numpy as np
 
 from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.wheel_state import ContactArc, GroundReaction, WheelState
+from datagen.blind_sets.wheel_state import ContactArc, SoilReaction, WheelState
 
 
 def _slope_driven(rows: WheelState, angle: float) -> WheelState:
     return replace(rows, load=rows.load * math.cos(angle))
 
 
-def _slope_reading(reaction: GroundReaction, rows: WheelState, angle: float) -> GroundReaction:
+def _slope_reading(reaction: SoilReaction, rows: WheelState, angle: float) -> SoilReaction:
     """The load of `rows` is the component of the weight normal to the slope."""
     return replace(reaction, pull=reaction.pull - rows.load * math.tan(angle))
 
 
 def _load_transfer(
-    reaction: GroundReaction, arc: ContactArc, rows: WheelState, ratio: float
-) -> GroundReaction:
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, ratio: float
+) -> SoilReaction:
     """The soil carries W + ratio DP where W is reported."""
     return replace(reaction, load=reaction.load - ratio * reaction.pull)
 
 
-def _bearing_friction(
-    reaction: GroundReaction, rows: WheelState, coefficient: float
-) -> GroundReaction:
+def _bearing_friction(reaction: SoilReaction, rows: WheelState, coefficient: float) -> SoilReaction:
     return replace(reaction, torque=reaction.torque + coefficient * rows.load * rows.radius)
 
 
-def _torque_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+def _torque_gain(reaction: SoilReaction, rows: WheelState, gain: float) -> SoilReaction:
     return replace(reaction, torque=reaction.torque * (1.0 + gain))
 
 
-def _torque_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+def _torque_offset(reaction: SoilReaction, rows: WheelState, offset: float) -> SoilReaction:
     return replace(reaction, torque=reaction.torque + offset)
 
 
-def _drawbar_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+def _drawbar_gain(reaction: SoilReaction, rows: WheelState, gain: float) -> SoilReaction:
     return replace(reaction, pull=reaction.pull * (1.0 + gain))
 
 
-def _drawbar_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+def _drawbar_offset(reaction: SoilReaction, rows: WheelState, offset: float) -> SoilReaction:
     return replace(reaction, pull=reaction.pull + offset)
 
 
-def _sinkage_gain(reaction: GroundReaction, rows: WheelState, gain: float) -> GroundReaction:
+def _sinkage_gain(reaction: SoilReaction, rows: WheelState, gain: float) -> SoilReaction:
     return replace(reaction, sinkage=reaction.sinkage * (1.0 + gain))
 
 
-def _sinkage_offset(reaction: GroundReaction, rows: WheelState, offset: float) -> GroundReaction:
+def _sinkage_offset(reaction: SoilReaction, rows: WheelState, offset: float) -> SoilReaction:
     return replace(reaction, sinkage=reaction.sinkage + offset)
 
 

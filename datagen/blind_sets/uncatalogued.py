@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 
 from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.wheel_state import Floats, GroundReaction, WheelState
+from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
 
 
-def _stick_slip(reaction: GroundReaction, rows: WheelState, depth: float) -> GroundReaction:
+def _stick_slip(reaction: SoilReaction, rows: WheelState, depth: float) -> SoilReaction:
     """Torque dips in a band of slip, more for a heavier wheel."""
     band = np.exp(-(((rows.slip - 0.25) / 0.08) ** 2))
     return replace(reaction, torque=reaction.torque * (1.0 - depth * band * rows.load / 100.0))
 
 
-def _ripple(reaction: GroundReaction, rows: WheelState, height: float) -> GroundReaction:
+def _ripple(reaction: SoilReaction, rows: WheelState, height: float) -> SoilReaction:
     """Sinkage varies periodically with load, as over a compaction pattern."""
     wave = np.sin(2.0 * np.pi * rows.load / 35.0)
     return replace(reaction, sinkage=reaction.sinkage * (1.0 + height * wave))
 
 
-def _cable_drag(reaction: GroundReaction, rows: WheelState, drag: float) -> GroundReaction:
+def _cable_drag(reaction: SoilReaction, rows: WheelState, drag: float) -> SoilReaction:
     """Drag of a cable, which grows with slip and load."""
     pulled = (rows.slip / 0.5) ** 3 * (rows.load / 100.0) ** 2
     return replace(reaction, pull=reaction.pull - drag * pulled)

@@ -59,7 +59,7 @@ class ContactPoints:
 
 
 @dataclass(frozen=True)
-class GroundReaction:
+class SoilReaction:
     """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
 
     NaN where the soil does not carry the load at any sinkage down to the hub.

@@ -107,7 +107,7 @@ OTHERS = {
     "recipe that is none": (["generate", "model.toml", "o.parquet"], "is missing"),
     "rows of nothing": (["generate", "recipe.toml", "o.parquet", "--rows", "0"], "rows is 0"),
     "out that is no Parquet": (["generate", "recipe.toml", "o.csv"], "must end in .parquet"),
-    "model that is text": (["estimate", "runs.csv", "runs.csv"], "not a whole ONNX model"),
+    "model that is text": (["estimate", "runs.csv", "runs.csv"], "not a valid ONNX model"),
     "truncated model": (["estimate", "cut.onnx", "runs.csv", "--out", "o.csv"], "cut.onnx"),
     "by no column": (["estimate", "good.onnx", "runs.csv", "--by", "soil"], "column soil"),
     "compare without truth": (

@@ -79,7 +79,7 @@ def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
     assert main(["identify", str(model_file), str(runs_file)]) == 0
-    assert "2 runs are taken for one soil" in json.loads(capsys.readouterr().out)["warnings"]
+    assert "2 runs are fitted as one soil" in json.loads(capsys.readouterr().out)["warnings"]
 
 
 def test_simulate_takes_braking_slip(model_file, capsys):

@@ -69,7 +69,7 @@ def test_each_run_has_its_own_answer_and_one_that_cannot_be_had_is_said(folder, 
     captured = capsys.readouterr()
     assert {r["run"] for r in rows_of(captured.out)} == {"a"}
     assert "run b has no result" in captured.err
-    assert "run a: 60 N: the pull still rises" in captured.err
+    assert "run a: 60 N: the pull still increases" in captured.err
 
 
 def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):

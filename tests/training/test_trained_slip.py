@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from conftest import WHEEL_ON_SAND
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
@@ -17,15 +18,10 @@ from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train
 
-RECIPE = """\
-rows = {rows}
-seed = {seed}
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
+RECIPE = (
+    "rows = {rows}\nseed = {seed}\n"
+    + WHEEL_ON_SAND
+    + """\
 [soil.prior]
 {soil}
 [operating]
@@ -35,6 +31,7 @@ load_N = [30.0, 120.0]
 torque_Nm = "4 %"
 drawbar_pull_N = "10 % + 3"
 """
+)
 KNOWN = "friction_angle = [0.60, 0.62]"
 UNKNOWN = "friction_angle = [0.436332, 0.785398]\nshear_modulus = [0.005, 0.03]"
 TORQUE = 'features = ["torque/load", "load"]\ntargets = ["slip"]\n'
@@ -196,7 +193,7 @@ def test_slip_is_not_compared_with_methods_that_find_soil(trained, folder, tmp_p
     command = ["compare", str(tmp_path / "m.toml"), str(folder / "known.parquet")]
     command += [str(trained(TORQUE + MACHINE)[1]), "--out", str(tmp_path / "o")]
     assert main(command) == 2
-    assert "estimates slip, which no analytic method finds" in capsys.readouterr().err
+    assert "estimates slip, which no analytic method identifies" in capsys.readouterr().err
     assert not (tmp_path / "o").exists()
 
 

@@ -56,7 +56,7 @@ def classify_estimator(estimator: Estimator) -> MethodKind:
     if estimator.sets is not None:
         return MethodKind.SET_POSTERIOR
     regressors = json.loads(estimator.metadata["spec"]).get("regressor", [])
-    if all(entry.get("type") == LinearGaussian.kind for entry in regressors):
+    if all(entry.get("type") == LinearGaussian.type_name for entry in regressors):
         return MethodKind.LINEAR_REGRESSION
     return MethodKind.REGRESSION
 

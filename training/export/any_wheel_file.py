@@ -16,7 +16,7 @@ from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.metadata import figures_of, metadata_of, probe_of_sets
-from training.set_posterior.posterior_summary import prior_summary
+from training.set_posterior.sampler.posterior_summary import prior_summary
 from training.set_posterior.validation import SetFigures
 from training.spec import AnyWheelSpec
 

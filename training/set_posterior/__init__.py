@@ -5,17 +5,17 @@ response surface, `calibrate_misfit_limits` makes the graph with its misfit limi
 `validate_posterior` measures its accuracy.
 """
 
-from training.set_posterior.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import Response, ResponseSettings, fit_response
+from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.validation import (
     SetFigures,
     calibrate_misfit_limits,
     validate_posterior,
 )
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 __all__ = [
     "DimensionlessFamily",

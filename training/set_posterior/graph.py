@@ -19,12 +19,12 @@ from soilml.onboard.set_contract import (
 )
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value, concat
-from training.set_posterior.importance_sampler import add_importance_sampler
-from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.posterior_summary import add_posterior_outputs
-from training.set_posterior.residual_system import add_residual_system, integrate_out_bias
+from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.response_surface import Response
-from training.set_posterior.wheel_family import WheelFamily
+from training.set_posterior.sampler.importance_sampler import add_importance_sampler
+from training.set_posterior.sampler.misfit_test import MisfitLimits
+from training.set_posterior.sampler.posterior_summary import add_posterior_outputs
+from training.set_posterior.sampler.residual_system import add_residual_system, integrate_out_bias
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
-from training.set_posterior.credible_interval import INTERVAL
 from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.sampler.credible_interval import INTERVAL
 from training.set_posterior.validation import SetFigures, graph_outputs, posterior_session
 
 #: Rows of the probe, and the sets among which the first suitable one is taken.

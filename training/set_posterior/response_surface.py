@@ -15,16 +15,15 @@ from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, gemm, tanh
 from training.regressors.standardisation import Standardisation
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
-from training.set_posterior.wheel_family import WheelFamily
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 #: Points of the unknowns at which each design is simulated, for each term of the polynomial.
 POINTS_PER_TERM = 2.5
-#: Nearly known axes have a normal prior that is truncated at this many standard deviations.
-NORMAL_TRUNCATION = 2.5
 #: Designs simulated at a time, which bounds the memory needed.
 SIMULATED_AT_A_TIME = 512
 #: Designs of a step of the training, and the share held out to measure the error.

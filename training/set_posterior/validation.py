@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from soilml.onboard.set_contract import MEMORY_INPUTS, empty_memory
 from training.onnx_graph.builder import Graph, session_of
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.response_surface import Response
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
+from training.set_posterior.sampler.misfit_test import MisfitLimits
+from training.set_posterior.sampler.posterior_summary import prior_summary
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from conftest import THREE_CHANNEL_MODEL
 
 from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
@@ -26,22 +27,7 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
-MODEL = """\
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
-[soil.prior]
-cohesion = [0.0, 3000.0]
-friction_angle = [0.3, 0.8]
-shear_modulus = [0.005, 0.04]
-[noise]
-torque_Nm = "1 %"
-drawbar_pull_N = "1 % + 0.2"
-sinkage_m = "1 %"
-"""
+MODEL = THREE_CHANNEL_MODEL.replace("2 %", "1 %")
 LOADS = (40.0, 60.0, 90.0, 140.0)
 
 

@@ -127,7 +127,7 @@ def test_rows_with_another_status_than_ok_are_excluded(dug):
     [
         ("mood=3", TableError, "mood"),
         ("load_N", InputError, "COLUMN=VALUE"),
-        ("load_N=heavy", TableError, "'heavy' is none"),
+        ("load_N=heavy", TableError, "'heavy' is not a number"),
         ("run=run_9", TableError, "no row has run = run_9"),
     ],
 )

@@ -100,5 +100,5 @@ def test_a_method_of_fixed_unknowns_reports_parameters_not_requested(case, table
 def test_rows_cannot_be_grouped_by_blank_cells(table):
     time = np.arange(12.0)
     time[5] = np.nan
-    with pytest.raises(TableError, match=r"log\.csv line 7, column time_s: is blank"):
+    with pytest.raises(TableError, match=r"log\.csv line 7, column time_s: the cell is blank"):
         list(changed(table, time_s=time).groups("time_s"))

@@ -12,9 +12,9 @@ from scipy.stats import qmc
 from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
 from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.monomials import monomial_terms, monomials
-from training.set_posterior.response_surface import NORMAL_TRUNCATION
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 

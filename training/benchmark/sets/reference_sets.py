@@ -19,8 +19,8 @@ from soilml.quantities import SHEAR
 from training.benchmark.designs import HASHED_DIGITS
 from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.set_unknowns import RankedPosterior
-from training.set_posterior.recipe_family import RecipeFamily
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.spec import read_any_wheel_spec
 
 Progress = Callable[[str, int, int], None]

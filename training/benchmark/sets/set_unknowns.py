@@ -16,8 +16,8 @@ from training.benchmark.bayes_limit_file import (
     HPD_DRAWS,
     PosteriorSummary,
 )
-from training.set_posterior.response_surface import NORMAL_TRUNCATION
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.benchmark.sets.set_unknowns import RankedPosterior, Unknowns, sample_posterior
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
-from training.set_posterior.wheel_family import SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from soilml.config.measurement_noise import Noise
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
 from training.benchmark.sets.exact_posterior import exact_set_posterior
-from training.set_posterior.dimensionless_family import DimensionlessFamily
-from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.families.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
 from training.spec import read_any_wheel_spec
 
 STEPS = 36

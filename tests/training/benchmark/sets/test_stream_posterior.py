@@ -7,10 +7,10 @@ from datagen.recipe import read_recipe
 from soilml.quantities import SHEAR
 from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
+from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import ResponseSettings, fit_response
+from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 

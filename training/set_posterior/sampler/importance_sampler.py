@@ -8,26 +8,26 @@ import numpy as np
 
 from training.onnx_graph.cholesky import cholesky_columns
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, tanh
-from training.set_posterior.importance_weights import (
+from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.response_surface import Response
+from training.set_posterior.sampler.importance_weights import (
     WeightedRound,
     sample_round,
     tempered_weights,
     tempering_power,
     weights_by_effective_size,
 )
-from training.set_posterior.polynomial_residuals import (
+from training.set_posterior.sampler.polynomial_residuals import (
     PolynomialResiduals,
     gauss_newton,
     standardised_system,
 )
-from training.set_posterior.proposals import (
+from training.set_posterior.sampler.proposals import (
     ProposalDraws,
     adapted_draws,
     prior_draws,
     sample_sizes,
 )
-from training.set_posterior.response_surface import Response
-from training.set_posterior.wheel_family import ContextValues, WheelFamily
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.monomials import Terms, derivative, monomials, pair_factors
-from training.set_posterior.response_surface import NORMAL_TRUNCATION, Response
-from training.set_posterior.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.response_surface import Response
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import pytest
 from datagen.recipe import read_recipe
 from soilml.errors import InputError
 from soilml.quantities import SHEAR
-from training.set_posterior.recipe_family import RecipeFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
 
 
 def recipe_of(folder, text):

@@ -17,9 +17,9 @@ from training.onnx_graph.value import (
     softmax,
     sqrt,
 )
-from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
-from training.set_posterior.proposals import ProposalDraws
+from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.sampler.polynomial_residuals import PolynomialResiduals, within_box
+from training.set_posterior.sampler.proposals import ProposalDraws
 
 #: Standard deviations of the proposal of the solved coordinate over those of its conditional
 #: posterior: a proposal somewhat too wide costs samples, one too narrow makes weights unbounded.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from training.set_posterior.posterior_summary import prior_summary
+from training.set_posterior.sampler.posterior_summary import prior_summary
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 

@@ -6,7 +6,7 @@ import pytest
 from soilml.onboard.set_contract import ABSENT_STD
 from training.benchmark.bayes_limit_file import FRACTIONS
 from training.benchmark.sets.stream_posterior import posterior_of_memory
-from training.set_posterior.credible_interval import INTERVAL
+from training.set_posterior.sampler.credible_interval import INTERVAL
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 

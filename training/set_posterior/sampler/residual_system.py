@@ -8,13 +8,13 @@ import numpy as np
 
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, absolute, concat, constant, gemm, log, maximum, sqrt
-from training.set_posterior.response_surface import Response
-from training.set_posterior.wheel_family import (
+from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
     WheelFamily,
 )
+from training.set_posterior.response_surface import Response
 
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
 BOX_TOLERANCE = 1e-3

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.onboard.set_contract import LEAST_STD
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.families.coordinates import Coordinate
 
 Floats = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from soilml.onboard.set_contract import SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, sqrt, where
-from training.set_posterior.credible_interval import INTERVAL, add_standardised_quantiles
-from training.set_posterior.importance_sampler import WeightedSample
-from training.set_posterior.misfit_test import MisfitLimits, add_consistency_test
-from training.set_posterior.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.sampler.credible_interval import INTERVAL, add_standardised_quantiles
+from training.set_posterior.sampler.importance_sampler import WeightedSample
+from training.set_posterior.sampler.misfit_test import MisfitLimits, add_consistency_test
 
 Floats = NDArray[np.float64]
 

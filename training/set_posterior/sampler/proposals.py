@@ -15,8 +15,8 @@ from scipy.special import ndtri
 from scipy.stats import chi2, qmc
 from scipy.stats import t as student_t
 
-from training.set_posterior.response_surface import NORMAL_TRUNCATION
-from training.set_posterior.wheel_family import WheelFamily
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.wheel_family import WheelFamily
 
 Floats = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
-from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.dimensionless_design import (
+from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.dimensionless_design import (
     BEARING_RANGE,
     COHESION_SHARE,
     EXPONENT_RANGE,
@@ -30,8 +30,8 @@ from training.set_posterior.dimensionless_design import (
     REFERENCE_DEPTH,
     SHEAR_MODULUS_SHARE,
 )
-from training.set_posterior.dimensionless_sets import simulate_sets
-from training.set_posterior.wheel_family import (
+from training.set_posterior.families.dimensionless_sets import simulate_sets
+from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
@@ -140,7 +140,7 @@ class DimensionlessFamily:
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
         """See `WheelFamily` and `simulate_sets`."""
-        return simulate_sets(self, count, rows, seed)
+        return simulate_sets(self, self.ranges["slip"], count, rows, seed)
 
     def force(self, designs: Floats, x: Floats) -> Force:
         """Forces of the wheel (n, m) on soils at coordinates x (n, m, p)."""

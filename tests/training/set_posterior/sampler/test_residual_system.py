@@ -6,7 +6,7 @@ import pytest
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value
 from training.set_posterior.monomials import monomials
-from training.set_posterior.residual_system import integrate_out_bias
+from training.set_posterior.sampler.residual_system import integrate_out_bias
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.importance_sampler import WeightedSample
+from training.set_posterior.sampler.importance_sampler import WeightedSample
 
 Floats = NDArray[np.float64]
 

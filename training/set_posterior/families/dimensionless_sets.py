@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.prior import Prior
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
-from training.set_posterior.dimensionless_design import (
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.dimensionless_design import (
     BEARING,
     BEARING_RANGE,
     COHESION_MAX,
@@ -20,12 +20,8 @@ from training.set_posterior.dimensionless_design import (
     SLIP,
     WIDTH,
 )
-from training.set_posterior.response_surface import NORMAL_TRUNCATION
-from training.set_posterior.run_patterns import run_patterns
-from training.set_posterior.wheel_family import Origin, SimulatedSets
-
-if TYPE_CHECKING:
-    from training.set_posterior.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.run_patterns import run_patterns
+from training.set_posterior.families.wheel_family import Origin, SimulatedSets, WheelFamily
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +37,9 @@ SHARE_BIASED, MOST_BIAS = 1.0 / 3.0, 0.04
 SHARE_ALL_CHANNELS = 0.3
 
 
-def simulate_sets(family: DimensionlessFamily, count: int, rows: int, seed: int) -> SimulatedSets:
+def simulate_sets(
+    family: WheelFamily, slip: Prior, count: int, rows: int, seed: int
+) -> SimulatedSets:
     """Sets of a family, less those that leave the range of the response surface.
 
     Bearing values, wheel, noise and the bias of the torque sensor differ from set to set. Relative
@@ -52,7 +50,7 @@ def simulate_sets(family: DimensionlessFamily, count: int, rows: int, seed: int)
     rng = np.random.default_rng((seed, rows))
     base = family.designs(count, seed + rows)
     designs = np.repeat(base[:, None], rows, axis=1)
-    designs[..., SLIP] = family.ranges["slip"].at(run_patterns(count, rows, rng))
+    designs[..., SLIP] = slip.at(run_patterns(count, rows, rng))
     designs[..., LOAD] *= np.exp(LOG_LOAD_RANGE * (run_patterns(count, rows, rng) - 0.5))
     x, bearing_std = _draw_unknowns(family, count, rng)
     y = family.responses(
@@ -85,7 +83,7 @@ def simulate_sets(family: DimensionlessFamily, count: int, rows: int, seed: int)
 
 
 def _draw_unknowns(
-    family: DimensionlessFamily, count: int, rng: np.random.Generator
+    family: WheelFamily, count: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Coordinates (count, p) of the prior, and `bearing_std` (count,)."""
     known = rng.random(count) < SHARE_KNOWN_BEARING
@@ -95,7 +93,7 @@ def _draw_unknowns(
     return np.concatenate([x, normal * bearing_std[:, None] / BEARING_RANGE], axis=1), bearing_std
 
 
-def _in_range(family: DimensionlessFamily, base: Floats, designs: Floats) -> NDArray[np.bool_]:
+def _in_range(family: WheelFamily, base: Floats, designs: Floats) -> NDArray[np.bool_]:
     """Whether all rows of a set have features within those of the designs (n, d), (sets,)."""
     sets, rows, width = designs.shape
     features = family.features(designs.reshape(-1, width)).reshape(sets, rows, -1)

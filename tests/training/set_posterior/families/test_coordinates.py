@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from soilml.numerics.prior import Prior
-from training.set_posterior.coordinates import Coordinate
+from training.set_posterior.families.coordinates import Coordinate
 
 PRIORS = {
     "from zero": Prior(0.0, 3000.0),

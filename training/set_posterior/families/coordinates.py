@@ -20,6 +20,8 @@ OFFSET_RATIO = 4.0
 #: A range with a larger ratio of its ends than this has a logarithmic coordinate: in a narrower one
 #: the logarithm is nearly linear.
 LOGARITHMIC_RATIO = 1.5
+#: Nearly known axes have a normal prior that is truncated at this many standard deviations.
+NORMAL_TRUNCATION = 2.5
 
 
 @dataclass(frozen=True)

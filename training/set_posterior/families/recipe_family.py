@@ -17,9 +17,9 @@ from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD, RESPONSE_CHA
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
-from training.set_posterior.coordinates import Coordinate
-from training.set_posterior.run_patterns import run_patterns
-from training.set_posterior.wheel_family import (
+from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.run_patterns import run_patterns
+from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
     ContextValues,
