@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.config.prior import take_prior
+from soilml.config.prior_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior

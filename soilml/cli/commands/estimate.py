@@ -224,7 +224,7 @@ def _group_estimates(
     readings = [joint_readings(estimator, rows) for _, rows in groups]
     estimates = [estimator.run(**inputs) for inputs in readings]
     in_range = [int(estimator.rows_in_range(**inputs).sum()) for inputs in readings]
-    estimate = _stack(estimates)
+    estimate = Estimate.stack(estimates, (len(estimates),))
     position = {name: i for i, (name, _) in enumerate(groups)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])
@@ -264,15 +264,6 @@ def _columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
         columns[f"{key}_p05"] = estimate.low[:, i]
         columns[f"{key}_p95"] = estimate.high[:, i]
     return columns
-
-
-def _stack(estimates: list[Estimate]) -> Estimate:
-    first = estimates[0]
-    parts = {
-        key: np.stack([getattr(e, key) for e in estimates])
-        for key in ("mean", "std", "covariance", "low", "high", "in_range")
-    }
-    return Estimate(names=first.names, units=first.units, prior=first.prior, **parts)
 
 
 def _width_notes(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:

@@ -14,7 +14,7 @@ from soilml.gap.html.discrepancy_map import discrepancy_maps
 from soilml.gap.html.gap_bars import gap_bars
 from soilml.gap.html.prediction_curves import prediction_curves
 from soilml.gap.html.soil_table import soil_table
-from soilml.gap.html.verdict import advice, effect_descriptions, effect_tables, model_after
+from soilml.gap.html.verdict_section import advice, effect_descriptions, effect_tables, model_after
 from soilml.gap.results import STATUSES, GapReport
 from soilml.optional_imports import need
 

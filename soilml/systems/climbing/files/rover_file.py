@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Annotated, final
 
 from soilml.config.measurement_noise import Noise, take_noise
-from soilml.config.prior import take_prior
+from soilml.config.prior_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
