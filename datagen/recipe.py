@@ -168,7 +168,7 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         )
     if load.lower <= 0:
         operating.fail(f"load_N begins at {load.lower:g}; needed are loads above 0 N")
-    operating.knows(COVARIATES.values())
+    operating.permit(COVARIATES.values())
     covariates = {f: take_prior(operating, k) for f, k in COVARIATES.items() if k in operating}
     for effect in case.model.effects:
         for field in effect.about.needs:
@@ -184,7 +184,7 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
                 operating.fail(f"slip begins at {slip.lower:g}; {needed}")
     bias_settings = settings.table("bias")
     bias = {key: take_noise(bias_settings, key) for key in SENSOR_COLUMNS if key in bias_settings}
-    bias_settings.knows(SENSOR_COLUMNS)
+    bias_settings.permit(SENSOR_COLUMNS)
     bias_settings.finish()
     for key in case.noise.keys() - set(SENSOR_COLUMNS):
         settings.fail(f"[noise] {key}: a sensor of {COLUMNS[key].text} is not simulated")
@@ -243,7 +243,7 @@ def _take_steady(entry: Settings) -> tuple[str, ...]:
 
 def _take_levels(entry: Settings) -> tuple[tuple[str, int], ...]:
     table = entry.table("levels")
-    table.knows(OPERATING_COLUMNS)
+    table.permit(OPERATING_COLUMNS)
     levels = tuple((name, table.count(name)) for name in OPERATING_COLUMNS if name in table)
     table.finish()
     for name, count in levels:

@@ -144,6 +144,6 @@ def _take_stick_slip(settings: Settings) -> StickSlip:
     sizes = {key: settings.number(key) for key in own if key in settings}
     for end in (stiffness.lower, stiffness.upper):
         check(SpringLeg(stiffness=end, **sizes), f"{settings.where}: ")
-    settings.knows(own)
+    settings.permit(own)
     settings.finish()
     return StickSlip(law, SpringLeg(stiffness=stiffness.lower, **sizes), stiffness, drop)

@@ -203,7 +203,7 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
         settings.fail(f"type is {type_name!r}; there are: {', '.join(REGRESSORS)}")
     regressor = REGRESSORS[type_name]()
     defaults = regressor.get_params()
-    settings.knows(defaults)
+    settings.permit(defaults)
     parameters = {k: _take_parameter(settings, k, v) for k, v in defaults.items() if k in settings}
     settings.finish()
     if "random_state" in defaults and "random_state" not in parameters:

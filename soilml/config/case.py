@@ -140,7 +140,7 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, effects[name]).items()}
     noise = {}
     noise_settings = settings.table("noise")
-    noise_settings.knows(COLUMNS)
+    noise_settings.permit(COLUMNS)
     for key in COLUMNS:
         if key in noise_settings:
             noise[key] = take_noise(noise_settings, key)
@@ -155,7 +155,7 @@ def _instance(cls: type, settings: Settings) -> Any:
         for f in fields(cls)
         if f.name in settings or f.default is MISSING
     }
-    settings.knows(declared(cls))
+    settings.permit(declared(cls))
     try:
         made = cls(**values)
     except InputError as error:
@@ -173,7 +173,7 @@ def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
         except InputError as error:
             settings.fail(str(error))
         values = {k: settings.number(k) for k in declared(Soil) if k in settings}
-        settings.knows(declared(Soil))
+        settings.permit(declared(Soil))
         made = with_values(base, values)
         check(made, f"{settings.where}: ")
     else:
@@ -184,7 +184,7 @@ def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
 
 def _take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
     priors = {}
-    settings.knows(declared(cls))
+    settings.permit(declared(cls))
     for key, parameter in declared(cls).items():
         if key in settings:
             prior = take_prior(settings, key)

@@ -72,7 +72,7 @@ class Settings:
             for i, entry in enumerate(content, 1)
         ]
 
-    def knows(self, keys: Iterable[str]) -> None:
+    def permit(self, keys: Iterable[str]) -> None:
         """Add permitted keys, which the message about an unknown key suggests."""
         self._known.extend(keys)
 

@@ -55,7 +55,7 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
         Saaj 2017, eq. 26) and `pairwise` (eq. 30) count the prior in every estimate: they are
         overconfident unless the readings are far more informative than the prior.
         `covariance-intersection` is conservative whatever the correlation of the errors, for
-        example through a soil that none of the files knows.
+        example through a soil outside the prior of every file.
 
     Returns
     -------

@@ -30,7 +30,7 @@ class Design:
     """Experimental design of sets of one size.
 
     `loads` is the number of load levels of a set, 0 where loads are not restricted to levels;
-    `grid` tells whether every slip level is combined with every load level.
+    `grid` states whether every slip level is combined with every load level.
     """
 
     key: str

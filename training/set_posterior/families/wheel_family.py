@@ -1,4 +1,4 @@
-"""What a set posterior needs to know of the wheels and soils for which it is trained."""
+"""What a set posterior requires of the wheels and soils for which it is trained."""
 
 from __future__ import annotations
 

@@ -16,14 +16,14 @@ from soilml.physics.operating_point import Operating
 @final
 @dataclass(frozen=True, kw_only=True)
 class Slope(Effect):
-    r"""The bed is inclined and nobody knows: driving goes uphill, or downhill in reverse.
+    r"""The bed has an unnoticed slope: driving goes uphill, or downhill in reverse.
 
     .. math:: W = W' \cos\alpha, \quad DP' = DP - d W' \sin\alpha
 
     with primes for what is reported and d = -1 where the travel speed is given and below zero,
     else 1. References: statics of a body on a slope, as in Wong, Theory of Ground Vehicles,
-    chapter 3. The wheel's soil is taken as on the flat: for slopes of some degrees, not for those
-    on which the soil itself is about to slide.
+    chapter 3. The soil is treated as on level ground: valid for slopes of some degrees, not for
+    those on which the soil itself is close to sliding.
     """
 
     name: ClassVar[str] = "slope"

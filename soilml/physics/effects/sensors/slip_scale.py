@@ -44,7 +44,7 @@ class SlipScale(Effect):
         xp = namespace(slip)
         driving = slip + (1.0 - slip) * (self.error / (1.0 + self.error))
         true = xp.where(slip < 0, slip + (1.0 + slip) * self.error, driving)
-        # past zero slip is told by its other definition
+        # where the sign of slip changes, the other definition of slip applies
         true = xp.where((slip < 0) == (true < 0), true, true / (1.0 + xp.abs(true)))
         most = xp.full_like(true, MOST_SLIP)
         return replace(at, slip=xp.minimum(xp.maximum(true, -most), most))

@@ -19,7 +19,7 @@ class TorqueGain(Effect):
 
     .. math:: T' = (1 + e) T
 
-    References: sensor error of first order; a torque told from motor current by a wrong torque
+    References: sensor error of first order; a torque computed from motor current with a wrong torque
     constant is of this form too, friction of the gears is not.
     """
 

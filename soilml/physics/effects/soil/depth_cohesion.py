@@ -23,7 +23,7 @@ class DepthCohesion(SlipLoadScaling):
     with z the depth that sets the pressure of a point, and the sign of the slip on tau.
     References: Carrier, Olhoeft and Mendell, Lunar Sourcebook, 1991, chapter 9, cohesion of
     regolith by depth; the straight line is ours. Where n = 1 pressure too is proportional to z,
-    and no run can tell it from a larger friction angle.
+    and no run distinguishes it from a larger friction angle.
     """
 
     name: ClassVar[str] = "depth-cohesion"

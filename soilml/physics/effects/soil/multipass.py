@@ -23,8 +23,8 @@ class Multipass(SlipLoadScaling):
     with N the number of the pass; sinkage is then measured from the bottom of the rut.
     References: Holm, J. Terramechanics 6, 1969, multi-pass behaviour of tyres; Senatore and
     Sandu, J. Terramechanics 48(4), 2011, soil parameters by pass. The power of N is ours: theirs
-    are curves fitted to each soil. It knows nothing of the slip of the passes before, and density
-    and shear strength stay those of virgin soil.
+    are curves fitted to each soil. The slip of earlier passes has no influence, and density and
+    shear strength remain those of virgin soil.
     """
 
     name: ClassVar[str] = "multipass"

@@ -47,7 +47,7 @@ def read_rover(path: str | os.PathLike[str]) -> RoverFile:
     names = [f.name for f in fields(Rover)]
     needed = ("mass", "radius", "width")
     values = {name: own.number(name) for name in names if name in own or name in needed}
-    own.knows(names)
+    own.permit(names)
     own.finish()
     try:
         rover = Rover(**values)
@@ -66,10 +66,10 @@ def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]
     fixed = {
         name: settings.number(name) for name in declared(FixedShearParameters) if name in settings
     }
-    settings.knows(declared(FixedShearParameters))
+    settings.permit(declared(FixedShearParameters))
     settings.finish()
     check(FixedShearParameters(**fixed), f"{settings.where} ")
-    ranges.knows(declared(FixedShearParameters))
+    ranges.permit(declared(FixedShearParameters))
     for name, parameter in declared(FixedShearParameters).items():
         if name not in ranges:
             continue
@@ -110,8 +110,8 @@ def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
         )
         if key in settings
     }
-    settings.knows(("speed_m_s", "normal_Pa", "slope_rad", "entry_angle_rad"))
-    settings.knows(("speed_scale", "front_load"))
+    settings.permit(("speed_m_s", "normal_Pa", "slope_rad", "entry_angle_rad"))
+    settings.permit(("speed_scale", "front_load"))
     settings.finish()
     for name, value in numbers.items():
         if not 0.0 <= value < 1.0:
