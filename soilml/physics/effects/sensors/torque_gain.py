@@ -19,8 +19,8 @@ class TorqueGain(Effect):
 
     .. math:: T' = (1 + e) T
 
-    References: sensor error of first order; a torque computed from motor current with a wrong torque
-    constant is of this form too, friction of the gears is not.
+    References: sensor error of first order. A torque computed from motor current with a wrong
+    torque constant is of this form too; friction of the gears is not.
     """
 
     name: ClassVar[str] = "torque-gain"
