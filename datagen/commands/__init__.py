@@ -1,1 +1,1 @@
-"""Sub-commands of `soilml` that come with the ground software."""
+"""Sub-command of `soilml` that datagen provides: `generate`."""

@@ -1,1 +1,43 @@
 """Numerical methods without soil mechanics: roots, quadrature, sampling, fusion of estimates."""
+
+from soilml.numerics.estimate_fusion import (
+    FusedEstimate,
+    best_linear,
+    inverse_variance,
+    pairwise,
+    shrink_correlation,
+)
+from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.maximum_entropy import moment_matched_weights, prior_quantiles
+from soilml.numerics.prior import Prior
+from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_start, gauss
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.resampling import latin_hypercube, systematic_resampling
+from soilml.numerics.root_finding import first_bracket, rising_root
+from soilml.numerics.subspaces import column_space, project_out
+
+__all__ = [
+    "FusedEstimate",
+    "ImportanceSample",
+    "Nodes",
+    "Prior",
+    "QuantileBand",
+    "best_linear",
+    "column_space",
+    "columns",
+    "crowded_ends",
+    "crowded_start",
+    "first_bracket",
+    "gauss",
+    "importance_sample",
+    "inverse_variance",
+    "latin_hypercube",
+    "moment_matched_weights",
+    "pairwise",
+    "prior_quantiles",
+    "project_out",
+    "quantile_band",
+    "rising_root",
+    "shrink_correlation",
+    "systematic_resampling",
+]

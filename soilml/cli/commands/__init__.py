@@ -1,1 +1,1 @@
-"""The sub-commands of `soilml` that need no ground software to be listed."""
+"""Sub-commands of `soilml`, one module each; `soilml.cli.main.COMMANDS` lists them."""
