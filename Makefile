@@ -34,11 +34,11 @@ demo-papers: $(VENV)/.ready ## every system of the source papers: pictures, and 
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/python -m pytest -n 2 --dist loadgroup
+	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, under a minute
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not slow and not network"
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network"
 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from scipy.stats import qmc
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -107,33 +109,53 @@ def model_file(tmp_path: Path) -> Path:
     return path
 
 
+def shared_folder(
+    factory: pytest.TempPathFactory, name: str, fill: Callable[[Path], object]
+) -> Path:
+    """A folder that the first of all workers fills, and that the others read."""
+    root = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent
+    folder = root / name
+    with FileLock(root / f"{name}.lock"):
+        if not folder.exists():
+            part = root / f"{name}.part"
+            part.mkdir()
+            fill(part)
+            part.rename(folder)
+    return folder
+
+
 @pytest.fixture(scope="session")
 def small_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Some thousand rows, a quarter of them in runs of 32."""
     from datagen.generate import generate
     from datagen.recipe import read_recipe
 
-    folder = tmp_path_factory.mktemp("data")
-    recipe = folder / "recipe.toml"
-    blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
-    recipe.write_text(RECIPE.format(rows=8192, seed=5) + blocks)
-    generate(read_recipe(recipe), folder / "data.parquet")
-    return folder / "data.parquet"
+    def fill(folder: Path) -> None:
+        recipe = folder / "recipe.toml"
+        blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
+        recipe.write_text(RECIPE.format(rows=8192, seed=5) + blocks)
+        generate(read_recipe(recipe), folder / "data.parquet")
+
+    return shared_folder(tmp_path_factory, "small_data", fill) / "data.parquet"
 
 
 @pytest.fixture(scope="session")
-def small_model(small_data: Path) -> Path:
+def small_model(small_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A fused estimator trained on the small data, with a quick perceptron."""
     from soilml.cli import main
 
-    spec = small_data.parent / "spec.toml"
-    spec.write_text(
-        'seed = 1\n[[regressor]]\ntype = "fixed-size-lssvm"\ncentres = 60\n'
-        '[[regressor]]\ntype = "mlp"\nhidden = [24]\nepochs = 12\n[[regressor]]\ntype = "linear"\n'
-    )
-    out = small_data.parent / "small.onnx"
-    assert main(["train", str(spec), str(small_data), str(out)]) == 0
-    return out
+    def fill(folder: Path) -> None:
+        spec = folder / "spec.toml"
+        spec.write_text(
+            'seed = 1\n[[regressor]]\ntype = "fixed-size-lssvm"\ncentres = 60\n'
+            '[[regressor]]\ntype = "mlp"\nhidden = [24]\nepochs = 12\n'
+            '[[regressor]]\ntype = "linear"\n'
+        )
+        assert main(["train", str(spec), str(small_data), str(folder / "small.onnx")]) == 0
+
+    return shared_folder(tmp_path_factory, "small_model", fill) / "small.onnx"
 
 
 #: What a set of readings may be off by, generously: nothing of it is measured here.
@@ -151,19 +173,44 @@ def _exported(folder: Path, family, posterior, noise) -> Path:
     return path
 
 
+def _fitted(factory: pytest.TempPathFactory, name: str, family, settings):
+    """The set posterior of a family, with a response surface that is fitted once."""
+    from training.regressors.standardisation import Standardisation
+    from training.set_posterior.graph import SetPosteriorGraph
+    from training.set_posterior.response_surface import Response, fit_response
+    from training.set_posterior.sampler.misfit_test import MisfitLimits
+
+    def fill(folder: Path) -> None:
+        fit = fit_response(family, settings, lambda *_: None)
+        layers = {f"layer{i}": layer for i, layer in enumerate(fit.layers)}
+        arrays = {"mean": fit.scaling.mean, "scale": fit.scaling.scale, "error": fit.error}
+        terms = np.asarray(fit.terms)
+        ends = {"lower": fit.lower, "upper": fit.upper}
+        np.savez(folder / "response.npz", terms=terms, **arrays, **ends, **layers)
+
+    folder = shared_folder(factory, name, fill)
+    with np.load(folder / "response.npz") as kept:
+        response = Response(
+            terms=tuple(tuple(int(k) for k in term) for term in kept["terms"]),
+            scaling=Standardisation(kept["mean"], kept["scale"]),
+            layers=tuple(kept[f"layer{i}"] for i in range(len(kept.files) - 6)),
+            lower=kept["lower"],
+            upper=kept["upper"],
+            error=kept["error"],
+        )
+    return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
+
+
 @pytest.fixture(scope="session")
-def wheel_posterior():
+def wheel_posterior(tmp_path_factory: pytest.TempPathFactory):
     """The set posterior of the packaged wheel, learned from few designs."""
     from datagen.recipe import read_recipe
     from soilml.quantities import SHEAR
     from training.set_posterior.families.recipe_family import RecipeFamily
-    from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.response_surface import ResponseSettings, fit_response
-    from training.set_posterior.sampler.misfit_test import MisfitLimits
+    from training.set_posterior.response_surface import ResponseSettings
 
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
-    response = fit_response(family, ResponseSettings(768, 32, 120, 0), lambda *_: None)
-    return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
+    return _fitted(tmp_path_factory, "wheel_response", family, ResponseSettings(768, 32, 120, 0))
 
 
 @pytest.fixture(scope="session")
@@ -175,19 +222,16 @@ def wheel_set_file(wheel_posterior, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 @pytest.fixture(scope="session")
-def any_posterior():
+def any_posterior(tmp_path_factory: pytest.TempPathFactory):
     """The set posterior of wheels of any size, learned from so few designs that it is coarse."""
     from datagen.recipe import packaged_file
     from soilml.io.toml_settings import read_settings
     from training.set_posterior.families.dimensionless_family import DimensionlessFamily
-    from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.response_surface import ResponseSettings, fit_response
-    from training.set_posterior.sampler.misfit_test import MisfitLimits
+    from training.set_posterior.response_surface import ResponseSettings
 
     settings = read_settings(packaged_file("any_wheel", "training", "specs"))
     family = DimensionlessFamily.take(settings.table("any_wheel"))
-    response = fit_response(family, ResponseSettings(768, 32, 60, 0), lambda *_: None)
-    return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
+    return _fitted(tmp_path_factory, "any_response", family, ResponseSettings(768, 32, 60, 0))
 
 
 @pytest.fixture(scope="session")
@@ -197,24 +241,19 @@ def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)
 
 
-#: Fixtures that train or run a whole workflow, by the group of tests that shares them. Tests of one
-#: group run on one worker, so that nothing is trained twice.
-SHARED = {
-    "small_data": "small model",
-    "small_model": "small model",
-    "wheel_posterior": "set posteriors",
-    "wheel_set_file": "set posteriors",
-    "any_posterior": "set posteriors",
-    "any_set_file": "set posteriors",
+#: Fixtures that train: tests that use one are slow.
+TRAINED = {
+    "small_data",
+    "small_model",
+    "wheel_posterior",
+    "wheel_set_file",
+    "any_posterior",
+    "any_set_file",
 }
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests that use an expensive fixture as slow, and keep its users on one worker."""
+    """Mark tests that use a trained fixture as slow."""
     for item in items:
-        groups = [SHARED[name] for name in getattr(item, "fixturenames", ()) if name in SHARED]
-        if groups:
+        if TRAINED & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.slow)
-            if item.get_closest_marker("xdist_group") is None:
-                item.add_marker(pytest.mark.xdist_group(groups[-1]))

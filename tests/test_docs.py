@@ -30,6 +30,7 @@ def name_of(page):
     return str(page.relative_to(ROOT))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
 def test_python_blocks_run(page, monkeypatch, tmp_path):
     """In a folder that has the repository's examples, and the table that the page shows."""
@@ -58,6 +59,7 @@ def test_the_model_file_is_valid(tmp_path):
     assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus", "slip-sinkage.n1"}
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
     model = blocks("docs/model-file.md", "toml")[0]

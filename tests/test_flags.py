@@ -110,6 +110,7 @@ def test_another_wheel_is_flagged_where_sinkage_and_pull_are_read(wheel, factor)
         assert flagged(wheel, rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 3, 6, 16])
 def test_one_valid_set_in_a_hundred_is_flagged(wheel, rows):
     sets = RecipeFamily.of(read_recipe("wheel"), SHEAR).sets(300, rows, 991)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 SENSORS = {"torque-gain", "torque-offset", "load-gain", "drawbar-gain", "slip-scale"}
 

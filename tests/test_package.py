@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,3.0\na,0.4,60,4.2\n"
 

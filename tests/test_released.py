@@ -43,6 +43,7 @@ def test_comes_from_the_recipe_and_spec_in_the_tree(name):
     assert metadata["data_sha256"] in card
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 def test_metrics_hold_on_another_seed(name):
     estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
@@ -86,6 +87,7 @@ def coverage(estimator, columns, copies=1):
     return np.mean([e.in_range for e in found]), inside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 @pytest.mark.parametrize("steady", STEADY, ids=lambda steady: "-".join(("steady", *steady)))
 def test_intervals_hold_in_every_pattern_of_run(name, steady):
@@ -97,6 +99,7 @@ def test_intervals_hold_in_every_pattern_of_run(name, steady):
         assert (np.abs(inside - 0.9) < DEVIATION.get(name, 0.06)).all(), (rows, inside)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 def test_repeated_readings_do_not_reduce_the_uncertainty(name):
     estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
@@ -113,6 +116,7 @@ def test_the_file_for_any_wheel_comes_from_its_spec():
     assert metadata["spec_sha256"] in (ROOT / "exported" / "any_wheel.md").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 6, 24])
 def test_the_file_for_any_wheel_is_as_good_as_that_of_the_reference_wheel(rows):
     one = Estimator.load(ROOT / "exported" / "wheel.onnx")

@@ -18,6 +18,8 @@ from soilml import Estimator
 from soilml.cli import main
 from soilml.cli.advice_text import _trained_for, advice_after_estimate
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 RUNS = "run,slip,load_N,torque_Nm\na,0.2,60,2.9\na,0.2,60,2.95\n"
 

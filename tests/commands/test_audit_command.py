@@ -10,6 +10,8 @@ from soilml import Wheel
 from soilml.cli import main
 from soilml.physics.effects import EFFECTS
 
+pytestmark = pytest.mark.slow
+
 
 def design(loads=(40, 60, 90, 140), slips=5, speeds=None):
     lines = ["run,slip,load_N" + (",speed_m_s" if speeds else "")]

@@ -60,6 +60,7 @@ def test_an_empty_output_name_is_refused(folder, capsys):
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
     assert main([*COMMAND, "--slip-limit", "0.3"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -72,6 +73,7 @@ def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
     assert len(found["runs"]) == 6
 
 
+@pytest.mark.slow
 def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
     assert main([*COMMAND, "--out", "found"]) == 0
     message = capsys.readouterr().out
@@ -86,6 +88,7 @@ def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
         assert low <= middle <= high
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_result(folder):
     for name in ("a.json", "b.json"):
         assert main([*COMMAND, "--seed", "3", "--out", name]) == 0
@@ -204,6 +207,7 @@ def refused(folder, capsys, message, command=COMMAND):
     assert sorted(p.name for p in folder.rglob("*")) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_invalid_tables_are_refused_in_one_line(folder, tables, capsys, fault):
     change, message = FAULTS[fault]

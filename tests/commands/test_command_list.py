@@ -6,6 +6,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+import pytest
+
 from soilml.cli.main import COMMANDS
 
 ROOT = Path(__file__).parents[2]
@@ -19,6 +21,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.slow
 def test_every_command_is_there_without_entry_points(tmp_path):
     for words in (["--help"], ["generate", "--help"], ["compare", "--help"]):
         done = subprocess.run(

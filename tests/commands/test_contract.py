@@ -51,6 +51,7 @@ def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model
     assert "no equilibrium" in bad["status"]
 
 
+@pytest.mark.slow
 def test_estimate_leaves_rows_without_a_reading_blank(tmp_path, small_model, capsys):
     text = "run,slip,load_N,torque_Nm\na,0.2,60,\na,0.3,60,3.0\nb,0.4,80,4.9\n"
     (tmp_path / "runs.csv").write_text(text)
@@ -111,6 +112,7 @@ def test_identify_warns_of_one_load(model_file, runs_file, capsys):
     assert content["rows_used"] == 5
 
 
+@pytest.mark.slow
 def test_generate_train_estimate_follow_each_other(tmp_path, runs_file, capsys):
     (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=900, seed=2))
     (tmp_path / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')

@@ -14,6 +14,8 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.user_effects import load_effects
 from soilml.physics.operating_point import Operating
 
+pytestmark = pytest.mark.slow
+
 FILES = ["gap.json", "model.toml", "next_runs.csv", "report.html"]
 COLUMNS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
 

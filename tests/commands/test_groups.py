@@ -46,6 +46,7 @@ def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(fo
     assert not (folder / "n.json").exists()
 
 
+@pytest.mark.slow
 def test_estimate_has_a_line_for_a_run_without_readings(folder, capsys, small_model):
     assert main(["estimate", str(small_model), "runs.csv", "--by", "run"]) == 0
     captured = capsys.readouterr()

@@ -84,6 +84,7 @@ def one_line(process, status, said):
     assert error.count("\n") == 1 and said in error, error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "status"), [("SIGTERM", 143), ("SIGHUP", 129)])
 def test_a_signal_to_stop_leaves_nothing_half_written(folder, name, status):
     number = getattr(signal, name)
@@ -106,6 +107,7 @@ def test_a_command_leaves_the_handling_of_signals_as_it_was(folder, capsys):
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
+@pytest.mark.slow
 def test_a_closed_standard_output_is_one_line(folder):
     def close():
         os.close(1)
@@ -160,6 +162,7 @@ def test_more_rows_than_memory_holds_are_refused(folder, capsys, slip):
     assert error.count("\n") == 1 and len(error) < 400
 
 
+@pytest.mark.slow
 def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(tmp_path, capsys):
     exported = Path(__file__).parents[2] / "exported"
     log = tmp_path / "log.csv"

@@ -12,6 +12,8 @@ from conftest import MODEL
 from soilml import Operating, read_case
 from soilml.cli import main
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 ROWS = "run,slip,load_N,torque_Nm\na,0.2,60,{}\na,0.4,60,{}\n"
 COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.4"]

@@ -68,6 +68,7 @@ def test_a_load_that_nothing_carries_has_no_answer():
     assert (answered == [True, False, True, False]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
     if name not in OF_SOILML:
@@ -80,6 +81,7 @@ def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
     assert apart(of_soilml(rows), theirs).max() > 1e-4  # it does act
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tier", "key"), [(tier, key) for tier in MECHANISMS for key in MECHANISMS[tier]]
 )
@@ -137,6 +139,7 @@ def test_runs_sweep_the_slip_at_one_of_several_loads(runs):
     assert list(drawn.region) == list(columns)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tier", ["A", "B"])
 def test_what_a_cause_needs_varies(tier):
     needy = [key for key in mechanism_keys(tier) if active_mechanisms(tier, key)[0].needs]
@@ -149,6 +152,7 @@ def test_what_a_cause_needs_varies(tier):
         assert len(np.unique(column)) > 1
 
 
+@pytest.mark.slow
 def test_a_column_betrays_no_cause():
     drawn = [
         draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)
@@ -168,6 +172,7 @@ def strays(tier, count=60):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_readings_stray_as_the_tier_says():
     plain, linked, struck, louder = (strays(tier) for tier in ("N0", "N2", "N3", "N4"))
     assert plain.std() == pytest.approx(1.0, abs=0.03)

@@ -162,6 +162,7 @@ def test_a_recipe_that_mostly_fails_is_refused_and_leaves_nothing(tmp_path):
     assert not list(tmp_path.glob("*parquet*"))
 
 
+@pytest.mark.slow
 def test_killed_half_way_leaves_no_file_and_the_next_one_is_whole(tmp_path):
     made = recipe(tmp_path, rows=3_000_000)
     target = tmp_path / "d.parquet"

@@ -53,6 +53,7 @@ def recipe(tmp_path, text=RECIPE, rows=400):
     return read_recipe(tmp_path / "r.toml")
 
 
+@pytest.mark.slow
 def test_vibration_is_that_of_the_spring(tmp_path):
     made = simulate_rows(recipe(tmp_path), 0, 0, 60)
     felt = [

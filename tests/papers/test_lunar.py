@@ -23,6 +23,8 @@ from lunar.predictions import (  # noqa: E402
 from lunar.pull import pull_interval, repeat_over_slips, sample_soils  # noqa: E402
 from lunar.sweep import add_torque_noise, bounds, three_loads, wheel_forces  # noqa: E402
 
+pytestmark = pytest.mark.slow
+
 CASE = read_case(HERE / "lunar" / "model.toml")
 LOWER, UPPER = bounds(CASE)
 SPREAD = (UPPER - LOWER) / np.sqrt(12.0)

@@ -14,6 +14,7 @@ ROWS = list(printed_numbers())
 CHAPTERS = [chapter for name in PAPERS for chapter in chapters(name)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.paper}-{row.key}")
 def test_a_printed_number_is_reproduced_or_has_a_reason(row):
     found = row.compare()

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from soilml import Model, Operating, soil
 from soilml.config.case import Case
@@ -37,6 +38,7 @@ def misfit(torque, sinkage):
     return identify(CASE, Table(columns)).misfit
 
 
+@pytest.mark.slow
 def test_no_soil_makes_midstance_integrals_follow_a_walk_by_resistive_forces():
     legs = [wheel_leg("LTF", mass=load / 9.81) for load in LOADS]
     walked = walk(legs, GROUNDS["SSC-2"], slip=SLIPS, turns=1.0, steps=500).after(0.4 * np.pi)

@@ -50,12 +50,14 @@ def leg_scores(tmp_path_factory):
     return of
 
 
+@pytest.mark.slow
 def test_on_known_soil_torque_and_vibration_joined_say_more_of_slip_than_one(leg_scores):
     """Comin and Saaj 2017, eq. 26."""
     (shares,) = leg_scores("known", ["slip"], "torque/load load", "vibration load")
     assert shares[-1] < 0.75 * shares[:2].min() < shares[:2].max() < 0.6
 
 
+@pytest.mark.slow
 def test_on_unknown_soil_only_what_reads_both_at_once_says_more(leg_scores):
     (apart,) = leg_scores("unknown", ["slip"], "torque/load load", "vibration load")
     (at_once,) = leg_scores("unknown", ["slip"], "torque/load load vibration")
@@ -63,6 +65,7 @@ def test_on_unknown_soil_only_what_reads_both_at_once_says_more(leg_scores):
     assert apart[0] > 0.7  # torque: mostly the prior
 
 
+@pytest.mark.slow
 def test_sinkage_tells_stiffness_and_torque_and_vibration_tell_friction(leg_scores):
     """Comin and Saaj 2017, section IV-B: sinkage for load bearing, slip models for shear."""
     friction, stiffness = leg_scores(

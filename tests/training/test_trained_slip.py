@@ -18,6 +18,8 @@ from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train
 
+pytestmark = pytest.mark.slow
+
 RECIPE = (
     "rows = {rows}\nseed = {seed}\n"
     + WHEEL_ON_SAND

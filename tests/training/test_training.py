@@ -82,6 +82,7 @@ def test_fusing_a_regressor_with_itself_does_not_reduce_std(data):
     )
 
 
+@pytest.mark.slow
 def test_pooling_is_calibrated_on_held_out_runs(data):
     parts = split_by_run(data, seed=0)
     member = recalibrate(

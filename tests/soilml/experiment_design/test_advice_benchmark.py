@@ -8,6 +8,8 @@ import pytest
 
 from soilml import read_case
 
+pytestmark = pytest.mark.slow
+
 BENCH = Path(__file__).parents[3] / "bench"
 
 

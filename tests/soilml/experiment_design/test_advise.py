@@ -86,6 +86,7 @@ def test_each_row_of_a_sequence_reduces_the_variance_at_a_new_point(case):
     assert len({c.candidate for c in found.sequence}) == 3
 
 
+@pytest.mark.slow
 def test_the_realised_width_after_a_plan_is_the_expected_one(case):
     planned = advise(case, samples_of_prior(select_free(case, None), 1500), GRID, count=2).sequence
     points = [(c.candidate.slip, c.candidate.load) for c in planned]

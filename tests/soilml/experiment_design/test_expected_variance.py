@@ -103,6 +103,7 @@ def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
     assert (np.diff(found) < 0).all()
 
 
+@pytest.mark.slow
 def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
     """Against importance sampling with twenty times the samples, simulated readings apart."""
     case = read_case(model_file)

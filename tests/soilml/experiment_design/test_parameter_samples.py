@@ -51,6 +51,7 @@ def test_infeasible_moments_give_finite_quantiles_inside_the_prior():
         assert np.isfinite(found).all() and found.min() >= 0.0 and found.max() <= 1.0
 
 
+@pytest.mark.slow
 def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(model_file):
     case = read_case(model_file)
     table = rows(case, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
@@ -67,6 +68,7 @@ def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(model_fi
         np.testing.assert_allclose(correlation, fit.correlation, atol=0.08)
 
 
+@pytest.mark.slow
 def test_excess_residuals_scale_the_noise(model_file):
     case = read_case(model_file)
     table = rows(case, np.full(4, 0.3), np.full(4, 60.0))

@@ -65,6 +65,7 @@ def test_declared_noise_is_confirmed(rig):
     assert found["angle"] <= 0.25 and found["bearing"] <= 0.25 and found["autocorrelation"] == 0.0
 
 
+@pytest.mark.slow
 def test_run_to_run_variation_is_estimated(rig):
     found = typical(rig, scatter(angle=1.2, bearing=1.2))
     assert 0.7 < found["angle"] < 1.9
@@ -72,6 +73,7 @@ def test_run_to_run_variation_is_estimated(rig):
     assert np.all(found["scale"] < 1.3)
 
 
+@pytest.mark.slow
 def test_autocorrelation_is_estimated(rig):
     assert typical(rig, scatter(autocorrelation=0.7))["autocorrelation"] in (0.5, 0.7, 0.85)
 

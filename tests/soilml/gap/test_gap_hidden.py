@@ -8,6 +8,8 @@ from soilml.gap import STATUSES
 from soilml.identification.operating_points import operating_points
 from soilml.quantities import CHANNELS, column
 
+pytestmark = pytest.mark.slow
+
 STRONG = ("slip-sinkage", "bulldozing", "exit-angle")
 
 

@@ -11,6 +11,8 @@ from soilml.gap import gap
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 
+pytestmark = pytest.mark.slow
+
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 SAND = soil("wong1989/dry_sand")
 PRIOR = {

@@ -12,6 +12,8 @@ from soilml.errors import InputError, TableError
 from soilml.gap import gap
 from soilml.physics.effects import EFFECTS
 
+pytestmark = pytest.mark.slow
+
 FEW = {n: EFFECTS[n] for n in ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")}
 
 

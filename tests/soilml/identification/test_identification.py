@@ -39,6 +39,7 @@ def test_recovers_the_truth_from_rows_without_noise(case):
     assert fit.rows_used == 18
 
 
+@pytest.mark.slow
 def test_nine_of_ten_truths_lie_in_the_interval_and_the_std_says_how_far(case):
     rng = np.random.default_rng(1)
     inside, error, claimed = [], [], []
@@ -55,6 +56,7 @@ def test_nine_of_ten_truths_lie_in_the_interval_and_the_std_says_how_far(case):
     assert (ratio > 0.55).all() and (ratio < 1.7).all()
 
 
+@pytest.mark.slow
 def test_one_load_does_not_identify_cohesion_and_says_so(case):
     rng = np.random.default_rng(2)
     slip, load = np.linspace(0.1, 0.6, 6), np.full(6, 60.0)
@@ -68,6 +70,7 @@ def test_one_load_does_not_identify_cohesion_and_says_so(case):
     assert (np.mean(inside, axis=0) > 0.78).all()
 
 
+@pytest.mark.slow
 def test_the_std_holds_where_the_prior_holds_another_parameter(case):
     """The equally good values lie along a valley that bends away from the end of the prior."""
     rng = np.random.default_rng(11)
@@ -81,6 +84,7 @@ def test_the_std_holds_where_the_prior_holds_another_parameter(case):
     assert (np.mean(np.less(far, 2.0), axis=0) > 0.93).all()
 
 
+@pytest.mark.slow
 def test_a_share_of_noise_does_not_draw_the_fit_low(case):
     rng = np.random.default_rng(3)
     slip, load = rng.uniform(0.1, 0.6, 1000), rng.uniform(40.0, 110.0, 1000)

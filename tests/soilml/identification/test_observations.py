@@ -46,6 +46,7 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
     assert "newton method does not propagate noise of slip and load" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nonlinear", "newton"])
 def test_a_reading_of_zero_with_relative_noise_has_finite_weight(case, table, method):
     truth = identify(case, table, SHEAR, method)

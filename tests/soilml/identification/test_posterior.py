@@ -50,6 +50,7 @@ def test_sampling_finds_the_moments_and_the_evidence_of_a_bent_ridge():
     np.testing.assert_allclose(ends[:, 0], [0.05, 0.95], atol=0.03)
 
 
+@pytest.mark.slow
 def test_the_posterior_is_that_of_brute_force_on_a_grid(case):
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     case = case.with_values(truth)
@@ -74,6 +75,7 @@ def test_the_posterior_is_that_of_brute_force_on_a_grid(case):
     )
 
 
+@pytest.mark.slow
 def test_truths_stand_anywhere_in_their_posteriors_alike_and_no_fit_is_nearer(case):
     rng = np.random.default_rng(5)
     inside, error, other = [], [], []
@@ -100,6 +102,7 @@ def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
     assert all(p.lower <= a < b <= p.upper for p, a, b in zip(prior, low, high, strict=True))
 
 
+@pytest.mark.slow
 def test_a_model_that_lacks_something_is_said_to(case):
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, SLIPS, LOADS, seed=1)

@@ -168,6 +168,7 @@ def test_files_of_another_origin_are_refused(tmp_path, small_model):
         Estimator.load(tmp_path / "foreign.onnx")
 
 
+@pytest.mark.slow
 def test_every_single_damaged_byte_is_found(tmp_path, small_model):
     whole = small_model.read_bytes()
     rng = np.random.default_rng(0)

@@ -52,6 +52,7 @@ def assert_similar(a, b, tolerance=0.05):
     assert (np.abs(np.log(a.std / b.std)) < tolerance).all()
 
 
+@pytest.mark.slow
 def test_the_soil_is_inside_the_interval(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 24)
     found = estimator.run(**run)
@@ -195,6 +196,7 @@ def test_a_missing_reading_is_named(estimator, missing):
         estimator.run(**run)
 
 
+@pytest.mark.slow
 def test_a_file_for_any_wheel_requires_its_context(any_wheel):
     with pytest.raises(InputError, match="wheel_radius"):
         any_wheel.run(slip=0.3, torque=2.0, load=60.0)

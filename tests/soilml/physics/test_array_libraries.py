@@ -9,6 +9,8 @@ import torch
 
 from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
 
+pytestmark = pytest.mark.slow
+
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(WHEEL.gear)}
 CASES = {

@@ -10,6 +10,8 @@ from soilml import SlipSinkage, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.traction.coverage_study import coverage
 
+pytestmark = pytest.mark.slow
+
 SOILS = 10
 
 

@@ -8,6 +8,8 @@ from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.traction.report import pull_report
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def case(model_file):

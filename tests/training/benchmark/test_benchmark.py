@@ -100,6 +100,7 @@ def test_the_first_sets_do_not_depend_on_their_number(recipe):
             assert set_hash(a, recipe.case) == set_hash(b, recipe.case)
 
 
+@pytest.mark.slow
 def test_the_packaged_limit_is_the_exact_posterior(recipe):
     """Some sets again, by the model itself and not by its surrogate."""
     every = benchmark_sets(recipe, SHEAR)
@@ -147,6 +148,7 @@ def test_the_limit_is_calibrated(recipe):
     assert np.mean(stored.flagged) < 0.01
 
 
+@pytest.mark.slow
 def test_a_stale_limit_is_refused_with_a_hint(recipe, tmp_path, capsys, monkeypatch):
     wanted = benchmark_sets(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
     with pytest.raises(InputError, match=r"stale.*soilml compare --limit FILE\.parquet"):
@@ -225,6 +227,7 @@ def test_a_set_posterior_with_single_row_estimates_is_two_methods(small_model, r
     assert [m.kind for m in both] == [MethodKind.POOLED, MethodKind.SET_POSTERIOR]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "kind"),
     [
@@ -242,6 +245,7 @@ def test_the_kind_of_a_file_is_read_from_its_metadata(tmp_path, file, kind):
         assert classify_estimator(Estimator.load(copied)) is kind
 
 
+@pytest.mark.slow
 def test_goals_do_not_depend_on_the_name_of_a_file(tmp_path):
     names = {"wheel": "my_mlp", "wheel_mlp": "wheel", "wheel_linear": "best_lssvm"}
     copies = {
@@ -273,6 +277,7 @@ def test_gaussian_intervals_have_nominal_coverage():
         np.testing.assert_allclose(inside.mean(axis=0), share, atol=0.01)
 
 
+@pytest.mark.slow
 def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
     out = tmp_path / "results"
     assert main(["compare", str(small_model), "--sets", "3", "--out", str(out)]) == 0
@@ -302,6 +307,7 @@ def test_without_released_models_the_command_names_the_clone(tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_recomputed_limit_replaces_the_file_and_is_used(small_model, tmp_path, capsys):
     file, out = tmp_path / "limit.parquet", tmp_path / "results"
     file.write_text("old")

@@ -37,6 +37,7 @@ def score(scores, rows, method):
     return next(x for x in scores if x.rows == rows and x.method == method)
 
 
+@pytest.mark.slow
 def test_every_method_is_scored_on_every_size_of_set(scores):
     methods = {"prior", "small", *(f"analytic {method}" for method in METHODS)}
     for rows in (1, 12):
@@ -50,6 +51,7 @@ def test_the_prior_scores_itself(scores):
     np.testing.assert_allclose(prior.coverage50, 0.5, atol=0.08)
 
 
+@pytest.mark.slow
 def test_twelve_readings_reduce_the_error_that_one_leaves(scores):
     one, twelve = score(scores, 1, "small"), score(scores, 12, "small")
     assert 0.8 < one.rmse_over_prior[0] < 1.02
@@ -65,6 +67,7 @@ def test_methods_that_need_several_rows_fail_on_one(scores):
     assert np.isnan(score(scores, 12, "analytic linear").rmse[2])  # K is fixed, not estimated
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_picture_and_page(test_data, small_model, capsys):
     out = test_data / "comparison"
     command = ["compare", str(test_data / "model.toml"), str(test_data / "test.parquet")]

@@ -16,6 +16,8 @@ from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train
 
+pytestmark = pytest.mark.slow
+
 MEMBERS = {
     "lssvm": '[[regressor]]\ntype = "lssvm"\n',
     "fixed-size-lssvm": '[[regressor]]\ntype = "fixed-size-lssvm"\ncentres = 40\n',

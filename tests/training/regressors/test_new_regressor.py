@@ -1,6 +1,7 @@
 """A new regressor needs its class and a line of the catalogue: card, plots and export follow."""
 
 import numpy as np
+import pytest
 
 from soilml import Estimator
 from training import spec as specs
@@ -12,6 +13,8 @@ from training.regressors.gaussian_head import GaussianHead, validate_training_da
 from training.regressors.gaussian_regressor import GaussianRegressor
 from training.regressors.standardisation import Standardisation
 from training.train import train
+
+pytestmark = pytest.mark.slow
 
 
 class MeanRegressor(GaussianRegressor):

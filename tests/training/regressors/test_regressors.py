@@ -22,6 +22,7 @@ def curve(count, seed=0, noise=0.1):
     return x, clean + noise * rng.normal(size=clean.shape), clean
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("regressor", ALL, ids=lambda m: m.type_name)
 def test_passes_the_checks_of_scikit_learn(regressor):
@@ -83,6 +84,7 @@ def test_fixed_size_with_all_rows_as_centres_is_the_exact_machine():
     np.testing.assert_allclose(fixed.predict(probe), exact.predict(probe), atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "regressor", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=80)]
 )
@@ -98,6 +100,7 @@ def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
     assert 0.82 < inside < 0.96
 
 
+@pytest.mark.slow
 def test_varying_noise_is_estimated():
     rng = np.random.default_rng(0)
     x = rng.uniform(-1, 1, (2000, 1))

@@ -165,6 +165,7 @@ def bad():
     return GapReport("bad-data", "no noise; one channel", report().model)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("status", STATUSES)
 def test_every_status_gives_a_complete_page_with_its_meaning(status):
     html = page(bad() if status == "bad-data" else report(status), "rover.toml", "runs.csv")
@@ -178,6 +179,7 @@ def test_every_status_gives_a_complete_page_with_its_meaning(status):
     assert seen.tags.count("caption") == seen.tags.count("table")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("whole", [report(), bad()])
 def test_the_page_is_self_contained(whole):
     html = page(whole, "rover.toml", "runs.csv")
@@ -219,6 +221,7 @@ def test_hostile_names_stay_text():
     assert EVIL in "".join(seen.text)
 
 
+@pytest.mark.slow
 def test_the_same_report_gives_the_same_bytes():
     assert page(report(), "rover.toml", "runs.csv") == page(report(), "rover.toml", "runs.csv")
 

@@ -57,6 +57,7 @@ def plain(gear):
     return solved(input_box(128, seed=4), gear=GEARS[gear], **known_to(128))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gear", RIGID)
 @every
 def test_neutral_changes_nothing_to_the_last_bit(name, gear):
@@ -67,6 +68,7 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gear", RIGID)
 @every
 def test_finite_over_the_whole_box_or_flagged(name, gear):
@@ -85,6 +87,7 @@ def test_finite_over_the_whole_box_or_flagged(name, gear):
         assert (np.abs(true.slip) < 1).all() and (true.load > 0).all()
 
 
+@pytest.mark.slow
 @every
 def test_any_size_within_its_bounds_is_answered_or_flagged(name):
     box, known = input_box(64, seed=6), known_to(64)

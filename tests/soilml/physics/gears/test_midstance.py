@@ -83,6 +83,7 @@ def printed(theta1, slip, the_soil, foot=FOOT):
     return tuple(b * sum(integral(f, *part) for part in parts) for f in (load, torque))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", [-0.3, 0.0, 0.125, 0.5])
 @pytest.mark.parametrize("load", [2.0, 12.0, 20.0, 36.8, 45.0])
 def test_rests_where_the_printed_integrals_carry_the_load(slip, load):
@@ -158,6 +159,7 @@ def test_a_load_that_the_foot_never_carries_is_flagged():
     assert np.isnan(force.torque[1])
 
 
+@pytest.mark.slow
 def test_finite_over_a_box_of_feet_or_flagged_and_neutral_effects_change_nothing():
     u = qmc.Sobol(9, rng=3).random(256).T
     foot = Midstance.of_foot(0.02 + 0.06 * u[0], 0.003 + 0.01 * u[1], 0.02 + 0.06 * u[2], 0.18)

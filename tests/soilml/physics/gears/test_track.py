@@ -78,6 +78,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("ground", [SAND, CLAY], ids=["sand", "clay"])
 def test_agrees_with_a_dense_walk_along_the_belt(ground, shape):
@@ -134,6 +135,7 @@ def test_every_row_of_a_wide_box_is_answered_or_too_heavy():
         np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS_OF_TRACKS)
 def test_effects_are_neutral_or_finite_on_tracks(name):
     cls = EFFECTS_OF_TRACKS[name]
@@ -147,6 +149,7 @@ def test_effects_are_neutral_or_finite_on_tracks(name):
         np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("library", ["strict", "torch"])
 @pytest.mark.parametrize("effects", [(), (Grousers(spacing=0.8), ShearSoftening(share=1.0))])
 def test_same_answers_in_another_array_library(library, effects):
@@ -163,6 +166,7 @@ def test_same_answers_in_another_array_library(library, effects):
         np.testing.assert_allclose(values, getattr(expected, name), rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", ["cohesion", "friction_angle", "shear_modulus", "kphi", "n", "settling", "rebound",
              "leaving", "rear_leaving", "radius", "base", "spacing", "height"]

@@ -16,6 +16,7 @@ def relative(a, b):
     return np.abs(a / b - 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("braking", [False, True])
 def test_agrees_with_adaptive_quadrature_over_the_whole_input_box(braking):
     box = input_box(512, seed=20 + braking)
@@ -32,6 +33,7 @@ def test_agrees_with_adaptive_quadrature_over_the_whole_input_box(braking):
         assert abs(force.drawbar_pull[i] - pull) < 1e-6 * scale
 
 
+@pytest.mark.slow
 def test_agrees_at_the_corners_of_the_box():
     names = ("cohesion", "friction_angle", "shear_modulus", "n", "kphi", "slip", "load", "radius")
     ends = {
@@ -90,6 +92,7 @@ def test_rows_beyond_what_the_soil_carries_are_flagged_and_blank():
         assert forces(np.pi / 2, row)[0] >= row["load"]
 
 
+@pytest.mark.slow
 def test_a_braking_wheel_rests_at_the_first_depth_that_carries_it():
     box = input_box(256, seed=9)
     box["slip"] = -np.abs(box["slip"])
@@ -108,6 +111,7 @@ SHALLOW = [  # radius, width, c, phi, K, kc, kphi, n, slip, load; first rest, m
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SHALLOW)
 def test_a_braking_wheel_rests_at_the_first_of_several_depths(case):
     radius, width, c, phi, K, kc, kphi, n, slip, load, first = case

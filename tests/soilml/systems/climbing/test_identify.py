@@ -40,6 +40,7 @@ def test_the_shear_modulus_is_identified_with_known_strength(true, climbs):
     assert np.all(ground.samples[:, 0] == 0.0)
 
 
+@pytest.mark.slow
 def test_friction_angle_and_shear_modulus_are_correlated(true, climbs):
     fit = identify_ground(true.rover, climbs, fixed={"cohesion": 0.0}).fit
     assert fit.correlation[0, 1] > 0.8
@@ -125,6 +126,7 @@ def test_no_shear_modulus_balances_a_slope_beyond_the_largest_pull(true, climbs)
     assert np.isnan(modulus_per_climb(true.rover, [cliff], **size)).all()
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_of_random_rovers():
     """Six rovers: three or fewer inside bands of nine tenths would come once in sixty."""
     found = simulate_coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())

@@ -119,6 +119,7 @@ def test_a_saturated_peak_is_inferred_from_the_flanks_with_a_warning():
     ).warnings
 
 
+@pytest.mark.slow
 def test_intervals_have_the_nominal_coverage():
     rng, runs = np.random.default_rng(7), 50
     held = pulled = 0
@@ -149,6 +150,7 @@ def test_intervals_have_the_nominal_coverage():
     assert float(np.std(apart)) == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_noise_and_slip_uncertainty_widen_the_estimate():
     def std(noise, slip_std):
         wheel = replace(NOISY, noise=noise)

@@ -18,6 +18,8 @@ from soilml.systems.tracked_robot.group_identification import (
 from soilml.systems.tracked_robot.pull_regression import linear_regression
 from soilml.systems.tracked_robot.robot import WANG2018
 
+pytestmark = pytest.mark.slow
+
 PRIOR = {
     "n": Prior(0.5, 1.5),
     "friction_angle": Prior(np.deg2rad(20.0), np.deg2rad(40.0)),

@@ -75,6 +75,7 @@ def test_a_tail_that_settles_moves_the_pressure_back():
     assert down.centre > level.centre + 0.01 and down.rear > level.rear
 
 
+@pytest.mark.slow
 def test_a_raised_hitch_lowers_the_tail():
     """Wang et al. 2018, section 4.1.3: the more it pulls, the more the robot inclines."""
     model = Model(WANG2018.track)

@@ -13,6 +13,8 @@ from soilml.systems.wheel_legs.walking.geometry import wheel_leg
 from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
 from soilml.systems.wheel_legs.walking.walk import walk
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def legs():

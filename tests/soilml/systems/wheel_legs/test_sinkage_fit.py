@@ -12,6 +12,8 @@ from soilml.systems.wheel_legs.sensing.sinkage_fit import (
 )
 from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def rows():

@@ -77,6 +77,7 @@ def test_more_slip_shakes_the_hub_of_a_leg_that_bends_easily_more():
     assert found[-1] > 1.1 * found[1] > 10.0 * found[0]
 
 
+@pytest.mark.slow
 def test_the_amplitude_does_not_depend_on_the_step(monkeypatch):
     coarse = vibration_amplitude(LEG, SLIPS, PHI, GAP)
     monkeypatch.setattr(stick_slip, "STEPS_PER_PERIOD", 240)
@@ -87,6 +88,7 @@ def test_a_friction_that_does_not_drop_lets_the_foot_slide_more_smoothly():
     assert vibration_amplitude(LEG, 0.3, PHI, 0.0) < 0.3 * vibration_amplitude(LEG, 0.3, PHI, GAP)
 
 
+@pytest.mark.slow
 def test_cases_are_independent():
     one = vibration_amplitude(LEG, 0.25, PHI, GAP)
     many = vibration_amplitude(LEG, SLIPS[:, None], PHI, np.asarray([0.05, GAP]))

@@ -15,6 +15,8 @@ from training.set_posterior.families.dimensionless_family import DimensionlessFa
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.spec import read_any_wheel_spec
 
+pytestmark = pytest.mark.slow
+
 STEPS = 36
 
 

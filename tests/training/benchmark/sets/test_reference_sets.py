@@ -17,6 +17,8 @@ from training.benchmark.sets.reference_sets import (
     with_noise_of_reading,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def some():

@@ -13,6 +13,8 @@ from training.set_posterior.response_surface import ResponseSettings, fit_respon
 from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.validation import graph_outputs, posterior_session
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def triples():

@@ -52,6 +52,7 @@ def test_designs_of_one_size_ratio_have_the_same_features_and_answers(any_poster
     assert family.responses(scaled, x) == pytest.approx(family.responses(base, x), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_features_in_the_graph_are_those_of_the_training(any_posterior):
     family = any_posterior.family
     sets = family.sets(10, 4, 3)

@@ -9,6 +9,8 @@ from training.benchmark.sets.stream_posterior import posterior_of_memory
 from training.set_posterior.sampler.credible_interval import INTERVAL
 from training.set_posterior.validation import graph_outputs, posterior_session
 
+pytestmark = pytest.mark.slow
+
 
 def compare(posterior, sets, index, session):
     """Outputs of the graph, and mean, standard deviation and interval of a long sampling."""
