@@ -1,4 +1,4 @@
-"""Five stories of a model that lacks something: `make gap-demo`."""
+"""Five examples of a model that lacks an effect: `make gap`."""
 
 from __future__ import annotations
 
