@@ -76,7 +76,8 @@ class _FormerPaths(MetaPathFinder, Loader):
         sys.modules[former] = import_module(present)
 
 
-sys.meta_path.append(_FormerPaths())
+# before the usual finders, which would load a second copy of a module below a moved package
+sys.meta_path.insert(0, _FormerPaths())
 
 
 def __getattr__(name: str) -> Any:

@@ -114,13 +114,22 @@ def test_every_public_name_can_be_had():
 
 
 def test_former_import_paths_lead_to_the_same_module():
-    code = "import warnings; warnings.simplefilter('error'); import soilml; "
-    code += "warnings.simplefilter('ignore'); import soilml.effects.base as old, soilml.case; "
-    code += (
-        "from soilml.effects import SlipSinkage; from soilml.physics.effects import base as new; "
-    )
-    code += "import soilml.config.case; assert old is new and SlipSinkage is soilml.SlipSinkage; "
-    code += "assert soilml.case is soilml.config.case; print('same')"
+    code = """
+import warnings
+warnings.simplefilter("error")
+import soilml
+warnings.simplefilter("ignore")
+from soilml.effects.base import EffectCard
+from soilml.effects import SlipSinkage
+import soilml.case
+import sys
+assert EffectCard is soilml.EffectCard and SlipSinkage is soilml.SlipSinkage
+for former, present in soilml._FORMER_PATHS.items():
+    __import__(former)
+    __import__(present)
+    assert sys.modules[former] is sys.modules[present], former
+print("same")
+"""
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
     )

@@ -143,6 +143,14 @@ def test_an_effect_with_and_without_the_base_class_acts_alike(own):
     )
 
 
+@pytest.mark.filterwarnings("ignore:.*has moved:DeprecationWarning")
+def test_a_file_with_the_former_import_path_works(own):
+    former = OWN.replace("from soilml.physics.effects import", "from soilml.effects.base import")
+    assert former != OWN
+    own.write_text(former)
+    assert list(load_effects(own)) == ["crust"]
+
+
 def test_instances_of_an_effect_without_the_base_class_can_be_pickled(own):
     (crust,) = load_effects(own).values()
     assert pickle.loads(pickle.dumps(crust(strength=5.0))) == crust(strength=5.0)
