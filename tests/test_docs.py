@@ -103,3 +103,21 @@ def test_links_lead_to_files(page):
     for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text()):
         if not target.startswith(("http://", "https://")):
             assert (page.parent / target).exists(), f"{name_of(page)} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_named_files_exist(page):
+    named = r"`((?:soilml|datagen|training|tests|bench|docs|examples|exported)/[\w/.]+)`"
+    for path in re.findall(named, page.read_text()):
+        assert (ROOT / path).exists(), f"{name_of(page)} names {path}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_named_modules_exist(page):
+    named = r"`((?:soilml|datagen|training)(?:\.[a-z_]\w*)+)"
+    for path in set(re.findall(named, page.read_text())):
+        *parents, last = path.split(".")
+        folder = ROOT.joinpath(*parents)
+        is_module = (folder / last).is_dir() or (folder / f"{last}.py").exists()
+        is_member = folder.with_suffix(".py").exists() or (folder / "__init__.py").exists()
+        assert is_module or is_member, f"{name_of(page)} names {path}"
