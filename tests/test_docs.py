@@ -1,5 +1,6 @@
 """What README and docs show works as shown, and every link leads somewhere."""
 
+import importlib
 import re
 from pathlib import Path
 
@@ -112,12 +113,13 @@ def test_named_files_exist(page):
         assert (ROOT / path).exists(), f"{name_of(page)} names {path}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name_of)
+@pytest.mark.parametrize("page", [p for p in PAGES if p.name != "CHANGELOG.md"], ids=name_of)
 def test_named_modules_exist(page):
     named = r"`((?:soilml|datagen|training)(?:\.[a-z_]\w*)+)"
     for path in set(re.findall(named, page.read_text())):
-        *parents, last = path.split(".")
-        folder = ROOT.joinpath(*parents)
-        is_module = (folder / last).is_dir() or (folder / f"{last}.py").exists()
-        is_member = folder.with_suffix(".py").exists() or (folder / "__init__.py").exists()
-        assert is_module or is_member, f"{name_of(page)} names {path}"
+        parent, _, last = path.rpartition(".")
+        try:
+            importlib.import_module(path)
+        except ModuleNotFoundError:
+            owner = importlib.import_module(parent)
+            assert hasattr(owner, last), f"{name_of(page)} names {path}"

@@ -1,6 +1,5 @@
 """The fixed benchmark: sets, Bayes limit, scores of methods, acceptance goals."""
 
-import csv
 import json
 import shutil
 from dataclasses import replace
@@ -11,7 +10,6 @@ import pytest
 
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.cli import main
 from soilml.errors import InputError
 from soilml.identification import identify
 from soilml.quantities import SHEAR
@@ -25,14 +23,12 @@ from training.benchmark.designs import (
     set_hash,
 )
 from training.benchmark.methods import (
-    ANALYTIC_PREFIX,
     MethodKind,
     classify_estimator,
     gaussian_estimate,
     model_file_methods,
 )
 from training.benchmark.suite import (
-    ANALYTIC_METHODS,
     LIMIT_LABEL,
     POSTERIOR_LABEL,
     RECIPE,
@@ -275,44 +271,3 @@ def test_gaussian_intervals_have_nominal_coverage():
     for ends, share in ((estimate.interval50, 0.5), (estimate.interval90, 0.9)):
         inside = (draws > ends[0]) & (draws < ends[1])
         np.testing.assert_allclose(inside.mean(axis=0), share, atol=0.01)
-
-
-@pytest.mark.slow
-def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
-    out = tmp_path / "results"
-    assert main(["compare", str(small_model), "--sets", "3", "--out", str(out)]) == 0
-    printed = capsys.readouterr().out
-    assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
-    rows = list(csv.DictReader((out / "benchmark.csv").open()))
-    assert {r["method"] for r in rows} == {
-        LIMIT_LABEL,
-        POSTERIOR_LABEL,
-        "prior",
-        "small",
-        *(f"{ANALYTIC_PREFIX}{name}" for name in ANALYTIC_METHODS),
-    }
-    assert {r["unknown_effect"] for r in rows} == {"", *UNMODELLED_EFFECTS}
-    assert (out / "benchmark.png").stat().st_size > 20_000
-    assert "## Acceptance goals" in (out / "benchmark.md").read_text()
-
-
-def test_without_released_models_the_command_names_the_clone(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare"]) == 2
-    assert "run it in a clone of the repository" in capsys.readouterr().err
-    assert main(["compare", "a.toml", "b.parquet"]) == 2
-    assert "needed are MODEL.toml TEST.parquet" in capsys.readouterr().err
-    assert main(["compare", "--limit", "limit.csv"]) == 2
-    assert "must end in .parquet" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.slow
-def test_a_recomputed_limit_replaces_the_file_and_is_used(small_model, tmp_path, capsys):
-    file, out = tmp_path / "limit.parquet", tmp_path / "results"
-    file.write_text("old")
-    assert main(["compare", "--limit", str(file), "--sets", "1"]) == 0
-    command = ["compare", str(small_model), "--out", str(out), "--against", str(file), "--sets"]
-    assert main([*command, "2"]) == 2
-    assert "has no posterior of set 1" in capsys.readouterr().err
-    assert not out.exists()
