@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from soilml.gap.results import GapReport, decimal
+from soilml.gap.report_parts import GapReduction, decimal
+from soilml.gap.results import GapReport
+
+#: Suspects that the sentence lists.
+LISTED_SUSPECTS = 3
+#: Discrepancy in sigma from which the sentence states it.
+NOTABLE_DISCREPANCY = 0.3
 
 
-def verdict_sentence(
-    report: GapReport, naming_obstacles: Sequence[str], model_effects: Sequence[str]
-) -> str:
-    """The verdict in one sentence.
+def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
+    """The verdict in words.
 
     Parameters
     ----------
-    naming_obstacles : sequence of str
-        Why these runs cannot identify a cause.
     model_effects : sequence of str
         Names of the effects that the model had before the analysis.
     """
@@ -23,40 +25,88 @@ def verdict_sentence(
         f"{e.name} (the model has it at another size)" if e.name in model_effects else e.name
         for e in report.effects
     )
-    train = report.gap["train"]
-    reduction = (
-        f"mean squared residual {decimal(train.before)} -> {decimal(train.after)} "
-        "(noise alone gives 1)"
-    )
-    if report.status == "no-gap":
-        return (
-            "Model and measurements agree within the noise: "
-            f"mean squared residual {decimal(train.before, 2)}, p = {decimal(report.p_gap, 2)}."
-        )
-    if report.status == "not-testable":
-        why = "; ".join(naming_obstacles)
-        return f"There is a gap, but these runs cannot identify its cause: {why}."
-    if report.status == "unknown":
-        return (
-            "There is a gap, and no effect of the catalogue explains it: the best candidate has "
-            "residuals inconsistent with noise, needs a law far from the catalogue's, or does not "
-            "predict the held-out runs."
-        )
-    if report.status == "class":
-        sets = ", or ".join(" + ".join(names) for names in report.cause_set)
-        return (
-            f"The gap is explained equally well by {sets}: {reduction}. "
-            "These runs cannot distinguish them."
-        )
-    if report.status == "form-open":
-        return (
-            f"The gap is explained by {names}, with a law that differs from the catalogue's: "
-            f"{reduction}."
-        )
+    reduction = _reduction(report.gap["train"])
+    match report.status:
+        case "no-gap":
+            return (
+                "Model and measurements agree within the noise: mean squared residual "
+                f"{decimal(report.gap['train'].before, 2)}, p = {decimal(report.p_gap, 2)}."
+            )
+        case "undecided":
+            return (
+                "No smooth disagreement between model and measurements was found, but the "
+                f"measurements are inconsistent: {'; '.join(report.reasons)}."
+            )
+        case "not-testable":
+            why = "; ".join(report.reasons)
+            return f"There is a gap, but these runs cannot identify its cause: {why}."
+        case "suspected":
+            return _suspected(report)
+        case "unknown":
+            return (
+                "There is a gap, and no effect of the catalogue explains it better than a smooth "
+                f"discrepancy of unknown cause does. {_remainder(report)}"
+            ).strip()
+        case "class":
+            sets = ", or ".join(" + ".join(names) for names in report.cause_set)
+            return (
+                f"The gap is explained equally well by {sets}: {reduction}. These runs cannot "
+                f"distinguish them. {_remainder(report)}"
+            ).strip()
+        case "partly-named":
+            return f"The evidence supports {names}: {reduction}. {_remainder(report)}".strip()
+        case "form-open":
+            return (
+                f"The gap is explained by {names}, with a law that differs from the catalogue's: "
+                f"{reduction}."
+            )
     return (
         f"The gap is explained by {names}: {reduction}. No other effect of the catalogue "
         "explains it."
     )
+
+
+def _reduction(figures: GapReduction) -> str:
+    return (
+        f"mean squared residual {decimal(figures.before)} -> {decimal(figures.after)} "
+        "(noise alone gives 1)"
+    )
+
+
+def _suspected(report: GapReport) -> str:
+    """The ranked suspects with their odds, and why none of them is named."""
+    listed = "; ".join(
+        f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
+    )
+    why = (
+        "; ".join(report.reasons)
+        if report.reasons
+        else "the evidence is not decisive beside the model's usual error"
+    )
+    first = " + ".join(report.suspects[0].effects)
+    return (
+        f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first: "
+        f"{listed}. With {first}, {_reduction(report.gap['train'])}."
+    )
+
+
+def _odds(log_odds: float) -> str:
+    """Odds against all other explanations, in words."""
+    odds = min(abs(log_odds), 30.0)
+    number = decimal(2.718281828**odds, 2)
+    if odds > 9.2:  # ten thousand to one
+        number = "more than 10000"
+    return f"odds {number} to 1" if log_odds >= 0.0 else f"odds 1 to {number}"
+
+
+def _remainder(report: GapReport) -> str:
+    """The remaining discrepancy of each channel, in the reading's unit and in sigma."""
+    parts = [
+        f"{name} {decimal(d.after_value, 2)} {d.unit} ({decimal(d.after_sigma, 2)} sigma)"
+        for name, d in report.discrepancy.items()
+        if d.after_sigma >= NOTABLE_DISCREPANCY
+    ]
+    return f"A smooth discrepancy is left, root mean square: {', '.join(parts)}." if parts else ""
 
 
 def unsupported_conclusions(
@@ -64,13 +114,15 @@ def unsupported_conclusions(
 ) -> list[str]:
     """Conclusions that the report does not support; `fixed` names parameters that were fixed."""
     conclusions = [f"the cause of the gap: {obstacle}" for obstacle in naming_obstacles]
-    if report.status == "no-gap":
+    if report.status in ("no-gap", "undecided"):
         conclusions.append("that the model is complete: these runs merely show no disagreement")
         return conclusions
-    if report.status in ("named", "form-open"):
+    if report.status in ("named", "form-open", "partly-named"):
         conclusions.append(
             "that no cause outside the catalogue has the same signature as the named effect"
         )
+    if report.status == "partly-named":
+        conclusions.append("the cause of the remaining discrepancy")
     if report.status == "form-open":
         conclusions.append(
             "the law of the effect: by_slip and by_load describe these data empirically"
@@ -81,6 +133,11 @@ def unsupported_conclusions(
         )
     if report.status == "unknown":
         conclusions.append("any cause: model.toml contains the refitted soil and no new effect")
+    if report.status == "suspected":
+        conclusions.append(
+            "any cause: model.toml contains the refitted soil and no new effect; "
+            "model_suspected.toml contains the first suspect"
+        )
     if fixed:
         conclusions.append(
             f"that {', '.join(fixed)} in the model file are correct: they were fixed, and an error "

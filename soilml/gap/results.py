@@ -2,128 +2,38 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from soilml.config.case import Case
-
-Floats = NDArray[np.float64]
+from soilml.gap.report_parts import (
+    CandidateSummary,
+    Discrepancy,
+    EstimatedValue,
+    GapReduction,
+    NamedEffect,
+    NextRun,
+    ReadingsAndPredictions,
+    RemainingDiscrepancy,
+    Suspect,
+)
 
 #: Status of a report, and its meaning.
 STATUSES = {
     "no-gap": "model and measurements agree within the noise",
-    "named": "exactly one effect of the catalogue explains the gap",
-    "class": "several effects explain the gap equally well; these runs cannot distinguish them",
-    "form-open": "one effect explains the gap, with a law that differs from the catalogue's",
+    "named": "exactly one explanation of the catalogue accounts for the gap",
+    "partly-named": "the evidence supports these effects; a smooth remainder is left unexplained",
+    "class": "several explanations account for the gap; these runs cannot distinguish them",
+    "form-open": "one effect accounts for the gap, with a law that differs from the catalogue's",
+    "suspected": "ranked suspects: the runs do not suffice to name a cause",
     "unknown": "there is a gap, and no effect of the catalogue explains it",
+    "undecided": "measurements disagree with each other more than their noise allows",
     "not-testable": "there is a gap, but these runs cannot identify its cause",
     "bad-data": "the data cannot be analysed",
 }
 
-
-@dataclass(frozen=True)
-class EstimatedValue:
-    """An estimated parameter with its standard deviation."""
-
-    value: float
-    std: float
-    unit: str
-
-    def as_json(self) -> dict[str, Any]:
-        """Its entry in gap.json."""
-        return {"value": self.value, "std": self.std, "unit": self.unit}
-
-
-@dataclass(frozen=True)
-class NamedEffect:
-    """An effect that was added to the model, with its parameters and its alternatives."""
-
-    name: str
-    parameters: dict[str, EstimatedValue]
-    #: effects of the other explanations that the data do not reject
-    alternatives: tuple[str, ...]
-    #: sigma that distinguish the effect, at its size, from the soil and its nearest rival
-    separating_snr: float
-    nearest_rival: str
-
-
-@dataclass(frozen=True)
-class Discrepancy:
-    """A region of the data with its score against the soil alone and its family-wise p value."""
-
-    channel: str
-    slip: tuple[float, float]
-    load_N: tuple[float, float]  # noqa: N815 - the name of the column
-    z: float
-    p: float
-
-
-@dataclass(frozen=True)
-class GapReduction:
-    """Mean squared standardised residual before and after, in all and by channel; noise gives 1."""
-
-    before: float
-    after: float
-    channels: dict[str, tuple[float, float]]
-    readings: int
-    description: str
-
-    def unchanged(self) -> GapReduction:
-        """The figures of a model to which nothing was added."""
-        same = {name: (before, before) for name, (before, _) in self.channels.items()}
-        return replace(self, after=self.before, channels=same)
-
-    def as_json(self) -> dict[str, Any]:
-        """Its entry in gap.json."""
-        return {
-            "before": self.before,
-            "after": self.after,
-            "channels": {k: {"before": b, "after": a} for k, (b, a) in self.channels.items()},
-            "cells": self.readings,
-            "what": self.description,
-        }
-
-
-@dataclass(frozen=True)
-class CandidateSummary:
-    """A candidate: predicted and achieved decrease of the objective, and its verdict."""
-
-    names: tuple[str, ...]
-    predicted_gain: float
-    achieved_gain: float
-    excess: float  # objective above that of the best candidate
-    verdict: str
-
-
-@dataclass(frozen=True)
-class NextRun:
-    """A proposed run or check, with the predictions of each explanation."""
-
-    kind: str
-    text: str
-    discrimination: float  # expected, in sigma, between the remaining explanations
-    rows: tuple[dict[str, float], ...]  # operating points and predictions of each explanation
-
-
-@dataclass(frozen=True)
-class ReadingsAndPredictions:
-    """Readings (m,) with the predictions before and after, for figures."""
-
-    channels: tuple[str, ...]
-    channel: NDArray[np.int64]
-    run: tuple[str, ...]  # of each reading
-    slip: Floats
-    load: Floats
-    reading: Floats
-    std: Floats
-    before: Floats
-    after: Floats
-    after_std: Floats
-    held_out: NDArray[np.bool_]
+#: Statuses of a report that claims a cause; its model then contains the cause.
+CLAIMING = ("named", "partly-named", "form-open", "class")
 
 
 @dataclass(frozen=True)
@@ -142,14 +52,23 @@ class GapReport:
         The effects that were added.
     cause_set : tuple of tuple of str
         The explanations that the data do not reject, as sets of effect names, the best first.
+    probabilities : dict of float
+        Posterior probability of each tested effect.
+    suspects : tuple of Suspect
+        Explanations with their odds, the likeliest first, wherever there is a gap.
+    discrepancy : dict of RemainingDiscrepancy
+        Smooth discrepancy of each channel before and after, by column.
     best_unclaimed : tuple of str
-        The candidate that fits best where no cause is claimed; it is not in `model`.
+        The explanation that is likeliest where no cause is claimed; it is not in `model`.
+    suspected_model : Case, optional
+        The model with the likeliest suspect, where the status is `suspected`.
     reasons : tuple of str
         Why no cause can be named, or why the data cannot be analysed.
     where : tuple of Discrepancy
         Regions of the data, the largest disagreement first.
     gap : dict of GapReduction
-        Figures of the fitted rows (`train`) and of held-out runs and regions.
+        Figures of the fitted rows (`train`) and of held-out runs and regions, before and after
+        adding what is named or first among the suspects.
     soil_before, soil_after : dict of EstimatedValue
         Soil parameters without and with the added effects.
     mimic_radius : float
@@ -175,7 +94,11 @@ class GapReport:
     model: Case
     effects: tuple[NamedEffect, ...] = ()
     cause_set: tuple[tuple[str, ...], ...] = ()
+    probabilities: dict[str, float] = field(default_factory=dict)
+    suspects: tuple[Suspect, ...] = ()
+    discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
     best_unclaimed: tuple[str, ...] = ()
+    suspected_model: Case | None = None
     reasons: tuple[str, ...] = ()
     where: tuple[Discrepancy, ...] = ()
     gap: dict[str, GapReduction] = field(default_factory=dict)
@@ -201,29 +124,14 @@ class GapReport:
         return {
             "status": self.status,
             "sentence": self.sentence,
-            "effects": [
-                {
-                    "name": e.name,
-                    "parameters": {k: v.as_json() for k, v in e.parameters.items()},
-                    "alternatives": list(e.alternatives),
-                    "separating_snr": e.separating_snr,
-                    "nearest_rival": e.nearest_rival,
-                }
-                for e in self.effects
-            ],
+            "effects": [e.as_json() for e in self.effects],
             "cause_set": [list(names) for names in self.cause_set],
             "fits_best_but_not_claimed": list(self.best_unclaimed),
             "reasons": list(self.reasons),
-            "where": [
-                {
-                    "channel": w.channel,
-                    "slip": list(w.slip),
-                    "load_N": list(w.load_N),
-                    "z": w.z,
-                    "p": w.p,
-                }
-                for w in self.where
-            ],
+            "probabilities": self.probabilities,
+            "suspects": [s.as_json() for s in self.suspects],
+            "discrepancy": {name: d.as_json() for name, d in self.discrepancy.items()},
+            "where": [w.as_json() for w in self.where],
             "gap": {name: figures.as_json() for name, figures in self.gap.items()},
             "p_gap": self.p_gap,
             "p_left": self.p_residual,
@@ -232,16 +140,7 @@ class GapReport:
                 "after": {k: v.as_json() for k, v in self.soil_after.items()},
             },
             "mimic_radius": self.mimic_radius,
-            "candidates": [
-                {
-                    "effects": list(t.names),
-                    "predicted_gain": t.predicted_gain,
-                    "realised_gain": t.achieved_gain,
-                    "behind_best": t.excess,
-                    "verdict": t.verdict,
-                }
-                for t in self.candidates
-            ],
+            "candidates": [t.as_json() for t in self.candidates],
             "next_runs": [
                 {"kind": n.kind, "text": n.text, "separates_sigma": n.discrimination}
                 for n in self.next_runs
@@ -254,11 +153,3 @@ class GapReport:
             "seed": self.seed,
             "soilml_version": __version__,
         }
-
-
-def decimal(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, never with a power of ten."""
-    if not math.isfinite(value):
-        return f"{value:g}"
-    exponent = 0 if value == 0.0 else math.floor(math.log10(abs(value)))
-    return f"{value:.{max(0, digits - 1 - exponent)}f}"

@@ -21,34 +21,38 @@ from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.messages import unsupported_conclusions, verdict_sentence
 from soilml.gap.results import GapReport
 from soilml.gap.search.cross_validation import predict_held_out
+from soilml.gap.search.decision import Decision, decide
+from soilml.gap.search.disagreements import disagreements
 from soilml.gap.search.iteration import Analysis, analyse
+from soilml.gap.search.problem import MarginalFit
+from soilml.gap.search.remaining_discrepancy import (
+    discrepancy_amplitudes,
+    remaining_discrepancy,
+)
 from soilml.gap.search.report_entries import (
     analysis_notes,
     candidate_summaries,
     competing_explanations,
     gap_reductions,
     readings_and_predictions,
+    soil_marginal,
+    suspects,
     variance_component_entries,
 )
 from soilml.gap.search.residual_trend import residual_trend
 from soilml.gap.search.updated_case import updated_case
 from soilml.gap.search.verdict import (
-    decide_status,
     discrepancy_map,
     named_effects,
     signature_similarity,
     soil_estimates,
 )
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
-
-#: Statuses of a report that claims a cause; the model then contains it.
-CLAIMING = ("named", "form-open", "class")
 
 
 def gap(
@@ -186,70 +190,87 @@ def _build_report(
     """Decide the status and collect the entries of the report."""
     problem, result = analysis.problem, analysis.result
     obstacles = checks.naming_obstacles
-    best = result.accepted[0].fit if result.accepted else result.soil
-    figures = gap_reductions(analysis, best, seed)
-    status = decide_status(result, obstacles, figures.get("held_out_runs"))
+    before = soil_marginal(analysis)
+    conflicts = [] if result.has_gap else disagreements(problem, result.soil)
+    best = next((c for c in result.accepted if c.names), None)
+    figures = gap_reductions(analysis, best.best if best else before, seed)
+    decision = decide(problem, result, obstacles, conflicts, figures.get("held_out_runs"))
+    shown = decision.shown.best if decision.shown else before
+    if best is None or shown is not best.best:
+        figures = gap_reductions(analysis, shown, seed)
     if held_out is not None and len(held_out):  # after the verdict, which must not depend on it
         description = split.description
-        figures[split.name] = predict_held_out(problem, result.soil, best, held_out, description)
-
-    claimed = status in CLAIMING
-    after = best if claimed else result.soil
-    if not claimed:  # the figures are those of the model in the report
-        figures = {name: entry.unchanged() for name, entry in figures.items()}
+        figures[split.name] = predict_held_out(
+            problem, result.soil, shown.fit, held_out, description
+        )
+    none = result.none.best if result.none else before
+    after = shown if decision.claimed else none  # what model.toml contains
     report = GapReport(
-        status=status,
+        status=decision.status,
         sentence="",
-        model=updated_case(after),
-        cause_set=tuple(c.names for c in result.accepted) if claimed else (),
-        best_unclaimed=() if claimed or not result.accepted else result.accepted[0].names,
-        reasons=obstacles if status == "not-testable" else (),
+        model=updated_case(after.fit, discrepancy_amplitudes(problem, after)),
+        cause_set=tuple(c.names for c in decision.claimed),
+        probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
+        suspects=tuple(suspects(analysis, obstacles)),
+        best_unclaimed=() if decision.claimed or not decision.shown else decision.shown.names,
+        reasons=_reasons(decision.status, obstacles, conflicts),
         gap=figures,
         soil_before=soil_estimates(result.soil),
-        soil_after=soil_estimates(after),
-        candidates=tuple(candidate_summaries(analysis, claimed=claimed)),
+        soil_after=soil_estimates(after.fit),
+        candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable={u.name: u.reason for u in result.untestable},
-        notes=(*checks.notes, *analysis_notes(analysis, after)),
+        notes=(*checks.notes, *analysis_notes(analysis, after.fit)),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,
         seed=seed,
-        curves=readings_and_predictions(analysis, after),
+        curves=readings_and_predictions(analysis, shown.fit),
     )
-    if claimed:
-        report = _with_effects(report, analysis, after)
+    if decision.status == "suspected":
+        suspected = updated_case(shown.fit, discrepancy_amplitudes(problem, shown))
+        report = replace(report, suspected_model=suspected)
+    if decision.claimed:
+        report = _with_effects(report, analysis, decision)
     if result.has_gap:
-        report = _with_disagreement(report, analysis, after, seed)
+        report = _with_disagreement(report, analysis, none, shown if decision.shown else none, seed)
     effects_before = [e.name for e in case.model.effects]
     return replace(
         report,
-        sentence=verdict_sentence(report, obstacles, effects_before),
+        sentence=verdict_sentence(report, effects_before),
         not_claimed=tuple(
             unsupported_conclusions(report, obstacles, _fixed_parameters(case, free))
         ),
     )
 
 
-def _with_effects(report: GapReport, analysis: Analysis, after: GapFit) -> GapReport:
+def _reasons(status: str, obstacles: Sequence[str], conflicts: Sequence[str]) -> tuple[str, ...]:
+    """Why no cause is named, or why the absence of a gap is not stated."""
+    if status in ("not-testable", "suspected"):
+        return tuple(obstacles)
+    return tuple(conflicts) if status == "undecided" else ()
+
+
+def _with_effects(report: GapReport, analysis: Analysis, decision: Decision) -> GapReport:
     """The report with the effects that it claims and their similarity to other effects."""
-    accepted = analysis.result.accepted
-    similarity = signature_similarity(analysis.problem, after)
+    claimed, posterior = decision.claimed, analysis.result.posterior
+    similarity = signature_similarity(analysis.problem, claimed[0].fit, claimed[0].amplitude)
     return replace(
         report,
-        effects=tuple(named_effects(accepted, similarity)),
-        mimic_radius=similarity.largest_cosine(accepted[0].names),
+        effects=tuple(named_effects(claimed, similarity, posterior)),
+        mimic_radius=similarity.largest_cosine(claimed[0].names),
     )
 
 
 def _with_disagreement(
-    report: GapReport, analysis: Analysis, after: GapFit, seed: int
+    report: GapReport, analysis: Analysis, before: MarginalFit, after: MarginalFit, seed: int
 ) -> GapReport:
-    """The report with the map of the gap, the remaining trend and the runs to make next."""
+    """The report with the map of the gap, the remaining discrepancy and the runs to make next."""
     problem = analysis.problem
     return replace(
         report,
         where=tuple(discrepancy_map(problem, analysis.result.soil, seed)),
-        residual_trend=residual_trend(problem, after),
+        residual_trend=residual_trend(problem, after.fit),
+        discrepancy=remaining_discrepancy(problem, before, after),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
 

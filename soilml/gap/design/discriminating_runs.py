@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.design.run_options import SENSOR_CHECKS, expected_readings, run_options
-from soilml.gap.results import NextRun
+from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import covariance_at
 from soilml.gap.search.problem import FitProblem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from soilml.gap.results import EstimatedValue, decimal
+from soilml.gap.report_parts import EstimatedValue, decimal
 from soilml.quantities import COLUMNS
 
 _SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")

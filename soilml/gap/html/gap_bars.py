@@ -16,7 +16,8 @@ from soilml.gap.html.svg_image import (
     report_style,
     svg_image,
 )
-from soilml.gap.results import GapReduction, GapReport
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.results import GapReport
 
 #: Titles of the charts, by the names of the figures in gap.json.
 _TITLES = {

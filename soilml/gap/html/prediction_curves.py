@@ -18,7 +18,7 @@ from soilml.gap.html.svg_image import (
     report_style,
     svg_image,
 )
-from soilml.gap.results import ReadingsAndPredictions
+from soilml.gap.report_parts import ReadingsAndPredictions
 from soilml.quantities import Z_90
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from soilml.gap.html.formatting import (
     parameter_name,
     with_unit,
 )
-from soilml.gap.results import EstimatedValue, GapReport
+from soilml.gap.report_parts import EstimatedValue
+from soilml.gap.results import GapReport
 from soilml.quantities import Z_90
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
-from soilml.gap.results import GapReduction
-from soilml.gap.search.problem import FitProblem
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.search.problem import FitProblem, MarginalFit
 from soilml.gap.statistics.coordinates import predict_readings
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.statistics.reml_covariance import (
@@ -50,16 +50,17 @@ def gap_reduction(
     return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
 
 
-def refit(problem: FitProblem, fit: GapFit, selected: Mask) -> GapFit:
-    """Fit the same model to some of the readings, starting at its optimum."""
-    matrix = problem.covariance.matrix[np.ix_(selected, selected)]
+def refit(problem: FitProblem, marginal: MarginalFit, selected: Mask) -> GapFit:
+    """Fit the same model to some of the readings, beside the same discrepancy, from its optimum."""
+    fit = marginal.fit
+    matrix = problem.discrepancy.matrix(marginal.evidence.amplitude)[np.ix_(selected, selected)]
     whiten = np.linalg.inv(np.linalg.cholesky(matrix))
     readings = problem.readings.subset(selected)
     return levenberg_marquardt(fit.case, fit.coordinates, readings, whiten, fit.x)
 
 
 def held_out_runs(
-    problem: FitProblem, soil: GapFit, after: GapFit, seed: int
+    problem: FitProblem, soil: MarginalFit, after: MarginalFit, seed: int
 ) -> GapReduction | None:
     """Cross-validation by runs; None where there are fewer than three runs."""
     runs = len(problem.readings.runs)
@@ -71,12 +72,28 @@ def held_out_runs(
     return _cross_validate(problem, soil, after, fold, np.unique(fold), description)
 
 
-def held_out_region(problem: FitProblem, soil: GapFit, after: GapFit) -> GapReduction | None:
+def held_out_region(
+    problem: FitProblem, soil: MarginalFit, after: MarginalFit
+) -> GapReduction | None:
     """Extrapolation to the highest loads, or to the highest slips where the load hardly varies.
 
     None where fewer than three loads and fewer than three slips were measured.
     """
-    readings = problem.readings
+    chosen = region_fold(problem.readings)
+    if chosen is None:
+        return None
+    name, out = chosen
+    description = f"{name}, predicted from the rest"
+    fold = out.astype(np.int64)
+    return _cross_validate(problem, soil, after, fold, np.asarray([1]), description)
+
+
+def region_fold(readings: StackedReadings) -> tuple[str, Mask] | None:
+    """The region of the highest loads, or of the highest slips where the load hardly varies.
+
+    Its name and its readings (m,); None where fewer than three loads and fewer than three slips
+    were measured.
+    """
     by_load = count_distinct(np.log(readings.load)) >= 3
     values = readings.load if by_load else readings.slip
     if count_distinct(values) < 3:
@@ -85,15 +102,13 @@ def held_out_region(problem: FitProblem, soil: GapFit, after: GapFit) -> GapRedu
     fractions = np.asarray([np.mean(values >= level) for level in levels])
     edge = levels[int(np.argmin(np.abs(fractions - REGION_FRACTION)))]
     name = f"load_N >= {edge:.4g}" if by_load else f"slip >= {edge:.3g}"
-    fold = np.where(values >= edge, 1, 0)
-    description = f"{name}, predicted from the rest"
-    return _cross_validate(problem, soil, after, fold, np.asarray([1]), description)
+    return name, values >= edge
 
 
 def _cross_validate(
     problem: FitProblem,
-    soil: GapFit,
-    after: GapFit,
+    soil: MarginalFit,
+    after: MarginalFit,
     fold: NDArray[np.int64],
     predicted_folds: NDArray[np.int64],
     description: str,

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.search.stepwise import ResidualTest, SearchResult, search
+from soilml.gap.search.residual_test import ResidualTest
+from soilml.gap.search.stepwise import SearchResult, search
 from soilml.gap.statistics.coordinates import soil_coordinate
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.outliers import MAX_OUTLIER_FRACTION, outliers
@@ -96,7 +98,7 @@ def analyse(
             break
         readings = problem.readings
         soil = problem.fit_soil([soil.x])
-        starts = {c.names: c.catalogue_fit.start_values() for c in result.candidates}
+        starts = {c.names: c for c in result.candidates}
         result = search(problem, soil, seed, starts)
         if not result.accepted:
             break
@@ -135,8 +137,9 @@ def _reestimate_covariance(
     case = fit.fitted()
     if not signatures or len(signatures[0].column) != len(readings):
         signatures, _ = effect_signatures(case, readings, problem.effects_not_in(fit))
-    jacobian = np.linalg.solve(problem.covariance.whiten, fit.jacobian)
-    space = np.column_stack([jacobian, *[s.column for s in signatures], smooth_basis(readings)])
+    space = np.column_stack(
+        [fit.derivatives, *[s.column for s in signatures], smooth_basis(readings)]
+    )
     residual = readings.reading - fit.prediction
     columns = run_effect_columns(case, readings)
 
@@ -173,4 +176,4 @@ def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> 
 def _no_result(soil: GapFit) -> SearchResult:
     """The result before any search: no candidates, and a test without scores."""
     no_test = ResidualTest((), ScoreTest(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0)))
-    return SearchResult(soil, no_test, (), (), no_test, {})
+    return SearchResult(soil, no_test, (), (), no_test, {}, Posterior({}))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from soilml.gap.statistics.coordinates import (
     shape_coordinates,
     size_coordinate,
 )
+from soilml.gap.statistics.discrepancy_process import discrepancy_process
+from soilml.gap.statistics.evidence import DiscrepancyModel, Evidence
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.gap.statistics.signatures import current_size, with_effect
@@ -34,10 +37,30 @@ UNCALIBRATED_STD = 2.0
 MIN_SLIP_RANGE, MIN_LOG_LOAD_RANGE = 0.05, 0.1
 
 
+#: Fits at most under successive estimates of the discrepancy; the estimate of the amplitudes hardly
+#: changes after the second.
+MAX_ROUNDS = 3
+#: Change of an amplitude, in usual ones and relative to itself, below which a fit is final: the
+#: weights of the readings then hardly change.
+AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
+
+#: Case, coordinates, start coordinates by path, and amplitudes of the discrepancy to start with.
+FitRequest = tuple[Case, Sequence[FitCoordinate], Mapping[str, float], Floats]
+
+
+@dataclass(frozen=True)
+class MarginalFit:
+    """A fit under the discrepancy that its own evidence supports."""
+
+    fit: GapFit
+    evidence: Evidence
+
+
 @dataclass(frozen=True)
 class FitProblem:
     """Everything that stays the same while candidates are fitted.
 
+    `covariance` is that of noise and run-to-run scatter; `discrepancy` adds a smooth discrepancy.
     `calibration` holds standard deviations of sensor and rig errors by effect name, in the unit of
     the effect's size.
     """
@@ -48,6 +71,11 @@ class FitProblem:
     covariance: Covariance
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
+
+    @cached_property
+    def discrepancy(self) -> DiscrepancyModel:
+        """Noise, scatter and a smooth discrepancy of the readings."""
+        return DiscrepancyModel(self.covariance, discrepancy_process(self.readings))
 
     def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit."""
@@ -88,14 +116,37 @@ class FitProblem:
         ]
         return min(fits, key=lambda fit: fit.objective)
 
-    def fit(
-        self, case: Case, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
+    def fit_marginal(self, requests: Sequence[FitRequest]) -> list[MarginalFit]:
+        """Fits and their evidence, each under the discrepancy that it supports itself."""
+        amplitudes = [amplitude for *_, amplitude in requests]
+        starts = [start for _, _, start, _ in requests]
+        found: dict[int, MarginalFit] = {}
+        waiting = list(range(len(requests)))
+        for _ in range(MAX_ROUNDS):
+            for i in waiting:
+                case, coordinates, *_ = requests[i]
+                whiten = self.discrepancy.whiten(amplitudes[i])
+                fit = self._fit(case, coordinates, starts[i], whiten)
+                found[i] = MarginalFit(fit, self.discrepancy.evidence(fit, amplitudes[i]))
+            waiting = [i for i in waiting if _changed(amplitudes[i], found[i].evidence.amplitude)]
+            for i in waiting:
+                amplitudes[i] = found[i].evidence.amplitude
+                starts[i] = found[i].fit.start_values()
+            if not waiting:
+                break
+        return [found[i] for i in range(len(requests))]
+
+    def _fit(
+        self,
+        case: Case,
+        coordinates: Sequence[FitCoordinate],
+        start: Mapping[str, float],
+        whiten: Floats,
     ) -> GapFit:
         """Fit from `start`, by path; other coordinates start at the case's value or small.
 
         Where the model refuses a trial from there, the fit starts again with all effects at zero.
         """
-        whiten = self.covariance.whiten
         first = np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
         try:
             return levenberg_marquardt(case, coordinates, self.readings, whiten, first)
@@ -115,3 +166,10 @@ class FitProblem:
         if coordinate.path in self.case.parameters():
             return current_size(self.case, coordinate.path, coordinate.prior.upper)
         return START_SIZE if coordinate.upper > 0.0 else -START_SIZE
+
+
+def _changed(before: Floats, after: Floats) -> bool:
+    """Whether the amplitudes of a discrepancy changed so much that a fit must be repeated."""
+    larger, smaller = np.maximum(before, after), np.minimum(before, after)
+    changed = (larger - smaller > AMPLITUDE_TOLERANCE) & (smaller < AMPLITUDE_RATIO * larger)
+    return bool(changed.any())

@@ -6,32 +6,45 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from soilml.gap.results import CandidateSummary, GapReduction, ReadingsAndPredictions
+from soilml.gap.report_parts import (
+    CandidateSummary,
+    GapReduction,
+    ReadingsAndPredictions,
+    Suspect,
+)
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import gap_reduction, held_out_region, held_out_runs
 from soilml.gap.search.iteration import Analysis
-from soilml.gap.search.stepwise import REJECTION_THRESHOLD
+from soilml.gap.search.posterior import REJECTION_THRESHOLD
+from soilml.gap.search.problem import MarginalFit
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
+from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.quantities import column
 
 #: Outliers that a note lists by name.
 LISTED_OUTLIERS = 6
+#: Suspects that are listed.
+LISTED_SUSPECTS = 8
 #: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
 AT_BOUND = 1e-3
 #: Factor on the declared noise above which a note is made.
 NOTABLE_NOISE_SCALE = 1.25
 
 
-def gap_reductions(analysis: Analysis, after: GapFit, seed: int) -> dict[str, GapReduction]:
-    """Figures of the fitted rows and of cross-validation, as far as the runs allow it."""
-    problem, soil = analysis.problem, analysis.result.soil
+def gap_reductions(analysis: Analysis, after: MarginalFit, seed: int) -> dict[str, GapReduction]:
+    """Figures of the fitted rows and of cross-validation, as far as the runs allow it.
+
+    Before is the soil alone, fitted under noise and scatter; after is the explanation shown.
+    """
+    problem = analysis.problem
+    soil = soil_marginal(analysis)
     std = problem.covariance.std
     description = "all rows fitted"
     figures = {
         "train": gap_reduction(
-            problem.readings, std, soil.prediction, after.prediction, description
+            problem.readings, std, soil.fit.prediction, after.fit.prediction, description
         ),
         "held_out_runs": held_out_runs(problem, soil, after, seed),
         "held_out_region": held_out_region(problem, soil, after),
@@ -39,39 +52,71 @@ def gap_reductions(analysis: Analysis, after: GapFit, seed: int) -> dict[str, Ga
     return {name: entry for name, entry in figures.items() if entry is not None}
 
 
+def soil_marginal(analysis: Analysis) -> MarginalFit:
+    """The soil alone under noise and scatter, without any discrepancy."""
+    soil = analysis.result.soil
+    none = np.zeros(len(analysis.problem.readings.channels))
+    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x))))
+
+
 def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
     """All fitted candidates, the best first; `claimed`: whether the report claims a cause."""
     result = analysis.result
-    if not result.candidates:
+    if result.none is None:
         return []
-    lowest = min(c.objective for c in result.candidates)
+    lowest = result.candidates[0].objective
     accepted = {c.names for c in result.accepted}
     summaries = []
-    for c in sorted(result.candidates, key=lambda c: c.objective):
+    for c in result.candidates:
+        if not c.names:
+            continue
         single = len(c.names) == 1
         predicted = result.predicted_gain.get(c.names[0], 0.0) if single else float("nan")
         if c.names in accepted:
             verdict = "explains the data" if claimed else "fits best, not claimed"
-        elif not c.catalogue_fit.converged:
+        elif not c.catalogue_law.fit.converged:
             verdict = "fit did not converge: no evidence"
         elif c.objective <= lowest + REJECTION_THRESHOLD:
-            verdict = "more effects than needed"
+            verdict = "more effects than needed" if claimed else "not rejected, not claimed"
         else:
             verdict = "rejected against the best"
-        achieved = result.soil.objective - c.objective
+        achieved = result.none.objective - c.objective
         excess = c.objective - lowest
         summaries.append(CandidateSummary(c.names, predicted, achieved, excess, verdict))
     return summaries
 
 
+def suspects(analysis: Analysis, naming_obstacles: Sequence[str]) -> list[Suspect]:
+    """Explanations with their odds against all others, the likeliest first.
+
+    The odds hold under the conditions that `given` states in words.
+    """
+    found = analysis.result.posterior
+    conditions = ["no other cause than those of the catalogue has an effect like it"]
+    runs = len(analysis.problem.readings.runs)
+    if runs == 1:
+        conditions.append("the bed was the same for all rows")
+    if any("load" in text for text in naming_obstacles):
+        conditions.append(
+            "the soil parameters lie inside their priors, because one load cannot test them"
+        )
+    given = "if " + ", and if ".join(conditions)
+    ordered = sorted(found.log_weights, key=lambda names: -found.log_weights[names])
+    listed: list[tuple[str, ...]] = []
+    for names in ordered:
+        if names and not any(set(smaller) <= set(names) for smaller in listed):
+            listed.append(names)
+    return [Suspect(names, found.set_log_odds(names), given) for names in listed[:LISTED_SUSPECTS]]
+
+
 def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
-    """The explanations to distinguish: the accepted ones, or the only one and its runner-up."""
-    accepted, candidates = analysis.result.accepted, analysis.result.candidates
-    if len(accepted) != 1:
-        return list(accepted)
-    best = accepted[0]
-    others = [c for c in candidates if len(c.names) == len(best.names) and c != best]
-    return [best, *sorted(others, key=lambda c: c.objective)[:1]]
+    """The explanations to distinguish: those not rejected, or the best one and its runner-up."""
+    accepted = [c for c in analysis.result.accepted if c.names]
+    others = [c for c in analysis.result.candidates if c.names and c not in accepted]
+    if len(accepted) > 1:
+        return accepted
+    rivals = [c for c in others if not accepted or not set(accepted[0].names) < set(c.names)]
+    return [*accepted, *rivals][:2] if accepted else rivals[:3]
 
 
 def analysis_notes(analysis: Analysis, after: GapFit) -> list[str]:
@@ -130,7 +175,7 @@ def variance_component_entries(analysis: Analysis) -> dict[str, float]:
 def readings_and_predictions(analysis: Analysis, after: GapFit) -> ReadingsAndPredictions:
     """Readings, predictions before and after, and the standard deviations of both."""
     problem, readings = analysis.problem, analysis.problem.readings
-    jacobian = np.linalg.solve(problem.covariance.whiten, after.jacobian)
+    jacobian = after.derivatives
     variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
     prediction = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
     return ReadingsAndPredictions(

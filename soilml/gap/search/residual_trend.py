@@ -22,6 +22,7 @@ def residual_trend(problem: FitProblem, fit: GapFit) -> dict[str, float]:
     not extrapolate beyond the slips and loads of the data.
     """
     readings, whiten = problem.readings, problem.covariance.whiten
+    fit = fit.whitened_by(whiten)
     smooth = smooth_basis(readings)
     trend = {}
     for i, name in enumerate(readings.channels):

@@ -1,80 +1,65 @@
-"""Stepwise search for missing effects: add, exchange and remove until only noise remains."""
+"""Stepwise search for missing effects, by their evidence beside a smooth discrepancy."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.search.candidate_fits import (
+    EFFECT_PENALTY,
     CandidateFit,
-    fit_candidate,
+    fit_candidates,
     fit_shapes,
     predicted_shape_gain,
-    shape_directions,
 )
-from soilml.gap.search.problem import FitProblem
+from soilml.gap.search.posterior import Posterior, explanations, posterior
+from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.score_test import ScoreTest, score_test
 from soilml.gap.statistics.signatures import Signature, Untestable, effect_signatures
-from soilml.gap.statistics.smooth_basis import smooth_basis
-from soilml.numerics.subspaces import project_out
 
 Floats = NDArray[np.float64]
 
 #: Family-wise significance level of the test for a gap.
 GAP_LEVEL = 0.03
-#: Significance level of the test for lack of fit of a candidate.
+#: Significance level of the test for a remainder that the best explanation does not account for.
 LACK_OF_FIT_LEVEL = 0.001
-#: Objective above that of the best candidate from which another one is rejected: 3 sigma for one
-#: degree of freedom.
-REJECTION_THRESHOLD = 9.0
-#: Decrease of the objective that a further effect must achieve: above the rejection threshold,
-#: because the effect is chosen from the whole catalogue.
-MIN_IMPROVEMENT = 12.0
-#: Effects are fitted in full if their predicted gain is above 2 sigma squared and within this
-#: margin of the largest, and so many of the largest in any case.
-MIN_GAIN, GAIN_MARGIN, MIN_FITTED = 4.0, 15.0, 6
+#: Effects are fitted in full if their predicted gain is within this margin of the largest, and so
+#: many of the largest in any case; the prediction is linear and can be wrong by that much.
+GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
+#: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
+MIN_NET_GAIN = -2.0
+#: Objective above that of the best candidate up to which shapes are estimated and sets extended.
+WITHIN_REACH = 15.0
 #: Largest number of effects in a candidate; sets that are extended by one effect in each step, and
 #: effects that each of them is extended by.
 MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
 #: Upper bound of the improvement by free shapes, in linearised gains; the full fit can exceed the
 #: linearised gain because the size changes with the shape.
 SHAPE_GAIN_FACTOR = 3.0
-#: Size, in reference sizes, at which a gain is predicted where the estimate has an impossible sign.
-SMALL_SIZE = 0.02
+#: Decrease of the objective by an extension below which no larger set is tried.
+MIN_IMPROVEMENT = 1.0
 
-#: Start coordinates by path, for each set of effect names.
-Starts = Mapping[tuple[str, ...], Mapping[str, float]]
-
-
-@dataclass(frozen=True)
-class ResidualTest:
-    """Score test of a fit's residuals against the catalogue and smooth functions together."""
-
-    signatures: tuple[Signature, ...]
-    test: ScoreTest
-
-    @property
-    def p_value(self) -> float:
-        """Family-wise p value of the largest score."""
-        return self.test.family_wise_p
+#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
+Starts = Mapping[tuple[str, ...], CandidateFit]
 
 
 @dataclass(frozen=True)
 class SearchResult:
-    """Result of the search; `final_test` is that of the best candidate, or of the soil alone."""
+    """Result of the search; `final_test` is that of the best explanation, or of the soil alone."""
 
-    soil: GapFit
+    soil: GapFit  # the soil alone, under noise and scatter
     soil_test: ResidualTest
-    #: candidates that are not rejected against the best one, in order of their objective
+    #: explanations that are not rejected against the best one, in order of their objective
     accepted: tuple[CandidateFit, ...]
-    #: all candidates that were fitted
+    #: all candidates that were fitted, the empty set among them
     candidates: tuple[CandidateFit, ...]
     final_test: ResidualTest
     predicted_gain: dict[str, float]
+    posterior: Posterior
     #: effects that these runs cannot test
     untestable: tuple[Untestable, ...] = ()
 
@@ -85,54 +70,18 @@ class SearchResult:
 
     @property
     def adequate(self) -> bool:
-        """Whether the residuals of the best candidate are consistent with noise."""
+        """Whether the residuals of the best explanation are consistent with noise."""
         return self.final_test.p_value >= LACK_OF_FIT_LEVEL
 
+    @property
+    def none(self) -> CandidateFit | None:
+        """The soil alone beside a smooth discrepancy; None where no gap was searched."""
+        return next((c for c in self.candidates if not c.names), None)
 
-def residual_test(
-    problem: FitProblem, fit: GapFit, signatures: Sequence[Signature], seed: int
-) -> ResidualTest:
-    """Test the residuals of a fit, with all that its coordinates can explain projected out.
-
-    Second-order terms in the laws of the effects in the fit are projected out too; see
-    `soilml.gap.search.candidate_fits.shape_directions`.
-    """
-    whiten = problem.covariance.whiten
-    smooth = smooth_basis(problem.readings)
-    columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])
-    signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
-    space = np.column_stack([fit.jacobian, *shape_directions(problem, fit)])
-    degrees_of_freedom = problem.covariance.components.degrees_of_freedom
-    test = score_test(fit.residual, columns, space, signs, degrees_of_freedom, seed)
-    return ResidualTest(tuple(signatures), test)
-
-
-def predicted_gains(
-    problem: FitProblem, fit: GapFit, signatures: Sequence[Signature]
-) -> dict[str, float]:
-    """Decrease of the objective that each effect, with free shape, should achieve: linearised."""
-    whiten = problem.covariance.whiten
-    slip, load = problem.readings.slip, np.log(problem.readings.load)
-    terms = [np.ones_like(slip), slip - slip.mean(), load - load.mean()]
-    gains = {}
-    for s in signatures:
-        shapes = problem.shape_coordinates([s.name])
-        columns = np.stack([s.column * term for term in terms[: 1 + len(shapes)]], axis=1)
-        projected = project_out(whiten @ columns, fit.jacobian)
-        main = projected[:, 0]
-        power = float(main @ main)
-        if power <= 0.0:
-            gains[s.name] = 0.0
-            continue
-        size = float(main @ fit.residual) / power
-        if s.sign and size * s.sign <= 0:
-            size = SMALL_SIZE * s.sign
-        std = problem.size_coordinates([s.name])[0].std
-        precision = np.asarray([std**-2, *[(shape.std * size) ** -2 for shape in shapes]])
-        normal = projected.T @ projected + np.diag(precision)
-        moment = projected.T @ fit.residual
-        gains[s.name] = float(moment @ np.linalg.solve(normal, moment))
-    return gains
+    @property
+    def likeliest(self) -> CandidateFit | None:
+        """The candidate with effects of the largest evidence; None where no gap was searched."""
+        return next((c for c in self.candidates if c.names), None)
 
 
 def search(
@@ -141,69 +90,119 @@ def search(
     """Search for the effects that explain what the soil alone does not.
 
     Candidates are fitted jointly with the soil, by their catalogue law; where it could bring them
-    close to the best, with free shapes too. While the residuals of the best candidate are
-    inconsistent with noise, the best sets are extended by one effect. A set is replaced by a
-    smaller one that explains the data nearly as well.
+    close to the best, with free shapes too. Sets within reach of the best are extended by one
+    effect while that increases the evidence.
 
     Parameters
     ----------
+    soil : GapFit
+        The soil alone, fitted under noise and scatter without discrepancy.
     starts : mapping
-        Start coordinates by effect names, from an earlier search.
+        Candidates of an earlier search.
     """
     starts = starts or {}
     signatures, untestable = effect_signatures(soil.fitted(), problem.readings, problem.effects)
     soil_test = residual_test(problem, soil, signatures, seed)
-    gains = predicted_gains(problem, soil, signatures)
-    nothing = SearchResult(soil, soil_test, (), (), soil_test, gains, tuple(untestable))
-    if not nothing.has_gap:
-        return nothing
-    start = soil.start_values()
-    level = _with_free_shapes(
-        problem,
-        [fit_candidate(problem, [n], starts.get((n,), start)) for n in _select_by_gain(gains)],
-    )
-    fitted = {c.names: c for c in level}
-    level = [c for c in level if c.objective < soil.objective - MIN_IMPROVEMENT / 2]
-    if not level:
-        return nothing
-    best = min(level, key=lambda c: c.objective)
-    test = _test_residuals(problem, best, seed)
+    if soil_test.p_value >= GAP_LEVEL:
+        return SearchResult(
+            soil, soil_test, (), (), soil_test, {}, Posterior({}), tuple(untestable)
+        )
+    none = _soil_alone(problem, soil, starts)
+    gains = _predicted_with_and_without(problem, none, soil, signatures)
+    fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
+    level = _fit_level(problem, none, {(n,): none for n in _select_by_gain(gains)}, starts)
+    fitted |= {c.names: c for c in level}
     for _ in range(MAX_EFFECTS - 1):
-        if test.p_value >= LACK_OF_FIT_LEVEL:
+        lowest = min(c.objective for c in fitted.values())
+        extensions = _extensions(problem, level, fitted, lowest)
+        level = _fit_level(problem, none, extensions, starts)
+        fitted |= {c.names: c for c in level}
+        if not level or min(c.objective for c in level) > lowest - MIN_IMPROVEMENT:
             break
-        larger = _with_free_shapes(problem, _add_one_effect(problem, level, fitted, starts))
-        fitted |= {c.names: c for c in larger}
-        if not larger:
-            break
-        better = min(larger, key=lambda c: c.objective)
-        if better.objective > best.objective - MIN_IMPROVEMENT:
-            break
-        level, best = larger, better
-        test = _test_residuals(problem, best, seed)
-    smaller = _drop_effects(problem, best, fitted)
-    if smaller is not None:
-        best, test = smaller, _test_residuals(problem, smaller, seed)
-    level = [c for c in fitted.values() if len(c.names) == len(best.names)]
-    accepted = [c for c in level if c.objective <= best.objective + REJECTION_THRESHOLD]
-    accepted.sort(key=lambda c: c.objective)
-    return replace(
-        nothing, accepted=tuple(accepted), candidates=tuple(fitted.values()), final_test=test
+    candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
+    found = posterior(candidates, gains, none)
+    accepted = explanations(candidates, found)
+    return SearchResult(
+        soil,
+        soil_test,
+        accepted,
+        candidates,
+        _test_residuals(problem, accepted[0], seed),
+        gains,
+        found,
+        tuple(untestable),
     )
 
 
-def _with_free_shapes(
-    problem: FitProblem, candidates: Sequence[CandidateFit]
+def _soil_alone(problem: FitProblem, soil: GapFit, starts: Starts) -> CandidateFit:
+    """The empty set of effects: the soil alone with a smooth discrepancy."""
+    start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
+    if () in starts:
+        start, amplitude = starts[()].fit.start_values(), starts[()].amplitude
+    marginal = problem.fit_marginal([(soil.case, list(soil.coordinates), start, amplitude)])[0]
+    return CandidateFit((), marginal, marginal)
+
+
+def _predicted_with_and_without(
+    problem: FitProblem, none: CandidateFit, soil: GapFit, signatures: Sequence[Signature]
+) -> dict[str, float]:
+    """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
+
+    A discrepancy of large amplitude can hide an effect that explains nearly everything.
+    """
+    plain = MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
+    with_discrepancy, without = (
+        predicted_gains(problem, CandidateFit((), fit, fit), none.objective, signatures)
+        for fit in (none.best, plain)
+    )
+    return {name: max(gain, without[name]) for name, gain in with_discrepancy.items()}
+
+
+def predicted_gains(
+    problem: FitProblem,
+    candidate: CandidateFit,
+    objective: float,
+    signatures: Sequence[Signature],
+) -> dict[str, float]:
+    """Decrease of an objective by one more effect, linearised at a candidate, by effect name.
+
+    An effect whose size would have an impossible sign gains nothing.
+    """
+    gains = {}
+    for s in signatures:
+        evidence = problem.discrepancy.evidence(
+            candidate.fit, candidate.amplitude, s.column[:, None]
+        )
+        possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
+        value = evidence.value + EFFECT_PENALTY * (len(candidate.names) + 1)
+        gains[s.name] = objective - value if possible else -EFFECT_PENALTY
+    return gains
+
+
+def _fit_level(
+    problem: FitProblem,
+    none: CandidateFit,
+    sets: Mapping[tuple[str, ...], CandidateFit],
+    starts: Starts,
 ) -> list[CandidateFit]:
-    """The candidates, with free shapes where that could bring them close to the best."""
-    fitted: list[CandidateFit] = []
-    lowest = np.inf
-    for candidate in sorted(candidates, key=lambda c: c.objective):
-        bound = candidate.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, candidate)
-        promising = bound < lowest + REJECTION_THRESHOLD
-        result = fit_shapes(problem, candidate) if promising else candidate
-        lowest = min(lowest, result.objective)
-        fitted.append(result)
-    return fitted
+    """Fit sets of effects, each from the candidate that it extends, with free shapes in reach."""
+    requests = []
+    for names, base in sets.items():
+        base = starts.get(names, base)
+        smaller = np.minimum(base.amplitude, none.amplitude)
+        requests.append((names, base.catalogue_law.fit.start_values(), smaller))
+    fitted = fit_candidates(problem, requests)
+    if not fitted:
+        return []
+    lowest = min(none.objective, *(c.objective for c in fitted))
+    promising = [
+        c
+        for c in fitted
+        if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
+        or c.objective < lowest + WITHIN_REACH
+    ]
+    shaped = {c.names: c for c in fit_shapes(problem, promising)}
+    return [shaped.get(c.names, c) for c in fitted]
 
 
 def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> ResidualTest:
@@ -212,49 +211,31 @@ def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> 
     return residual_test(problem, fit, signatures, seed)
 
 
-def _drop_effects(
-    problem: FitProblem, best: CandidateFit, fitted: dict[tuple[str, ...], CandidateFit]
-) -> CandidateFit | None:
-    """A smaller set that explains the data nearly as well; None where every effect is needed."""
-    smallest = None
-    while len(best.names) > 1:
-        subsets = [tuple(n for n in best.names if n != out) for out in best.names]
-        for names in subsets:
-            if names not in fitted:
-                candidate = fit_candidate(problem, names, best.catalogue_fit.start_values())
-                fitted[names] = _with_free_shapes(problem, [candidate])[0]
-        least = min((fitted[names] for names in subsets), key=lambda c: c.objective)
-        if least.objective > best.objective + MIN_IMPROVEMENT:
-            break
-        smallest = best = least
-    return smallest
-
-
 def _select_by_gain(gains: Mapping[str, float]) -> list[str]:
     """Effects to fit in full, in order of their predicted gain."""
-    ordered = [n for n in sorted(gains, key=lambda name: -gains[name]) if gains[n] > MIN_GAIN]
+    ordered = sorted(gains, key=lambda name: -gains[name])
     if not ordered:
         return []
     close = [n for n in ordered if gains[n] > gains[ordered[0]] - GAIN_MARGIN]
-    return ordered[: max(MIN_FITTED, len(close))]
+    return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
 
 
-def _add_one_effect(
+def _extensions(
     problem: FitProblem,
     level: Sequence[CandidateFit],
     fitted: Mapping[tuple[str, ...], CandidateFit],
-    starts: Starts,
-) -> list[CandidateFit]:
-    """The best sets of this level, each extended by the effects of largest predicted gain."""
+    lowest: float,
+) -> dict[tuple[str, ...], CandidateFit]:
+    """Sets with one more effect that should increase the evidence, and what they extend."""
     extended: dict[tuple[str, ...], CandidateFit] = {}
-    for candidate in sorted(level, key=lambda c: c.objective)[:EXTENDED_SETS]:
+    in_reach = [c for c in level if c.objective < lowest + WITHIN_REACH]
+    for candidate in sorted(in_reach, key=lambda c: c.objective)[:EXTENDED_SETS]:
         fit = candidate.fit
         others = problem.effects_not_in(fit)
         signatures, _ = effect_signatures(fit.fitted(), problem.readings, others)
-        gains = predicted_gains(problem, fit, signatures)
-        for name in _select_by_gain(gains)[:EXTENSIONS]:
+        gains = predicted_gains(problem, candidate, candidate.objective, signatures)
+        for name in sorted(gains, key=lambda n: -gains[n])[:EXTENSIONS]:
             names = tuple(sorted((*candidate.names, name)))
-            if names not in extended and names not in fitted:
-                start = starts.get(names, candidate.catalogue_fit.start_values())
-                extended[names] = fit_candidate(problem, names, start)
-    return list(extended.values())
+            if gains[name] > MIN_NET_GAIN and names not in fitted and names not in extended:
+                extended[names] = candidate
+    return extended

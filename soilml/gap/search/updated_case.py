@@ -13,11 +13,12 @@ from soilml.numerics.prior import Prior
 PRIOR_HALF_WIDTH = 3.0
 
 
-def updated_case(fit: GapFit) -> Case:
+def updated_case(fit: GapFit, discrepancy: dict[str, float]) -> Case:
     """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
 
     The size of each effect gets a uniform prior of three standard deviations to either side, so
-    that its uncertainty is propagated where the model is used.
+    that its uncertainty is propagated where the model is used. `discrepancy` holds the standard
+    deviations of the smooth discrepancy by column, in the column's unit.
     """
     case, values, stds = fit.fitted(), fit.values(), fit.stds()
     prior = dict(fit.case.prior)

@@ -1,4 +1,4 @@
-"""The verdict: which status the search result supports, and the figures that go with it."""
+"""Figures of a verdict: estimates, separation of effects, and where the model disagrees."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.results import Discrepancy, EstimatedValue, GapReduction, NamedEffect
+from soilml.gap.report_parts import Discrepancy, EstimatedValue, NamedEffect
 from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.statistics.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.score_test import score_test
@@ -21,41 +21,6 @@ from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
-
-#: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
-#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
-#: several adjustable laws together fit almost any data.
-MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
-#: Mean squared whitened residual above which the deviation cannot be one of shape alone.
-MAX_MEAN_SQUARE = 2.0
-#: Fraction of the gap on held-out runs that may remain, where that gap is above the second figure.
-MAX_REMAINING_GAP, MIN_HELD_OUT_GAP = 0.5, 2.0
-
-
-def decide_status(
-    result: SearchResult, naming_obstacles: Sequence[str], runs: GapReduction | None
-) -> str:
-    """The status of a report; see `soilml.gap.results.STATUSES`.
-
-    A candidate is no explanation if its residuals are inconsistent with noise, if its law is far
-    from the catalogue's, or if it does not predict the held-out runs.
-    """
-    if not result.has_gap:
-        return "no-gap"
-    if naming_obstacles:
-        return "not-testable"
-    if not result.accepted or not result.adequate:
-        return "unknown"
-    best = result.accepted[0]
-    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
-    if best.shape_deviation > most or float(np.mean(best.fit.residual**2)) > MAX_MEAN_SQUARE:
-        return "unknown"
-    predicts = runs is None or runs.after - 1.0 <= MAX_REMAINING_GAP * (runs.before - 1.0)
-    if runs is not None and runs.before > MIN_HELD_OUT_GAP and not predicts:
-        return "unknown"
-    if len(result.accepted) > 1:
-        return "class"
-    return "form-open" if best.shape_supported else "named"
 
 
 def soil_estimates(fit: GapFit) -> dict[str, EstimatedValue]:
@@ -79,18 +44,26 @@ def effect_estimates(fit: GapFit, effect: str) -> dict[str, EstimatedValue]:
 
 
 def named_effects(
-    accepted: Sequence[CandidateFit], similarity: SignatureSimilarity
+    accepted: Sequence[CandidateFit], similarity: SignatureSimilarity, posterior: Posterior
 ) -> list[NamedEffect]:
     """The effects of the best candidate, with the effects of the other accepted candidates."""
-    if not accepted:
-        return []
     best = accepted[0]
     alternatives = {n for c in accepted[1:] for n in c.names} - set(best.names)
     effects = []
     for name in best.names:
         snr, rival = similarity.separation(name, _size(best.fit, name))
         estimates = effect_estimates(best.fit, name)
-        effects.append(NamedEffect(name, estimates, tuple(sorted(alternatives)), snr, rival))
+        effects.append(
+            NamedEffect(
+                name,
+                estimates,
+                tuple(sorted(alternatives)),
+                snr,
+                rival,
+                posterior.probability(name),
+                posterior.effect_log_odds(name),
+            )
+        )
     return effects
 
 
@@ -131,14 +104,20 @@ class SignatureSimilarity:
         return float(self.cosine[chosen][:, ~chosen].max())
 
 
-def signature_similarity(problem: FitProblem, fit: GapFit) -> SignatureSimilarity:
-    """Similarity of the catalogue's signatures, computed on the soil of a fit."""
+def signature_similarity(
+    problem: FitProblem, fit: GapFit, amplitude: Floats
+) -> SignatureSimilarity:
+    """Similarity of the catalogue's signatures beside a discrepancy, on the soil of a fit.
+
+    `amplitude` is that of the remaining discrepancy by channel, in usual ones.
+    """
+    whiten = problem.discrepancy.whiten(amplitude)
     values = fit.values()
     soil = {c.path: values[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
     case = problem.case.with_values(soil)
     signatures, _ = effect_signatures(case, problem.readings, problem.effects)
-    columns = problem.covariance.whiten @ np.stack([s.column for s in signatures], axis=1)
-    columns = project_out(columns, fit.jacobian[:, : len(problem.soil)])
+    columns = whiten @ np.stack([s.column for s in signatures], axis=1)
+    columns = project_out(columns, whiten @ fit.derivatives[:, : len(problem.soil)])
     norm = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(norm > 0, norm, 1.0)
     cosine = np.abs(unit.T @ unit)
@@ -156,6 +135,7 @@ def discrepancy_map(problem: FitProblem, fit: GapFit, seed: int) -> list[Discrep
         return []
     std = problem.covariance.std
     columns = np.stack([np.where(r.selected, std, 0.0) for r in parts], axis=1)
+    fit = fit.whitened_by(problem.covariance.whiten)
     test = score_test(
         fit.residual,
         problem.covariance.whiten @ columns,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,13 @@ class GapFit:
     jacobian: Floats  # (m, p) whitened
     objective: float
     converged: bool
+    reading: Floats  # (m,)
+    derivatives: Floats  # (m, p) Jacobian in the readings' unit
+
+    def whitened_by(self, whiten: Floats) -> GapFit:
+        """The same optimum with residuals and Jacobian whitened by another matrix (m, m)."""
+        residual = whiten @ (self.reading - self.prediction)
+        return replace(self, residual=residual, jacobian=whiten @ self.derivatives)
 
     @property
     def precision(self) -> Floats:
@@ -131,8 +138,8 @@ def levenberg_marquardt(
         return np.where(np.isfinite(white), white, INFEASIBLE_RESIDUAL)
 
     x = np.clip(start, lower, upper)
-    y, derivatives = linearise(case, coordinates, x, readings)
-    residual, jacobian = whitened_residual(y), whiten @ np.nan_to_num(derivatives)
+    y, derivatives = _finite_derivatives(case, coordinates, x, readings)
+    residual, jacobian = whitened_residual(y), whiten @ derivatives
     objective, damping, converged = float(objective_of(residual, x)), FIRST_DAMPING, False
     for _ in range(MAX_ITERATIONS):
         descent = jacobian.T @ residual - weight**2 * x  # half the negative gradient
@@ -161,9 +168,28 @@ def levenberg_marquardt(
             continue
         x, objective = trials[best], float(objectives[best])
         damping = max(float(dampings[best]), MIN_DAMPING)
-        y, derivatives = linearise(case, coordinates, x, readings)
-        residual, jacobian = whitened_residual(y), whiten @ np.nan_to_num(derivatives)
+        y, derivatives = _finite_derivatives(case, coordinates, x, readings)
+        residual, jacobian = whitened_residual(y), whiten @ derivatives
         if improvement < max(ENOUGH, SHARE * (objective - len(readings))):
             converged = True
             break
-    return GapFit(case, tuple(coordinates), x, y, residual, jacobian, objective, converged)
+    return GapFit(
+        case,
+        tuple(coordinates),
+        x,
+        y,
+        residual,
+        jacobian,
+        objective,
+        converged,
+        readings.reading,
+        derivatives,
+    )
+
+
+def _finite_derivatives(
+    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
+) -> tuple[Floats, Floats]:
+    """Predictions and Jacobian; derivatives without an equilibrium are zero."""
+    y, derivatives = linearise(case, coordinates, x, readings)
+    return y, np.nan_to_num(derivatives)

@@ -1,0 +1,79 @@
+"""Decision: which status the evidence supports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.law_difference import law_matters
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.search.stepwise import SearchResult
+
+#: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
+#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
+#: several adjustable laws together fit almost any data.
+MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
+#: Probability of the soil alone above which there are no suspects worth a list.
+NO_SUSPECT = 0.5
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The status, the explanations it claims, and the one whose figures are shown.
+
+    `shown` is the first of the claimed explanations or of the suspects; None where nothing is
+    named or suspected.
+    """
+
+    status: str
+    claimed: tuple[CandidateFit, ...]
+    shown: CandidateFit | None
+
+
+def decide(
+    problem: FitProblem,
+    result: SearchResult,
+    naming_obstacles: Sequence[str],
+    disagreements: Sequence[str],
+    runs: GapReduction | None,
+) -> Decision:
+    """The status of a report; see `soilml.gap.results.STATUSES`.
+
+    Parameters
+    ----------
+    naming_obstacles : sequence of str
+        Why these runs cannot identify a cause.
+    disagreements : sequence of str
+        Measurements that disagree with each other, which forbid a verdict without a gap.
+    runs : GapReduction, optional
+        Held-out runs predicted with and without the best explanation.
+    """
+    if not result.has_gap:
+        return Decision("undecided" if disagreements else "no-gap", (), None)
+    likeliest = result.likeliest
+    suspects = likeliest is not None and result.posterior.weight(()) < NO_SUSPECT
+    if naming_obstacles:
+        return (
+            Decision("suspected", (), likeliest) if suspects else Decision("not-testable", (), None)
+        )
+    accepted = result.accepted
+    if not accepted or () in {c.names for c in accepted}:
+        return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
+    best = accepted[0]
+    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
+    if best.shape_deviation > most or not _predicts(runs):
+        return Decision("unknown", (), None)
+    if len(accepted) > 1:
+        return Decision("class", accepted, best)
+    if not result.adequate:
+        return Decision("partly-named", accepted, best)
+    if best.shape_supported and law_matters(problem, best):
+        return Decision("form-open", accepted, best)
+    return Decision("named", accepted, best)
+
+
+def _predicts(runs: GapReduction | None) -> bool:
+    """Whether held-out runs are predicted better than without the explanation."""
+    return runs is None or runs.after <= max(runs.before, 1.0)

@@ -1,0 +1,75 @@
+"""Measurements that disagree with each other: reasons against a verdict without a gap."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.gap.report_parts import decimal
+from soilml.gap.search.cross_validation import region_fold
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.coordinates import linearise
+from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
+from soilml.gap.statistics.reml_covariance import RUN_EFFECT_UNITS
+from soilml.quantities import column
+
+#: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
+#: about 10 % with the usual fifty degrees of freedom of a channel.
+NOISE_SCALED_UP = 1.3
+#: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
+UNUSUAL_RUN_EFFECT = 3.0
+#: Significance level of the test of the region that a fit to the rest predicts.
+REGION_LEVEL = 0.001
+
+
+def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
+    """What disagrees with what although no smooth gap was found; empty where nothing does."""
+    found = []
+    components, readings = problem.covariance.components, problem.readings
+    for name, scale in zip(readings.channels, components.noise_scale, strict=True):
+        if scale >= NOISE_SCALED_UP:
+            found.append(
+                f"readings of {column(name)} scatter {decimal(scale, 2)} times as much as their "
+                "declared noise"
+            )
+    angle = components.friction_angle_std / RUN_EFFECT_UNITS["friction_angle"]
+    bearing = components.bearing_std / RUN_EFFECT_UNITS["bearing"]
+    if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
+        found.append(
+            "runs differ from each other like soils whose friction angle varies by "
+            f"{np.degrees(components.friction_angle_std):.2g} deg and whose bearing strength "
+            f"varies by {components.bearing_std:.0%}"
+        )
+    found += _region(problem, soil)
+    return found
+
+
+def _region(problem: FitProblem, soil: GapFit) -> list[str]:
+    """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
+    from scipy.stats import chi2
+
+    chosen = region_fold(problem.readings)
+    if chosen is None:
+        return []
+    name, out = chosen
+    covariance = problem.covariance
+    rest, inside = ~out, np.ix_(out, out)
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance.matrix[np.ix_(rest, rest)]))
+    try:
+        part = problem.readings.subset(rest)
+        fit = levenberg_marquardt(soil.case, soil.coordinates, part, whiten, soil.x)
+        y, derivatives = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
+    except (InputError, np.linalg.LinAlgError):
+        return []
+    jacobian = derivatives[out]
+    residual = (problem.readings.reading - y)[out]
+    if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
+        return [f"a fit to the rows outside {name} has no equilibrium inside it"]
+    matrix = covariance.matrix[inside] + jacobian @ fit.covariance @ jacobian.T
+    square = float(residual @ np.linalg.solve(matrix, residual))
+    if chi2.sf(square, residual.size) >= REGION_LEVEL:
+        return []
+    return [
+        f"the region {name} is not predicted by a fit to the other rows: mean squared residual "
+        f"{decimal(square / residual.size, 2)} (1 is expected)"
+    ]

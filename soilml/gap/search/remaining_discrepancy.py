@@ -1,0 +1,81 @@
+"""Size and place of the smooth discrepancy that a fit leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.gap.report_parts import RemainingDiscrepancy, decimal
+from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.quantities import column
+
+Floats = NDArray[np.float64]
+
+
+def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
+    r"""Posterior mean of the discrepancy at the readings, (m,), in their unit.
+
+    .. math:: \hat\delta = \Phi T^2 \Phi^T V^{-1} (y - f(\hat x))
+    """
+    process, amplitude = problem.discrepancy.process, marginal.evidence.amplitude
+    if not np.any(amplitude > 0.0):
+        return np.zeros(len(problem.readings))
+    whiten = problem.discrepancy.whiten(amplitude)
+    residual = problem.readings.reading - marginal.fit.prediction
+    weighted = process.columns.T @ (whiten.T @ (whiten @ residual))
+    return np.asarray(process.columns @ (amplitude[process.channel] ** 2 * weighted))
+
+
+def remaining_discrepancy(
+    problem: FitProblem, before: MarginalFit, after: MarginalFit
+) -> dict[str, RemainingDiscrepancy]:
+    """Root mean square discrepancy of each channel beside two fits, by column."""
+    readings, std = problem.readings, problem.covariance.std
+    old, new = posterior_discrepancy(problem, before), posterior_discrepancy(problem, after)
+    found = {}
+    for i, name in enumerate(readings.channels):
+        own = readings.channel == i
+        if not own.any():
+            continue
+        found[column(name)] = RemainingDiscrepancy(
+            unit=_unit(name),
+            before_value=_rms(old[own]),
+            after_value=_rms(new[own]),
+            before_sigma=_rms(old[own] / std[own]),
+            after_sigma=_rms(new[own] / std[own]),
+            description=_largest(new[own], readings.slip[own], readings.load[own], _unit(name)),
+        )
+    return found
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _unit(channel: str) -> str:
+    return {"Nm": "N m"}.get(column(channel).rpartition("_")[2], column(channel).rpartition("_")[2])
+
+
+def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
+    """Where the discrepancy is largest, with its sign; empty where there is none."""
+    i = int(np.argmax(np.abs(values)))
+    if values[i] == 0.0:
+        return ""
+    side = "above" if values[i] > 0.0 else "below"
+    return (
+        f"measured {side} the model by up to {decimal(abs(float(values[i])), 2)} {unit}, "
+        f"at slip {slip[i]:.2f} under {load[i]:.3g} N"
+    )
+
+
+def discrepancy_amplitudes(problem: FitProblem, marginal: MarginalFit) -> dict[str, float]:
+    """Standard deviation of the discrepancy of each channel, by column, in the column's unit.
+
+    Channels without a discrepancy are left out.
+    """
+    std = marginal.evidence.amplitude * problem.discrepancy.process.usual
+    return {
+        column(name): float(value)
+        for name, value in zip(problem.readings.channels, std, strict=True)
+        if value > 0.0
+    }

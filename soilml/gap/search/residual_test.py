@@ -1,0 +1,48 @@
+"""Score test of a fit's residuals against the catalogue and smooth functions together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from soilml.gap.search.candidate_fits import shape_directions
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.statistics.score_test import ScoreTest, score_test
+from soilml.gap.statistics.signatures import Signature
+from soilml.gap.statistics.smooth_basis import smooth_basis
+
+
+@dataclass(frozen=True)
+class ResidualTest:
+    """Score test of a fit's residuals, and the signatures against which they were tested."""
+
+    signatures: tuple[Signature, ...]
+    test: ScoreTest
+
+    @property
+    def p_value(self) -> float:
+        """Family-wise p value of the largest score."""
+        return self.test.family_wise_p
+
+
+def residual_test(
+    problem: FitProblem, fit: GapFit, signatures: Sequence[Signature], seed: int
+) -> ResidualTest:
+    """Test the residuals of a fit against noise and scatter, without any discrepancy.
+
+    All that the coordinates of the fit can explain is projected out, with second-order terms in
+    the laws of its effects; see `soilml.gap.search.candidate_fits.shape_directions`.
+    """
+    whiten = problem.covariance.whiten
+    fit = fit.whitened_by(whiten)
+    smooth = smooth_basis(problem.readings)
+    columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])
+    signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
+    directions = [whiten @ columns for columns in shape_directions(problem, fit)]
+    space = np.column_stack([fit.jacobian, *directions])
+    degrees_of_freedom = problem.covariance.components.degrees_of_freedom
+    test = score_test(fit.residual, columns, space, signs, degrees_of_freedom, seed)
+    return ResidualTest(tuple(signatures), test)

@@ -1,0 +1,202 @@
+"""Marginal likelihood of a fit, with a smooth discrepancy of unknown amplitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.gap.statistics.coordinates import EffectCoordinate, FitCoordinate
+from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
+from soilml.gap.statistics.least_squares import UNIFORM_PRECISION, GapFit
+from soilml.gap.statistics.reml_covariance import Covariance
+
+Floats = NDArray[np.float64]
+
+#: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
+#: about 1.6, which change the evidence by less than 1 near its maximum.
+AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Sweeps over the channels; the amplitudes of different channels depend little on each other.
+SWEEPS = 2
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """-2 ln of a marginal posterior probability, up to a constant that all fits share.
+
+    `amplitude` holds the amplitudes of the discrepancy by channel, in usual ones, at which the
+    evidence is largest.
+    """
+
+    value: float
+    amplitude: Floats
+    step: Floats  # (p,) of the coordinates and further effects to the optimum at that amplitude
+
+
+@dataclass(frozen=True)
+class DiscrepancyModel:
+    """Covariance of the readings, as the sum of noise, scatter and a smooth discrepancy."""
+
+    covariance: Covariance  # of noise and run-to-run scatter
+    process: DiscrepancyProcess
+
+    @cached_property
+    def columns(self) -> Floats:
+        """The functions of the process, whitened by noise and scatter, (m, q)."""
+        return np.asarray(self.covariance.whiten @ self.process.columns)
+
+    @cached_property
+    def _factors(self) -> tuple[Floats, Floats]:
+        """Orthonormal basis (m, q) of the columns, and their coordinates in it (q, q)."""
+        return np.linalg.qr(self.columns)
+
+    @cached_property
+    def _gram(self) -> Floats:
+        return np.asarray(self.columns.T @ self.columns)
+
+    def whiten(self, amplitude: Floats) -> Floats:
+        r"""Matrix (m, m) that whitens noise, scatter and a discrepancy of these amplitudes.
+
+        .. math:: W = [I - Q (I - (I + R T^2 R^T)^{-1/2}) Q^T] W_0
+        """
+        whiten = self.covariance.whiten
+        if not np.any(amplitude > 0.0):
+            return whiten
+        q, r = self._factors
+        scaled = r * amplitude[self.process.channel]
+        value, vector = np.linalg.eigh(scaled @ scaled.T)
+        basis = q @ vector
+        shrink = 1.0 - 1.0 / np.sqrt(1.0 + np.maximum(value, 0.0))
+        return np.asarray(whiten - basis @ (shrink[:, None] * (basis.T @ whiten)))
+
+    def matrix(self, amplitude: Floats) -> Floats:
+        """Covariance (m, m) of the readings from noise, scatter and discrepancy."""
+        scaled = self.process.columns * amplitude[self.process.channel]
+        return np.asarray(self.covariance.matrix + scaled @ scaled.T)
+
+    def evidence(
+        self, fit: GapFit, start: Floats | None = None, extra: Floats | None = None
+    ) -> Evidence:
+        r"""Evidence of a fit by Laplace's approximation, at the best amplitudes of discrepancy.
+
+        .. math::
+            -2 \ln p = r^T V^{-1} r - g^T H^{-1} g + \ln|V| + \ln|H| - 2 \ln p(x) - 2 \ln p(\tau),
+            \quad H = X^T V^{-1} X + P
+
+        with the residual r, the Jacobian X and the priors' precision P. The second term is the
+        improvement by a step to the optimum under V, where the fit was made under another one.
+
+        Parameters
+        ----------
+        start : array (channels,), optional
+            Amplitudes at which the search begins.
+        extra : array (m, k), optional
+            Signatures of further effects, in the readings' unit per reference size, which are
+            treated as linear.
+
+        References
+        ----------
+        MacKay, Neural Computation 4, 1992, eq. 2.4.
+        """
+        problem = _linearised(self, fit, extra)
+        amplitude = np.zeros(len(self.process.usual)) if start is None else start.copy()
+        value = np.inf
+        for _ in range(SWEEPS):
+            before = value
+            for i in range(len(amplitude)):
+                trials = np.tile(amplitude, (len(AMPLITUDES), 1))
+                trials[:, i] = AMPLITUDES
+                values = problem.values(trials)
+                best = int(np.argmin(values))
+                value, amplitude = float(values[best]), trials[best]
+            if before - value < 0.1:
+                break
+        return Evidence(value, amplitude, problem.steps(amplitude[None, :])[0])
+
+
+@dataclass(frozen=True)
+class _Linearised:
+    """A fit's neighbourhood as a linear model, reduced to products with the process."""
+
+    gram: Floats  # (q, q) of the process
+    cross: Floats  # (q, p + 1) of the process with Jacobian and residual
+    plain: Floats  # (p + 1, p + 1) of Jacobian and residual
+    precision: Floats  # (p,)
+    x: Floats  # (p,)
+    movable: NDArray[np.bool_]  # (p,) not at a bound
+    constant: float  # -2 ln prior density of the coordinates
+    channel: NDArray[np.int64]  # (q,)
+
+    def values(self, amplitudes: Floats) -> Floats:
+        """Evidence (b,) at amplitudes (b, channels)."""
+        return self._solve(amplitudes)[0]
+
+    def steps(self, amplitudes: Floats) -> Floats:
+        """Steps (b, p) to the optimum at amplitudes (b, channels)."""
+        return self._solve(amplitudes)[1]
+
+    def _solve(self, amplitudes: Floats) -> tuple[Floats, Floats]:
+        t = amplitudes[:, self.channel]  # (b, q)
+        m = np.eye(len(self.channel)) + t[:, :, None] * self.gram * t[:, None, :]
+        factor = np.linalg.cholesky(m)
+        reduced = np.linalg.solve(factor, t[:, :, None] * self.cross)
+        product = self.plain - np.swapaxes(reduced, 1, 2) @ reduced  # (b, p + 1, p + 1)
+        p = len(self.x)
+        h = product[:, :p, :p] + np.diag(self.precision)
+        gradient = np.where(self.movable, product[:, :p, p] - self.precision * self.x, 0.0)
+        both = self.movable[:, None] & self.movable
+        inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
+        step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient
+        value = product[:, p, p] - (gradient * step).sum(axis=1)
+        value += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        if p:
+            value += np.linalg.slogdet(h)[1]
+        return value + self.constant + amplitude_prior(amplitudes), step
+
+
+def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _Linearised:
+    whiten = model.covariance.whiten
+    added = np.zeros((len(fit.reading), 0)) if extra is None else extra
+    jacobian = whiten @ np.column_stack([fit.derivatives, added])
+    block = np.column_stack([jacobian, whiten @ (fit.reading - fit.prediction)])
+    precision, constant = zip(
+        *[_prior(c, float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)], strict=True
+    )
+    k = added.shape[1]
+    lower = np.asarray([c.lower for c in fit.coordinates])
+    upper = np.asarray([c.upper for c in fit.coordinates])
+    movable = (fit.x > lower) & (fit.x < upper)
+    return _Linearised(
+        gram=model._gram,
+        cross=model.columns.T @ block,
+        plain=block.T @ block,
+        precision=np.concatenate([precision, np.full(k, 2.0)]),
+        x=np.concatenate([fit.x, np.zeros(k)]),
+        movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
+        constant=float(np.sum(constant)) - k * np.log(2.0),
+        channel=model.process.channel,
+    )
+
+
+def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float]:
+    r"""Precision of a coordinate's prior at x, and -2 ln of its density.
+
+    A soil coordinate is uniform. A size or shape with a standard deviation is Gaussian. The size of
+    a physical effect has the Cauchy density with a scale of one reference size, because sizes of
+    several reference sizes occur; 2 / (1 + x^2) is the precision of the Gaussian scale mixture that
+    has the same slope at x. Densities are normalised so that a coordinate that the data do not
+    determine leaves the evidence unchanged.
+    """
+    if not isinstance(coordinate, EffectCoordinate):
+        return UNIFORM_PRECISION, 0.0
+    if np.isfinite(coordinate.std):
+        precision = coordinate.std**-2
+        return precision, precision * x**2 - float(np.log(precision))
+    return 2.0 / (1.0 + x**2), 2.0 * float(np.log1p(x**2)) - float(np.log(2.0))
+
+
+def amplitude_prior(amplitudes: Floats) -> Floats:
+    """-2 ln of the prior density of the amplitudes (b, channels), summed over channels, (b,)."""
+    return np.asarray(2.0 * np.log1p(amplitudes**2).sum(axis=-1))
