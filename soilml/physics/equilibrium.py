@@ -11,7 +11,7 @@ from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase
-from soilml.physics.sinkage_search import first_equilibrium
+from soilml.physics.sinkage_search import SinkageEstimate, first_equilibrium
 
 #: Relative step in sinkage of the central difference for dW/dz. Its truncation error is of the
 #: order of the step squared, and an error in the slope of a Newton step only scales its derivative.
@@ -22,18 +22,22 @@ def sensor_readings(load_case: LoadCase) -> Force:
     """Forces at equilibrium as the sensors report them; arrays (batch,)."""
     force = equilibrium_forces(load_case)
     true_case = apply_input_effects(load_case)
-    return _without_unsolved(apply_stage(load_case.effects, "on_reading", force, true_case))
+    return without_unsolved(apply_stage(load_case.effects, "on_reading", force, true_case))
 
 
-def equilibrium_forces(load_case: LoadCase) -> Force:
-    """Forces at the smallest sinkage at which the soil carries the load; arrays (batch,)."""
+def equilibrium_forces(load_case: LoadCase, estimate: SinkageEstimate | None = None) -> Force:
+    """Forces at the smallest sinkage at which the soil carries the load; arrays (batch,).
+
+    From an estimate of the sinkage the search is shorter. Its answer is the same within
+    `soilml.physics.sinkage_search.LOAD_TOLERANCE`, and not to the last bit.
+    """
     load_case = apply_input_effects(load_case)
     parameters = list(values(load_case).values())
     with no_gradient(parameters):
-        force = first_equilibrium(load_case)
+        force = first_equilibrium(load_case, estimate)
     if requires_gradient(parameters):
         force = _with_gradients(load_case, force)
-    return _without_unsolved(force)
+    return without_unsolved(force)
 
 
 def _with_gradients(load_case: LoadCase, force: Force) -> Force:
@@ -56,7 +60,7 @@ def _with_gradients(load_case: LoadCase, force: Force) -> Force:
     return replace(forces_at_sinkage(load_case, z - step), status=force.status)
 
 
-def _without_unsolved(force: Force) -> Force:
+def without_unsolved(force: Force) -> Force:
     """The forces with NaN in every row that has no equilibrium."""
     xp = namespace(force.load)
     solved = force.status == 0

@@ -89,7 +89,7 @@ class Model:
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = _in_chunks(load_case, sensor_readings)
+            force = in_chunks(load_case, sensor_readings)
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
@@ -108,7 +108,7 @@ class Model:
         load_case, shape = self._load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):
-            sinkage = _in_chunks(
+            sinkage = in_chunks(
                 load_case, equilibrium_forces
             ).sinkage  # the true one, without sensor errors
             angle, stresses = stress_profile(load_case, sinkage, points)
@@ -152,11 +152,12 @@ def _float64(value: Real, xp: Any, device: Any) -> Array:
     return xp.asarray(value, dtype=xp.float64, device=device)
 
 
-def _in_chunks(load_case: LoadCase, solve: Callable[[LoadCase], Force]) -> Force:
+def in_chunks(load_case: LoadCase, solve: Callable[..., Force], *columns: Array) -> Force:
     """The forces of all rows, solved in chunks of driving and of braking rows.
 
     Driving and braking (by the true slip) are kept apart, because their contacts are discretised
-    differently.
+    differently. `solve` takes the load case of some rows and those rows of each of the `columns`,
+    arrays (batch,).
     """
     xp = namespace(load_case.at.slip)
     at = apply_stage(load_case.effects, "on_operating", load_case.at, load_case)
@@ -166,8 +167,10 @@ def _in_chunks(load_case: LoadCase, solve: Callable[[LoadCase], Force]) -> Force
     for group in (xp.nonzero(~braking)[0], xp.nonzero(braking)[0]):
         for start in range(0, group.shape[0], CHUNK):
             index = group[start : min(start + CHUNK, group.shape[0])]
-            whole = index.shape[0] == size
-            parts.append(solve(load_case if whole else rows(load_case, index)))
+            if index.shape[0] == size:
+                parts.append(solve(load_case, *columns))
+            else:
+                parts.append(solve(rows(load_case, index), *(c[index] for c in columns)))
             order.append(index)
     if not parts:
         nothing: dict[str, Array] = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
@@ -52,17 +52,25 @@ REFINEMENTS, REFINED_INTERVALS = 2, 16
 PEAK_BRACKET = 1e-3
 
 
-def first_equilibrium(load_case: LoadCase) -> Force:
+@dataclass(frozen=True)
+class SinkageEstimate:
+    """Where a search for equilibrium may start, arrays (batch,); NaN in rows that are not known."""
+
+    log_sinkage: Array  # ln(z / m)
+    slope: Array  # d ln W / d ln z, of the load that the soil carries
+
+
+def first_equilibrium(load_case: LoadCase, estimate: SinkageEstimate | None = None) -> Force:
     """Forces at the smallest sinkage that carries the load; rows without one by their status."""
     xp = namespace(load_case.at.load)
-    force, solved = _solve_by_secant(load_case)
+    force, solved = _solve_by_secant(load_case, estimate)
     if not bool(xp.all(solved)):
         unsolved = xp.nonzero(~solved)[0]
-        force = _merge_rows(force, solved, _solve_by_scan(rows(load_case, unsolved)))
+        force = merge_rows(force, solved, _solve_by_scan(rows(load_case, unsolved)))
     return force
 
 
-def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
+def _solve_by_secant(load_case: LoadCase, estimate: SinkageEstimate | None) -> tuple[Force, Array]:
     """Forces at the root that secant steps reach, and which rows need no further search."""
     xp = namespace(load_case.at.load)
     soil, at, gear = load_case.soil, load_case.at, load_case.gear
@@ -70,6 +78,10 @@ def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
     initial = xp.log(gear.initial_sinkage(soil, at))
     initial = xp.where(initial < largest - INITIAL_MARGIN, initial, largest - INITIAL_MARGIN)
     power = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
+    if estimate is not None:
+        known = xp.isfinite(estimate.log_sinkage) & (estimate.slope > 0)
+        initial = xp.where(known, xp.minimum(estimate.log_sinkage, largest), initial)
+        power = xp.where(known, estimate.slope, power)
     smallest = largest + math.log(SMALLEST_FRACTION)
     force, balanced, slope = _root_between(load_case, smallest, largest, initial, power)
     return force, balanced & ~_earlier_equilibrium_possible(load_case, force, slope)
@@ -197,7 +209,7 @@ def _log_load_ratio(load_case: LoadCase) -> Callable[[Array], Array]:
     return log_ratio
 
 
-def _merge_rows(force: Force, keep: Array, others: Force) -> Force:
+def merge_rows(force: Force, keep: Array, others: Force) -> Force:
     """`force` where `keep`, and the rows of `others`, in order, elsewhere."""
     xp = namespace(force.load)
     size = keep.shape[0]

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.batched_predictions import (
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
 from soilml.identification.free_parameters import FreeParameter
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
@@ -18,9 +24,6 @@ from soilml.physics.effects.base import Effect
 
 Floats = NDArray[np.float64]
 
-#: Step of the difference quotients, in units of the coordinate: a fraction of a soil parameter's
-#: prior range, or of an effect's reference size.
-DIFFERENCE_STEP = 1e-5
 #: Prior standard deviations of an effect's two shape coefficients, in their own units.
 SHAPE_STD = {"by_slip": 3.0, "by_load": 1.0}
 
@@ -127,26 +130,17 @@ def predict_readings(
     case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
 ) -> Floats:
     """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
-    values = {c.path: c.value(x[:, i])[:, None] for i, c in enumerate(coordinates)}
-    changed = case.with_values(values) if values else case
-    force = changed.model(changed.soil, readings.at)
-    shape = (len(x), len(readings.run))
-    return readings.stack(
-        {name: np.broadcast_to(getattr(force, name), shape) for name in readings.channels}
-    )
+    (prediction,) = predict_many([PredictionRequest(case, coordinates, x, readings)])
+    if isinstance(prediction, InputError):
+        raise prediction
+    return prediction
 
 
 def linearise(
     case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
 ) -> tuple[Floats, Floats]:
-    """Predictions (m,) at `x` (p,) and their Jacobian (m, p), from one call of the model.
-
-    One-sided differences; the step points downwards for a coordinate at its upper bound.
-    """
-    p = len(coordinates)
-    upper = np.asarray([coordinate.upper for coordinate in coordinates])
-    step = np.where(x + DIFFERENCE_STEP <= upper, DIFFERENCE_STEP, -DIFFERENCE_STEP)
-    sets = np.tile(x, (p + 1, 1))
-    sets[np.arange(p), np.arange(p)] += step
-    y = predict_readings(case, coordinates, sets, readings)
-    return y[-1], np.asarray(((y[:-1] - y[-1]) / step[:, None]).T)
+    """Predictions (m,) at `x` (p,) and their Jacobian (m, p); see `linearise_many`."""
+    (found,) = linearise_many([PredictionRequest(case, coordinates, x[None, :], readings)])
+    if isinstance(found, InputError):
+        raise found
+    return found.prediction, found.jacobian

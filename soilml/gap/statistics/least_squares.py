@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.coordinates import (
-    FitCoordinate,
-    SoilCoordinate,
-    linearise,
-    predict_readings,
+from soilml.gap.statistics.batched_predictions import (
+    Linearisation,
+    PredictionRequest,
+    linearise_many,
+    predict_many,
 )
+from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
+from soilml.physics.sinkage_search import SinkageEstimate
 
 Floats = NDArray[np.float64]
 
@@ -104,6 +108,21 @@ class GapFit:
         return self.case.with_values(self.values())
 
 
+@dataclass(frozen=True)
+class FitRequest:
+    """A descent to be made: its model, coordinates and data, and where it starts.
+
+    `whiten`, (m, m), is the inverse of the Cholesky factor L of the covariance of the readings;
+    `start`, (p,), are the first coordinates, clipped to the bounds.
+    """
+
+    case: Case
+    coordinates: Sequence[FitCoordinate]
+    readings: StackedReadings
+    whiten: Floats
+    start: Floats
+
+
 def levenberg_marquardt(
     case: Case,
     coordinates: Sequence[FitCoordinate],
@@ -111,85 +130,167 @@ def levenberg_marquardt(
     whiten: Floats,
     start: Floats,
 ) -> GapFit:
-    r"""Bounded Levenberg-Marquardt descent from one start.
+    """Bounded Levenberg-Marquardt descent from one start; see `descend_together`.
+
+    Raises
+    ------
+    InputError
+        Where the model refuses the coordinates of a trial.
+    """
+    (fit,) = descend_together([FitRequest(case, coordinates, readings, whiten, start)])
+    if isinstance(fit, InputError):
+        raise fit
+    return fit
+
+
+def descend_together(requests: Sequence[FitRequest]) -> list[GapFit | InputError]:
+    r"""Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
 
     .. math:: \min_x \|L^{-1} (y - f(x))\|^2 + \sum_k (x_k / \sigma_k)^2
 
-    Parameters
-    ----------
-    whiten : array (m, m)
-        Inverse of the Cholesky factor L of the covariance of the readings.
-    start : array (p,)
-        First coordinates; clipped to the bounds.
+    The descents are independent; the result of each is that of a descent alone, within the
+    tolerance of the search for equilibrium. Where the model refuses the coordinates of a trial, its
+    `InputError` takes the place of the fit.
 
     References
     ----------
     Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
+    results: dict[int, GapFit | InputError] = {}
+    descents = [_descent(request) for request in requests]
+    asked = {i: next(descent) for i, descent in enumerate(descents)}
+    while asked:
+        for i, answer in _answers(asked).items():
+            if isinstance(answer, InputError):
+                results[i] = answer
+                del asked[i]
+                continue
+            try:
+                asked[i] = descents[i].send(answer)
+            except StopIteration as end:
+                results[i] = end.value
+                del asked[i]
+    return [results[i] for i in range(len(requests))]
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What a descent asks of the model: predictions, or a linearisation."""
+
+    request: PredictionRequest
+    linearise: bool
+
+
+#: A descent: asks questions, is sent the answers, and returns its fit.
+_Descent: TypeAlias = Generator[_Question, Any, GapFit]
+
+
+def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation | InputError]:
+    """The answers to the questions of all descents."""
+    answers: dict[int, Floats | Linearisation | InputError] = {}
+    for linearised, answer in ((False, predict_many), (True, linearise_many)):
+        these = [i for i, question in asked.items() if question.linearise == linearised]
+        found = answer([asked[i].request for i in these])
+        answers |= dict(zip(these, found, strict=True))
+    return answers
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """A point of a descent."""
+
+    x: Floats  # (p,)
+    model: Linearisation
+    residual: Floats  # (m,) whitened
+    jacobian: Floats  # (m, p) whitened
+    objective: float
+
+
+def _descent(request: FitRequest) -> _Descent:
+    """One descent; see `descend_together`.
+
+    Trials start at the sinkage that the last iterate predicts. An iterate is solved by the full
+    search; it is no improvement where that finds an equilibrium before the one of the trial.
+    """
+    coordinates, readings = tuple(request.coordinates), request.readings
     lower = np.asarray([c.lower for c in coordinates])
     upper = np.asarray([c.upper for c in coordinates])
     weight = np.asarray([1.0 / c.std for c in coordinates])
 
-    def objective_of(residual: Floats, x: Floats) -> Floats:
-        return np.asarray((residual**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
-
     def whitened_residual(y: Floats) -> Floats:
-        white = (readings.reading - y) @ whiten.T
+        white = (readings.reading - y) @ request.whiten.T
         return np.where(np.isfinite(white), white, INFEASIBLE_RESIDUAL)
 
-    x = np.clip(start, lower, upper)
-    y, derivatives = _finite_derivatives(case, coordinates, x, readings)
-    residual, jacobian = whitened_residual(y), whiten @ derivatives
-    objective, damping, converged = float(objective_of(residual, x)), FIRST_DAMPING, False
+    def objectives(residual: Floats, x: Floats) -> Floats:
+        return np.asarray((residual**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
+
+    def asked(x: Floats, sinkage: SinkageEstimate | None) -> PredictionRequest:
+        return PredictionRequest(request.case, coordinates, x, readings, sinkage)
+
+    def iterate(x: Floats, model: Linearisation) -> _Iterate:
+        residual = whitened_residual(model.prediction)
+        jacobian = request.whiten @ np.nan_to_num(model.jacobian)
+        return _Iterate(x, model, residual, jacobian, float(objectives(residual, x)))
+
+    x = np.clip(request.start, lower, upper)
+    last = iterate(x, (yield _Question(asked(x[None, :], None), linearise=True)))
+    damping, converged = FIRST_DAMPING, False
     for _ in range(MAX_ITERATIONS):
-        descent = jacobian.T @ residual - weight**2 * x  # half the negative gradient
-        at_bound = ((x <= lower) & (descent < 0)) | ((x >= upper) & (descent > 0))
-        if at_bound.all():
+        dampings = damping * np.asarray(DAMPING_FACTORS)
+        trials = _trial_points(last, lower, upper, weight, dampings)
+        if trials is None:
             converged = True
             break
-        free = ~at_bound
-        normal = jacobian[:, free].T @ jacobian[:, free] + np.diag(weight[free] ** 2)
-        scale = np.diag(np.diag(normal) + 1e-9)
-        dampings = damping * np.asarray(DAMPING_FACTORS)
-        trials = np.tile(x, (len(dampings), 1))
-        for i, d in enumerate(dampings):
-            trials[i, free] += np.linalg.solve(normal + d * scale, descent[free])
-        trials = np.clip(trials, lower, upper)
-        predictions = predict_readings(case, coordinates, trials, readings)
-        objectives = objective_of(whitened_residual(predictions), trials)
-        best = int(np.argmin(objectives))
-        improvement = objective - float(objectives[best])
+        sinkage = last.model.sinkage_at(trials - last.x)
+        predictions = yield _Question(asked(trials, sinkage), linearise=False)
+        trial_objectives = objectives(whitened_residual(predictions), trials)
+        best = int(np.argmin(trial_objectives))
+        improvement = last.objective - float(trial_objectives[best])
+        if improvement > 0.0:
+            x = trials[best]
+            sinkage = last.model.sinkage_at((x - last.x)[None, :])
+            new = iterate(x, (yield _Question(asked(x[None, :], sinkage), linearise=True)))
+            improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
-            converged = float(np.abs(trials[-1] - x).max()) < 1e-3
+            converged = float(np.abs(trials[-1] - last.x).max()) < 1e-3
             damping *= DAMPING_INCREASE
             if converged or damping > MAX_DAMPING:
                 break
             continue
-        x, objective = trials[best], float(objectives[best])
+        last = new
         damping = max(float(dampings[best]), MIN_DAMPING)
-        y, derivatives = _finite_derivatives(case, coordinates, x, readings)
-        residual, jacobian = whitened_residual(y), whiten @ derivatives
-        if improvement < max(ENOUGH, SHARE * (objective - len(readings))):
+        if improvement < max(ENOUGH, SHARE * (last.objective - len(readings))):
             converged = True
             break
     return GapFit(
-        case,
-        tuple(coordinates),
-        x,
-        y,
-        residual,
-        jacobian,
-        objective,
+        request.case,
+        coordinates,
+        last.x,
+        last.model.prediction,
+        last.residual,
+        last.jacobian,
+        last.objective,
         converged,
         readings.reading,
-        derivatives,
+        np.nan_to_num(last.model.jacobian),
     )
 
 
-def _finite_derivatives(
-    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
-) -> tuple[Floats, Floats]:
-    """Predictions and Jacobian; derivatives without an equilibrium are zero."""
-    y, derivatives = linearise(case, coordinates, x, readings)
-    return y, np.nan_to_num(derivatives)
+def _trial_points(
+    last: _Iterate, lower: Floats, upper: Floats, weight: Floats, dampings: Floats
+) -> Floats | None:
+    """Where steps of each damping lead, (dampings, p); None where every bound holds the descent."""
+    descent = last.jacobian.T @ last.residual - weight**2 * last.x  # half the negative gradient
+    at_lower, at_upper = (last.x <= lower) & (descent < 0), (last.x >= upper) & (descent > 0)
+    free = ~(at_lower | at_upper)
+    if not free.any():
+        return None
+    jacobian = last.jacobian[:, free]
+    normal = jacobian.T @ jacobian + np.diag(weight[free] ** 2)
+    scale = np.diag(np.diag(normal) + 1e-9)
+    trials = np.tile(last.x, (len(dampings), 1))
+    trials[:, free] += np.linalg.solve(
+        normal + dampings[:, None, None] * scale, descent[free][:, None]
+    )[..., 0]
+    return np.clip(trials, lower, upper)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
-from soilml.gap.statistics.coordinates import predict_readings, size_coordinate
+from soilml.gap.statistics.batched_predictions import PredictionRequest, predict_many
+from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 
@@ -65,32 +66,40 @@ def effect_signatures(
 
     An effect that the case has already is changed from its present size, which may be wrong.
     """
-    base = predict_readings(case, [], np.zeros((1, 0)), readings)[0]
-    signatures, untestable = [], []
+    requests = [PredictionRequest(case, [], np.zeros((1, 0)), readings)]
+    reasons: dict[str, str] = {}
+    changes: dict[str, tuple[EffectCoordinate, float, float]] = {}
     for name, effect in effects.items():
         if reason := _missing_covariate(effect, readings):
-            untestable.append(Untestable(name, reason))
+            reasons[name] = reason
             continue
         size = size_coordinate(effect, None)
         at = current_size(case, size.path, size.prior.upper)
         step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
         try:
             changed = with_effect(case, effect)
-            moved = predict_readings(changed, [size], np.asarray([[at + step]]), readings)[0]
         except InputError as error:
-            untestable.append(Untestable(name, str(error)))
+            reasons[name] = str(error)
             continue
-        column = (moved - base) / step
+        changes[name] = size, at, step
+        requests.append(PredictionRequest(changed, [size], np.asarray([[at + step]]), readings))
+    base, *moved = predict_many(requests)
+    if isinstance(base, InputError):
+        raise base
+    signatures = []
+    for (name, (size, at, step)), prediction in zip(changes.items(), moved, strict=True):
+        if isinstance(prediction, InputError):
+            reasons[name] = str(prediction)
+            continue
+        column = (prediction[0] - base[0]) / step
         if not np.isfinite(column).all():
-            reason = "with it, the model has no equilibrium in some row"
-            untestable.append(Untestable(name, reason))
-            continue
-        if not np.any(np.abs(column) > MIN_CHANGE * readings.std):
-            untestable.append(Untestable(name, "it changes no measured quantity"))
-            continue
-        sign = 0 if size.lower < at < size.upper else int(np.sign(step))
-        signatures.append(Signature(name, effect.about.kind, column, sign))
-    return signatures, untestable
+            reasons[name] = "with it, the model has no equilibrium in some row"
+        elif not np.any(np.abs(column) > MIN_CHANGE * readings.std):
+            reasons[name] = "it changes no measured quantity"
+        else:
+            sign = 0 if size.lower < at < size.upper else int(np.sign(step))
+            signatures.append(Signature(name, effects[name].about.kind, column, sign))
+    return signatures, [Untestable(name, reasons[name]) for name in effects if name in reasons]
 
 
 def _missing_covariate(effect: type[Effect], readings: StackedReadings) -> str:

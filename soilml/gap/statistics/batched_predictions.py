@@ -1,0 +1,202 @@
+"""Predictions and derivatives of several cases, from few calls of the physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from graphlib import CycleError
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.joined_cases import CaseSets, join_key, joined_load_case
+from soilml.physics.contact import Force
+from soilml.physics.equilibrium import sensor_readings
+from soilml.physics.linear_response import linear_response
+from soilml.physics.model import in_chunks
+from soilml.physics.nearby_equilibrium import readings_near
+from soilml.physics.sinkage_search import SinkageEstimate
+
+if TYPE_CHECKING:
+    from soilml.gap.statistics.coordinates import FitCoordinate
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+#: Step of the difference quotients, in units of the coordinate: a fraction of a soil parameter's
+#: prior range, or of an effect's reference size.
+DIFFERENCE_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class PredictionRequest:
+    """The readings that a case predicts at sets of coordinates, x (sets, p).
+
+    `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
+    see `soilml.physics.nearby_equilibrium`.
+    """
+
+    case: Case
+    coordinates: Sequence[FitCoordinate]
+    x: Floats
+    readings: StackedReadings
+    estimate: SinkageEstimate | None = None
+
+    def case_sets(self, x: Floats) -> CaseSets:
+        """The case at coordinates x (sets, p)."""
+        values = {c.path: c.value(x[:, i]) for i, c in enumerate(self.coordinates)}
+        return CaseSets(self.case, len(x), values, self.readings.at)
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Predictions of m readings at coordinates x (p,), and their first-order changes."""
+
+    prediction: Floats  # (m,)
+    jacobian: Floats  # (m, p)
+    log_sinkage: Floats  # (n,) logarithm of the sinkage in m
+    log_sinkage_rate: Floats  # (p, n)
+    slope: Floats  # (n,), d ln W / d ln z
+
+    def sinkage_at(self, change: Floats) -> SinkageEstimate:
+        """Sinkage (sets, n) where the coordinates have changed by `change` (sets, p)."""
+        log_sinkage = self.log_sinkage + change @ self.log_sinkage_rate
+        return SinkageEstimate(log_sinkage, np.broadcast_to(self.slope, log_sinkage.shape))
+
+
+def predict_many(requests: Sequence[PredictionRequest]) -> list[Floats | InputError]:
+    """Predictions (sets, m) of each request; NaN where there is no equilibrium.
+
+    A request whose values the model refuses has the `InputError` in place of predictions.
+    """
+    return _answered(requests, _predict_joined)
+
+
+def linearise_many(requests: Sequence[PredictionRequest]) -> list[Linearisation | InputError]:
+    """Linearisations at the one set of coordinates, x (1, p), of each request.
+
+    One-sided differences at the sinkage of the equilibrium at x; see
+    `soilml.physics.linear_response`. The step points downwards for a coordinate at its upper
+    bound. A reading without equilibrium is NaN, and so are its derivatives. An `InputError` is
+    returned as by `predict_many`.
+    """
+    found = _answered(requests, _linearise_joined)
+    return [
+        one if isinstance(one, InputError) else _with_derivatives(request, one)
+        for request, one in zip(requests, found, strict=True)
+    ]
+
+
+def _answered(
+    requests: Sequence[PredictionRequest],
+    answer: Callable[[Sequence[PredictionRequest]], list[T]],
+) -> list[T | InputError]:
+    """Answers to all requests, those that can be joined together; else one by one."""
+    groups: dict[object, list[int]] = {}
+    for i, request in enumerate(requests):
+        key = join_key(request.case_sets(request.x)), request.estimate is None
+        groups.setdefault(key, []).append(i)
+    answers: dict[int, T | InputError] = {}
+    for group in groups.values():
+        try:
+            found = answer([requests[i] for i in group])
+            answers |= dict(zip(group, found, strict=True))
+        except (InputError, CycleError):
+            for i in group:
+                alone = _answer_one(requests[i], answer)
+                answers[i] = alone
+    return [answers[i] for i in range(len(requests))]
+
+
+def _predict_joined(requests: Sequence[PredictionRequest]) -> list[Floats]:
+    parts = [request.case_sets(request.x) for request in requests]
+    load_case = joined_load_case(parts)
+    with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
+        if requests[0].estimate is None:
+            force = in_chunks(load_case, sensor_readings)
+        else:
+            force = readings_near(load_case, _joined_estimate(requests))
+    predictions, start = [], 0
+    for request, part in zip(requests, parts, strict=True):
+        size = part.sets * part.points
+        predictions.append(_stacked(request.readings, force, slice(start, start + size)))
+        start += size
+    return predictions
+
+
+def _linearise_joined(requests: Sequence[PredictionRequest]) -> list[Linearisation]:
+    steps = [_difference_steps(request) for request in requests]
+    parts, base, start = [], [], 0
+    for request, step in zip(requests, steps, strict=True):
+        part = request.case_sets(np.concatenate([request.x, request.x + np.diag(step)]))
+        base.append(start + np.tile(np.arange(part.points), part.sets))
+        start += part.sets * part.points
+        parts.append(part)
+    estimate = _joined_estimate(requests) if requests[0].estimate is not None else None
+    response = linear_response(joined_load_case(parts), np.concatenate(base), estimate)
+    linearisations, start = [], 0
+    for request, part, step in zip(requests, parts, steps, strict=True):
+        rows = slice(start, start + part.sets * part.points)
+        y = _stacked(request.readings, response.reading, rows)
+        log_sinkage = response.sinkage.log_sinkage[rows].reshape(part.sets, part.points)
+        linearisations.append(
+            Linearisation(
+                prediction=y[0],
+                jacobian=np.asarray(((y[1:] - y[0]) / step[:, None]).T),
+                log_sinkage=log_sinkage[0],
+                log_sinkage_rate=(log_sinkage[1:] - log_sinkage[0]) / step[:, None],
+                slope=response.sinkage.slope[rows][: part.points],
+            )
+        )
+        start = rows.stop
+    return linearisations
+
+
+def _with_derivatives(request: PredictionRequest, found: Linearisation) -> Linearisation:
+    """The linearisation with difference quotients of predictions where it has no derivatives.
+
+    The load carried does not rise with sinkage at every equilibrium that the search accepts.
+    """
+    if not np.any(np.isfinite(found.prediction) & ~np.isfinite(found.jacobian.sum(axis=1))):
+        return found
+    step = _difference_steps(request)
+    sets = replace(request, x=request.x + np.diag(step), estimate=None)
+    (moved,) = _predict_joined([sets])
+    return replace(found, jacobian=((moved - found.prediction) / step[:, None]).T)
+
+
+def _difference_steps(request: PredictionRequest) -> Floats:
+    """The step of each coordinate, (p,), away from an upper bound that is near."""
+    upper = np.asarray([coordinate.upper for coordinate in request.coordinates])
+    return np.where(request.x[0] + DIFFERENCE_STEP <= upper, DIFFERENCE_STEP, -DIFFERENCE_STEP)
+
+
+def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate:
+    estimates = [request.estimate for request in requests if request.estimate is not None]
+    return SinkageEstimate(
+        np.concatenate([np.ravel(estimate.log_sinkage) for estimate in estimates]),
+        np.concatenate([np.ravel(estimate.slope) for estimate in estimates]),
+    )
+
+
+def _stacked(readings: StackedReadings, force: Force, rows: slice) -> Floats:
+    """Readings (sets, m) from the forces of these rows."""
+    points = np.size(readings.at.slip)
+    channels = {
+        name: np.asarray(getattr(force, name))[rows].reshape(-1, points)
+        for name in readings.channels
+    }
+    return readings.stack(channels)
+
+
+def _answer_one(
+    request: PredictionRequest, answer: Callable[[Sequence[PredictionRequest]], list[T]]
+) -> T | InputError:
+    try:
+        return answer([request])[0]
+    except InputError as error:
+        return error

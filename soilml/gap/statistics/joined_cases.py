@@ -1,0 +1,118 @@
+"""Several cases, each with sets of values and operating points, as one batch of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from graphlib import TopologicalSorter
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.parameters import check
+from soilml.physics.effects.base import Effect
+from soilml.physics.load_case import LoadCase
+from soilml.physics.model import flattened
+from soilml.physics.operating_point import Operating
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CaseSets:
+    """A case, `sets` values of some of its parameters by path, and n operating points for each."""
+
+    case: Case
+    sets: int
+    values: Mapping[str, Floats]  # (sets,)
+    at: Operating
+
+    @property
+    def points(self) -> int:
+        """Number n of operating points."""
+        return int(np.size(self.at.slip))
+
+
+def join_key(part: CaseSets) -> Hashable:
+    """Equal for parts that `joined_load_case` may join at little cost.
+
+    They share gear and known covariates. Effects on stresses act at all points of every contact,
+    so that rows without such an effect are kept apart from those that have it.
+    """
+    known = tuple(f.name for f in fields(Operating) if getattr(part.at, f.name) is not None)
+    on_stress = frozenset(e.name for e in part.case.model.effects if e.overrides("on_stress"))
+    return part.case.model.gear, known, on_stress
+
+
+def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
+    """The rows of all parts, in order: operating points within sets within parts.
+
+    The effects are those of all cases, in an order that each case has; an effect that a case lacks
+    has its neutral parameters in its rows, and so changes nothing there.
+
+    Raises
+    ------
+    InputError
+        For a value outside its bounds.
+    graphlib.CycleError
+        Where two cases have the same effects in contrary order.
+    """
+    effects = _joined_effects([part.case for part in parts])
+    parameters = [_with_effects(part.case, effects).parameters() for part in parts]
+    whole = _with_effects(parts[0].case, effects)
+    values: dict[str, Any] = {}
+    for path, (_, first) in whole.parameters().items():
+        own = [
+            part.values.get(path, known[path][1])
+            for part, known in zip(parts, parameters, strict=True)
+        ]
+        if any(np.ndim(value) or value != first for value in own):
+            values[path] = np.concatenate(
+                [
+                    np.repeat(np.broadcast_to(value, part.sets), part.points)
+                    for value, part in zip(own, parts, strict=True)
+                ]
+            )
+    whole = whole.with_values(values)
+    at = _joined_operating(parts)
+    check(at)
+    check(whole.soil, "soil ")
+    check(whole.model)
+    return flattened(LoadCase(whole.model.gear, whole.soil, at, whole.model.effects))[0]
+
+
+def _joined_effects(cases: Sequence[Case]) -> dict[str, type[Effect]]:
+    """The effects of all cases by name, in an order that each case has."""
+    order: TopologicalSorter[str] = TopologicalSorter()
+    effects: dict[str, type[Effect]] = {}
+    for case in cases:
+        effects |= {effect.name: type(effect) for effect in case.model.effects}
+        names = [effect.name for effect in case.model.effects]
+        for name in names:
+            order.add(name)
+        for earlier, later in pairwise(names):
+            order.add(later, earlier)
+    return {name: effects[name] for name in order.static_order()}
+
+
+def _with_effects(case: Case, effects: Mapping[str, type[Effect]]) -> Case:
+    """The case with these effects in this order: its own, and others at neutral parameters."""
+    own = {effect.name: effect for effect in case.model.effects}
+    joined = tuple(own.get(name, effect()) for name, effect in effects.items())
+    return replace(case, model=replace(case.model, effects=joined))
+
+
+def _joined_operating(parts: Sequence[CaseSets]) -> Operating:
+    """The operating points of all rows."""
+    known: dict[str, Floats] = {}
+    for field in fields(Operating):
+        if getattr(parts[0].at, field.name) is not None:
+            columns = [
+                np.tile(np.broadcast_to(getattr(part.at, field.name), part.points), part.sets)
+                for part in parts
+            ]
+            known[field.name] = np.concatenate(columns)
+    return Operating(**known)

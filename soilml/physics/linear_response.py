@@ -1,0 +1,118 @@
+"""Readings under small changes of the parameters, by the implicit function theorem."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from soilml.arrays import Array, namespace
+from soilml.physics.contact import Force
+from soilml.physics.effects.base import apply_stage
+from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
+from soilml.physics.forces import apply_input_effects, forces_at_sinkage
+from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.model import in_chunks
+from soilml.physics.sinkage_search import SinkageEstimate
+
+#: Step in the logarithm of sinkage of the difference for dW/d(ln z): a truncation error of the
+#: order of the step, and a rounding error of 1e-10.
+SINKAGE_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class LinearResponse:
+    """Readings of a batch of rows, linear in the distance to their base rows; arrays (batch,)."""
+
+    reading: Force
+    #: sinkage of every row, to first order, and the slope at that of its base row
+    sinkage: SinkageEstimate
+
+
+def linear_response(
+    load_case: LoadCase, base: Array, estimate: SinkageEstimate | None = None
+) -> LinearResponse:
+    r"""Readings of rows that differ slightly from a base row, from one search for equilibrium.
+
+    .. math::
+        \Delta\ln z = -\frac{\Delta W(z^*) - \Delta W_0}{\partial W / \partial\ln z}, \qquad
+        \Delta f = \Delta f(z^*) + \frac{\partial f}{\partial\ln z} \Delta\ln z
+
+    with the differences between a row and its base row, both evaluated at the sinkage of the base
+    row, and W_0 the load to be carried. Effects on readings act on the result. Second-order terms
+    are left out; at a base row, where the differences vanish, the readings are exact.
+
+    Parameters
+    ----------
+    load_case : LoadCase
+        Parameters of shape () or (batch,), from `soilml.physics.model.flattened`.
+    base : array (batch,)
+        Index of the base row of each row; that of a base row is its own.
+    estimate : SinkageEstimate, optional
+        Of the base rows, in increasing order of their index.
+
+    Returns
+    -------
+    LinearResponse
+        NaN in rows whose base row has no equilibrium, or where the load carried does not rise
+        with sinkage there.
+
+    References
+    ----------
+    Implicit function theorem; Griewank and Walther, Evaluating Derivatives, 2008, section 15.1.
+    """
+    xp = namespace(load_case.at.slip)
+    base_rows = xp.sort(xp.unique_values(base))
+    position = xp.searchsorted(base_rows, base)
+    everything = xp.arange(base.shape[0], device=base.device)
+    columns = () if estimate is None else (estimate.log_sinkage, estimate.slope)
+    with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
+        solved = in_chunks(rows(load_case, base_rows), _solve, *columns)
+        evaluated = xp.concat([everything, base_rows], axis=0)
+        sinkage = xp.concat(
+            [xp.take(solved.sinkage, position, axis=0), solved.sinkage * math.exp(SINKAGE_STEP)],
+            axis=0,
+        )
+        at_sinkage = in_chunks(rows(load_case, evaluated), _at_sinkage, sinkage)
+        true_case = apply_input_effects(load_case)
+        return _first_order(true_case, base, base_rows, position, at_sinkage, solved.status)
+
+
+def _first_order(
+    true_case: LoadCase,
+    base: Array,
+    base_rows: Array,
+    position: Array,
+    at_sinkage: Force,
+    base_status: Array,
+) -> LinearResponse:
+    """The response, from the forces of all rows at the sinkage of their base row.
+
+    They are followed by those of the base rows at a sinkage that is larger by `SINKAGE_STEP`.
+    """
+    xp, size = namespace(base), base.shape[0]
+    here: dict[str, Array] = {f.name: getattr(at_sinkage, f.name)[:size] for f in fields(Force)}
+    rate: dict[str, Array] = {  # of the base rows, by the logarithm of sinkage
+        name: (getattr(at_sinkage, name)[size:] - value[base_rows]) / SINKAGE_STEP
+        for name, value in here.items()
+        if name != "status"
+    }
+    load = true_case.at.load + xp.zeros_like(here["load"])
+    rising = xp.where(rate["load"] > 0, rate["load"], xp.full_like(rate["load"], math.nan))
+    excess = (here["load"] - here["load"][base]) - (load - load[base])
+    step = -excess / rising[position]
+    moved = {name: here[name] + rate[name][position] * step for name in rate}
+    moved |= {"load": load, "status": base_status[position]}
+    reading = apply_stage(true_case.effects, "on_reading", Force(**moved), true_case)
+    slope = rising / here["load"][base_rows]
+    sinkage = SinkageEstimate(xp.log(here["sinkage"]) + step, slope[position])
+    return LinearResponse(without_unsolved(reading), sinkage)
+
+
+def _solve(load_case: LoadCase, *columns: Array) -> Force:
+    return equilibrium_forces(load_case, SinkageEstimate(*columns) if columns else None)
+
+
+def _at_sinkage(load_case: LoadCase, sinkage: Array) -> Force:
+    return forces_at_sinkage(apply_input_effects(load_case), sinkage)
