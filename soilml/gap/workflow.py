@@ -24,7 +24,7 @@ from soilml.gap.search.cross_validation import predict_held_out
 from soilml.gap.search.decision import Decision, decide
 from soilml.gap.search.disagreements import disagreements
 from soilml.gap.search.iteration import Analysis, analyse
-from soilml.gap.search.problem import MarginalFit
+from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.remaining_discrepancy import (
     discrepancy_amplitudes,
     remaining_discrepancy,

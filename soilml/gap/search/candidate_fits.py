@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
+from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.statistics.coordinates import EffectCoordinate, shape_coordinates
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
@@ -69,41 +70,47 @@ class CandidateFit:
 
 def fit_candidates(
     problem: FitProblem,
-    requests: Sequence[tuple[tuple[str, ...], dict[str, float], Floats]],
+    requests: Sequence[tuple[tuple[str, ...], Mapping[str, float], Floats]],
 ) -> list[CandidateFit]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
     A request has the names of the effects, start coordinates by path, and the amplitudes of the
-    discrepancy by channel to start with.
+    discrepancy by channel to start with. Sets that the model refuses are left out.
     """
-    marginal = problem.fit_marginal(
-        [
-            (
+    started = [
+        (
+            StartedFit(
                 problem.with_effects(names),
                 [*problem.soil, *problem.size_coordinates(names)],
                 start,
-                amplitude,
-            )
-            for names, start, amplitude in requests
-        ]
-    )
+            ),
+            amplitude,
+        )
+        for names, start, amplitude in requests
+    ]
+    marginal = fit_marginal(problem, started)
     return [
-        CandidateFit(names, fit, fit) for (names, _, _), fit in zip(requests, marginal, strict=True)
+        CandidateFit(names, fit, fit)
+        for (names, _, _), fit in zip(requests, marginal, strict=True)
+        if fit is not None
     ]
 
 
 def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The candidates with the shape coefficients of their effects estimated as well."""
-    requests, index = [], []
+    started, index = [], []
     for i, candidate in enumerate(candidates):
         fit = candidate.catalogue_law.fit
         if shapes := problem.shape_coordinates(candidate.names):
             coordinates = [*fit.coordinates, *shapes]
-            requests.append((fit.case, coordinates, fit.start_values(), candidate.amplitude))
+            started.append(
+                (StartedFit(fit.case, coordinates, fit.start_values()), candidate.amplitude)
+            )
             index.append(i)
     fitted = list(candidates)
-    for i, marginal in zip(index, problem.fit_marginal(requests), strict=True):
-        fitted[i] = replace(candidates[i], free_law=marginal)
+    for i, marginal in zip(index, fit_marginal(problem, started), strict=True):
+        if marginal is not None:
+            fitted[i] = replace(candidates[i], free_law=marginal)
     return fitted
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
 from soilml.gap.report_parts import GapReduction
-from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import predict_readings
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.statistics.reml_covariance import (

@@ -20,8 +20,8 @@ from soilml.gap.statistics.coordinates import (
     size_coordinate,
 )
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
-from soilml.gap.statistics.evidence import DiscrepancyModel, Evidence
-from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
+from soilml.gap.statistics.evidence import DiscrepancyModel
+from soilml.gap.statistics.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.gap.statistics.signatures import current_size, with_effect
 from soilml.physics.effects.base import Effect
@@ -35,25 +35,6 @@ START_SIZE = 0.7
 UNCALIBRATED_STD = 2.0
 #: Range of slip, and of log load, above which a shape coefficient can be estimated.
 MIN_SLIP_RANGE, MIN_LOG_LOAD_RANGE = 0.05, 0.1
-
-
-#: Fits at most under successive estimates of the discrepancy; the estimate of the amplitudes hardly
-#: changes after the second.
-MAX_ROUNDS = 3
-#: Change of an amplitude, in usual ones and relative to itself, below which a fit is final: the
-#: weights of the readings then hardly change.
-AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
-
-#: Case, coordinates, start coordinates by path, and amplitudes of the discrepancy to start with.
-FitRequest = tuple[Case, Sequence[FitCoordinate], Mapping[str, float], Floats]
-
-
-@dataclass(frozen=True)
-class MarginalFit:
-    """A fit under the discrepancy that its own evidence supports."""
-
-    fit: GapFit
-    evidence: Evidence
 
 
 @dataclass(frozen=True)
@@ -110,54 +91,23 @@ class FitProblem:
 
     def fit_soil(self, starts: Sequence[Floats]) -> GapFit:
         """The best of the fits of the soil alone, one from each start."""
-        fits = [
-            levenberg_marquardt(self.case, self.soil, self.readings, self.covariance.whiten, start)
-            for start in starts
-        ]
-        return min(fits, key=lambda fit: fit.objective)
+        whiten = self.covariance.whiten
+        fits = descend_together(
+            [FitRequest(self.case, self.soil, self.readings, whiten, start) for start in starts]
+        )
+        return min((_raised(fit) for fit in fits), key=lambda fit: fit.objective)
 
-    def fit_marginal(self, requests: Sequence[FitRequest]) -> list[MarginalFit]:
-        """Fits and their evidence, each under the discrepancy that it supports itself."""
-        amplitudes = [amplitude for *_, amplitude in requests]
-        starts = [start for _, _, start, _ in requests]
-        found: dict[int, MarginalFit] = {}
-        waiting = list(range(len(requests)))
-        for _ in range(MAX_ROUNDS):
-            for i in waiting:
-                case, coordinates, *_ = requests[i]
-                whiten = self.discrepancy.whiten(amplitudes[i])
-                fit = self._fit(case, coordinates, starts[i], whiten)
-                found[i] = MarginalFit(fit, self.discrepancy.evidence(fit, amplitudes[i]))
-            waiting = [i for i in waiting if _changed(amplitudes[i], found[i].evidence.amplitude)]
-            for i in waiting:
-                amplitudes[i] = found[i].evidence.amplitude
-                starts[i] = found[i].fit.start_values()
-            if not waiting:
-                break
-        return [found[i] for i in range(len(requests))]
-
-    def _fit(
-        self,
-        case: Case,
-        coordinates: Sequence[FitCoordinate],
-        start: Mapping[str, float],
-        whiten: Floats,
+    def fit(
+        self, case: Case, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
     ) -> GapFit:
-        """Fit from `start`, by path; other coordinates start at the case's value or small.
+        """One fit; see `fit_many`."""
+        return _raised(fit_many(self, [StartedFit(case, coordinates, start)])[0])
 
-        Where the model refuses a trial from there, the fit starts again with all effects at zero.
-        """
-        first = np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
-        try:
-            return levenberg_marquardt(case, coordinates, self.readings, whiten, first)
-        except InputError:
-            zero = np.asarray(
-                [
-                    start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0
-                    for c in coordinates
-                ]
-            )
-            return levenberg_marquardt(case, coordinates, self.readings, whiten, zero)
+    def first_coordinates(
+        self, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
+    ) -> Floats:
+        """Where a fit starts: `start` by path, else the case's value or a small one."""
+        return np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
 
     def _default_start(self, coordinate: FitCoordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
@@ -168,8 +118,52 @@ class FitProblem:
         return START_SIZE if coordinate.upper > 0.0 else -START_SIZE
 
 
-def _changed(before: Floats, after: Floats) -> bool:
-    """Whether the amplitudes of a discrepancy changed so much that a fit must be repeated."""
-    larger, smaller = np.maximum(before, after), np.minimum(before, after)
-    changed = (larger - smaller > AMPLITUDE_TOLERANCE) & (smaller < AMPLITUDE_RATIO * larger)
-    return bool(changed.any())
+@dataclass(frozen=True)
+class StartedFit:
+    """A fit to be made to a problem's readings, and the coordinates, by path, that it starts at.
+
+    `whiten`, (m, m), replaces the inverse Cholesky factor of the problem's covariance.
+    """
+
+    case: Case
+    coordinates: Sequence[FitCoordinate]
+    start: Mapping[str, float]
+    whiten: Floats | None = None
+
+
+def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[GapFit | InputError]:
+    """Fits that share each call of the model; their results are those of single fits.
+
+    Coordinates without a start begin at the case's value or small. Where the model refuses a trial
+    from there, the fit starts again with all effects at zero; where it refuses again, its
+    `InputError` takes the place of the fit.
+    """
+
+    def request(fit: StartedFit, first: Floats) -> FitRequest:
+        whiten = problem.covariance.whiten if fit.whiten is None else fit.whiten
+        return FitRequest(fit.case, fit.coordinates, problem.readings, whiten, first)
+
+    found = descend_together(
+        [request(fit, problem.first_coordinates(fit.coordinates, fit.start)) for fit in fits]
+    )
+    refused = [i for i, result in enumerate(found) if isinstance(result, InputError)]
+    again = descend_together(
+        [request(fits[i], _without_effects(fits[i].coordinates, fits[i].start)) for i in refused]
+    )
+    for i, result in zip(refused, again, strict=True):
+        found[i] = result
+    return found
+
+
+def _without_effects(coordinates: Sequence[FitCoordinate], start: Mapping[str, float]) -> Floats:
+    """The coordinates of the soil at their start, those of effects at zero."""
+    return np.asarray(
+        [start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0 for c in coordinates]
+    )
+
+
+def _raised(fit: GapFit | InputError) -> GapFit:
+    """The fit; an `InputError` in its place is raised."""
+    if isinstance(fit, InputError):
+        raise fit
+    return fit

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.report_parts import RemainingDiscrepancy, decimal
-from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.problem import FitProblem
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,8 @@ from soilml.gap.search.candidate_fits import (
     predicted_shape_gain,
 )
 from soilml.gap.search.posterior import Posterior, explanations, posterior
-from soilml.gap.search.problem import FitProblem, MarginalFit
+from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
+from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.signatures import Signature, Untestable, effect_signatures
@@ -139,7 +140,10 @@ def _soil_alone(problem: FitProblem, soil: GapFit, starts: Starts) -> CandidateF
     start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
     if () in starts:
         start, amplitude = starts[()].fit.start_values(), starts[()].amplitude
-    marginal = problem.fit_marginal([(soil.case, list(soil.coordinates), start, amplitude)])[0]
+    started = StartedFit(soil.case, soil.coordinates, start)
+    marginal = fit_marginal(problem, [(started, amplitude)])[0]
+    if marginal is None:  # it is feasible under noise alone
+        marginal = MarginalFit(soil, problem.discrepancy.evidence(soil))
     return CandidateFit((), marginal, marginal)
 
 
