@@ -40,7 +40,7 @@ def fit_marginal(
     are repeated in turn until the amplitudes hardly change.
     """
     found: list[MarginalFit | None] = [None] * len(requests)
-    waiting = {i: request for i, request in enumerate(requests)}
+    waiting = dict(enumerate(requests))
     for _ in range(MAX_ROUNDS):
         started = [
             replace(fit, whiten=problem.discrepancy.whiten(amplitude))

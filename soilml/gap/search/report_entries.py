@@ -15,8 +15,8 @@ from soilml.gap.report_parts import (
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import gap_reduction, held_out_region, held_out_runs
 from soilml.gap.search.iteration import Analysis
-from soilml.gap.search.posterior import REJECTION_THRESHOLD
 from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.posterior import REJECTION_THRESHOLD
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.least_squares import GapFit

@@ -15,8 +15,8 @@ from soilml.gap.search.candidate_fits import (
     fit_shapes,
     predicted_shape_gain,
 )
-from soilml.gap.search.posterior import Posterior, explanations, posterior
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
+from soilml.gap.search.posterior import Posterior, explanations, posterior
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.statistics.least_squares import GapFit
