@@ -6,6 +6,14 @@ that an error in the analysis cannot hide in the data that test it.
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set, write_blind_set
 from datagen.blind_sets.catalogue import MECHANISMS
-from datagen.blind_sets.factorial_plan import Plan, plan_matrix
+from datagen.blind_sets.factorial_plan import Plan, benchmark_plans, plan_matrix
 
-__all__ = ["MECHANISMS", "BlindSet", "Plan", "draw_blind_set", "plan_matrix", "write_blind_set"]
+__all__ = [
+    "MECHANISMS",
+    "BlindSet",
+    "Plan",
+    "benchmark_plans",
+    "draw_blind_set",
+    "plan_matrix",
+    "write_blind_set",
+]

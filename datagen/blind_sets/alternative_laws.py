@@ -85,9 +85,9 @@ def _along_velocity(
     points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
 ) -> Floats:
     """Shear has the direction of the slip velocity at each point, not of the displacement."""
-    aside = (1.0 - rows.slip) * np.tan(rows.slip_angle) * share
+    aside = rows.travel_ratio * np.tan(rows.slip_angle) * share
     j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
-    along = 1.0 - (1.0 - rows.slip) * np.cos(points.theta)
+    along = 1.0 - rows.travel_ratio * np.cos(points.theta)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
     return np.asarray(tau * along / np.hypot(along, aside))
 

@@ -25,9 +25,11 @@ from datagen.blind_sets.reference_wheel import solve_equilibrium
 from datagen.blind_sets.run_schedules import (
     COVARIATE_COLUMNS,
     RunSchedule,
+    design_schedule,
     heavier_schedule,
-    sweep_schedule,
+    slip_range,
 )
+from datagen.blind_sets.smooth_discrepancy import draw_discrepancy
 from datagen.blind_sets.soil_families import (
     FAMILIES,
     FREE_PARAMETERS,
@@ -40,6 +42,10 @@ from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
 
 #: Run-to-run scatter, one standard deviation: rad of phi, fraction of the modulus.
 SCATTER_PHI, SCATTER_K = np.deg2rad(0.5), 0.05
+#: Probability that one channel was not measured rather than two, where channels are missing.
+ONE_MISSING = 2.0 / 3.0
+#: Smallest sinkage with the discrepancy, over that without: a wheel on soil sinks.
+LEAST_SINKAGE = 0.3
 #: Soils tried before a plan is given up.
 ATTEMPTS = 50
 
@@ -52,7 +58,8 @@ class BlindSet:
 
     `columns` and `region` are columns by name, each (rows,): run, slip, load_N, torque_Nm,
     drawbar_pull_N, sinkage_m, and the covariates that vary. `region` is 1.3 to 1.6 times heavier
-    than the heaviest run. `model` is the text of a model file without the hidden mechanism.
+    than the heaviest run. Channels that were not measured are NaN. `model` is the text of a model
+    file without the hidden mechanism.
     """
 
     columns: Columns
@@ -67,7 +74,8 @@ def draw_blind_set(plan: Plan) -> BlindSet:
     Parameters
     ----------
     plan
-        Mechanism, its size, noise, number of runs, soil family, number of free parameters, seed.
+        Mechanism, its size, noise, number of runs, soil family, number of free parameters, seed,
+        size of the smooth discrepancy, and design.
 
     Returns
     -------
@@ -92,24 +100,31 @@ def draw_blind_set(plan: Plan) -> BlindSet:
     )
     for attempt in range(ATTEMPTS):
         generator = np.random.default_rng((plan.seed, attempt))
+        extras = np.random.default_rng((plan.seed, attempt, 1))
         needs = {mechanism.needs for mechanism, _ in active} - {""}
-        runs = sweep_schedule(plan.runs, needs, generator)
-        region = heavier_schedule(runs, generator)
+        runs = design_schedule(plan.design, plan.runs, needs, generator)
+        region = heavier_schedule(runs, generator, slip_range(plan.design))
         soil = FAMILIES[plan.soil_family].soil(generator)
-        simulated = [_simulate(d, soil, plan.scattered, active, generator) for d in (runs, region)]
+        simulated = [_simulate(d, soil, plan.scatter, active, generator) for d in (runs, region)]
         steady = _channels(_rows(region, soil), active)
         bare = [_channels(_rows(d, soil), ()) for d in (runs, region)]
-        if all(
+        if not all(
             np.isfinite(v).all() for p in (*(s for s, _ in simulated), steady, *bare) for v in p
         ):
+            continue
+        extra = _discrepancies(plan, (runs, region), simulated[0][0], extras)
+        true = [_sum(s, e) for (s, _), e in zip(simulated, extra, strict=True)]
+        steady = _sum(steady, extra[1])
+        if all(_sinks(t, s) for t, (s, _) in zip(true, simulated, strict=True)):
             break
     else:
         raise RuntimeError(f"no soil of the family carries all rows: {plan}")
     declared = sensors(plan.noise)
     nominal = nominal_soil(soil, plan.free, generator)
+    missing = _missing_channels(plan.design, extras)
     tables = [
-        _measure(d, s, declared, plan.tier, generator)
-        for d, (s, _) in zip((runs, region), simulated, strict=True)
+        _measure(d, t, declared, plan.tier, missing, generator)
+        for d, t in zip((runs, region), true, strict=True)
     ]
     truth = {
         "plan": asdict(plan),
@@ -125,8 +140,14 @@ def draw_blind_set(plan: Plan) -> BlindSet:
             "autocorrelation": AUTOCORRELATION if plan.tier == "N2" else 0.0,
         },
         "scatter": {"runs": simulated[0][1], "region": simulated[1][1]} if plan.scattered else {},
+        "scatter_std": {
+            "friction_angle_rad": SCATTER_PHI * plan.scatter,
+            "modulus_fraction": SCATTER_K * plan.scatter,
+        },
+        "discrepancy": {"runs": _by_channel(extra[0]), "region": _by_channel(extra[1])},
+        "missing": list(missing),
         "covariates": sorted(COVARIATE_COLUMNS[name] for name in runs.varied),
-        "runs_true": _by_channel(simulated[0][0]),
+        "runs_true": _by_channel(true[0]),
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),
@@ -161,14 +182,14 @@ def _rows(schedule: RunSchedule, soil: dict[str, float]) -> WheelState:
 def _simulate(
     schedule: RunSchedule,
     soil: dict[str, float],
-    scattered: bool,
+    scatter: float,
     active: ActiveMechanisms,
     generator: np.random.Generator,
 ) -> tuple[list[Floats], dict[str, list[float]]]:
     """True channels of the runs, with run-to-run scatter of the soil, and that scatter."""
     runs = int(schedule.run.max()) + 1
-    phi = SCATTER_PHI * generator.standard_normal(runs) * scattered
-    k = np.exp(SCATTER_K * generator.standard_normal(runs) * scattered)
+    phi = SCATTER_PHI * generator.standard_normal(runs) * scatter
+    k = np.exp(SCATTER_K * generator.standard_normal(runs) * scatter)
     rows = _rows(schedule, soil)
     values = {**vars(rows)}
     values["friction_angle"] = rows.friction_angle + phi[schedule.run]
@@ -188,14 +209,48 @@ def _measure(
     true: list[Floats],
     declared: dict[str, Sensor],
     tier: str,
+    missing: tuple[str, ...],
     generator: np.random.Generator,
 ) -> Columns:
     columns: Columns = {"run": schedule.names, "slip": schedule.slip, "load_N": schedule.load}
     for name, values in zip(CHANNELS, true, strict=True):
         columns[name] = simulate_readings(values, declared[name], schedule.run, tier, generator)
+    for name in missing:
+        columns[name] = np.full(schedule.slip.size, np.nan)
     for name in schedule.varied:
         columns[COVARIATE_COLUMNS[name]] = schedule.covariates[name]
     return columns
+
+
+def _discrepancies(
+    plan: Plan,
+    schedules: tuple[RunSchedule, RunSchedule],
+    true: list[Floats],
+    generator: np.random.Generator,
+) -> tuple[list[Floats], list[Floats]]:
+    """The smooth discrepancy of every channel in the runs and in the region."""
+    if plan.discrepancy == 0.0:
+        none = [[np.zeros(d.slip.size) for _ in CHANNELS] for d in schedules]
+        return none[0], none[1]
+    pairs = [draw_discrepancy(plan.discrepancy, schedules, t, generator) for t in true]
+    return [runs for runs, _ in pairs], [region for _, region in pairs]
+
+
+def _sum(channels: list[Floats], more: list[Floats]) -> list[Floats]:
+    return [one + other for one, other in zip(channels, more, strict=True)]
+
+
+def _sinks(true: list[Floats], simulated: list[Floats]) -> bool:
+    """Whether the wheel sinks in every row, the discrepancy included."""
+    return bool(np.all(true[2] >= LEAST_SINKAGE * simulated[2]))
+
+
+def _missing_channels(design: str, generator: np.random.Generator) -> tuple[str, ...]:
+    """Columns that were not measured."""
+    if design != "missing-channels":
+        return ()
+    count = 1 if generator.random() < ONE_MISSING else 2
+    return tuple(str(name) for name in generator.permutation(CHANNELS)[:count])
 
 
 def _by_channel(channels: list[Floats]) -> dict[str, list[float]]:
@@ -217,5 +272,10 @@ def _csv(columns: Columns) -> str:
     names = list(columns)
     lines = [",".join(names)]
     for row in zip(*columns.values(), strict=True):
-        lines.append(",".join(v if isinstance(v, str) else f"{v:.8g}" for v in row))
+        lines.append(",".join(_cell(value) for value in row))
     return "\n".join(lines) + "\n"
+
+
+def _cell(value: str | float) -> str:
+    """A name or a number as text; a reading that was not taken is blank."""
+    return value if isinstance(value, str) else "" if np.isnan(value) else f"{value:.8g}"

@@ -36,6 +36,7 @@ TIERS_WITHOUT_MECHANISM = {
     "N2": "autocorrelated noise",
     "N3": "outliers",
     "N4": "more noise than declared",
+    "D": "a smooth discrepancy alone",
 }
 
 

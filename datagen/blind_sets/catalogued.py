@@ -77,9 +77,10 @@ def _shear_softening(
     points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
 ) -> Floats:
     """Wong's hump, K_r = 0.7 and K_w = 1.5 K, blended in by its share."""
-    x, k_r = points.shear_displacement / (1.5 * rows.shear_modulus), 0.7
+    x, k_r = np.abs(points.shear_displacement) / (1.5 * rows.shear_modulus), 0.7
     height = 1.0 + (1.0 / (k_r * (1.0 - np.exp(-1.0))) - 1.0) * np.exp(1.0 - x)
     hump = points.strength * k_r * height * -np.expm1(-x)
+    hump = np.copysign(hump, points.shear_displacement)
     return np.asarray((1.0 - share) * points.shear + share * hump)
 
 
@@ -92,14 +93,16 @@ def _sidewall_shear(
     area = 0.5 * r**2 * part
     y = 2.0 * r * np.sin(t) ** 3 / (3.0 * part)
     pressure = (1.0 - np.sin(phi)) * rows.unit_weight * (y - r * np.cos(t))
-    j = r * (t - (1.0 - rows.slip) * np.sin(t))
-    tau = (rows.cohesion + pressure * np.tan(phi)) * -np.expm1(-j / rows.shear_modulus)
+    j = r * (t - rows.travel_ratio * np.sin(t))
+    mobilised = np.copysign(np.expm1(-np.abs(j) / rows.shear_modulus), j)
+    tau = (rows.cohesion + pressure * np.tan(phi)) * mobilised
     both = 2.0 * share * tau * area
     return replace(reaction, pull=reaction.pull + both, torque=reaction.torque + both * y)
 
 
 def _depth_cohesion(points: ContactPoints, arc: ContactArc, rows: WheelState, c1: float) -> Floats:
-    mobilised = -np.expm1(-points.shear_displacement / rows.shear_modulus)
+    j = points.shear_displacement
+    mobilised = np.copysign(np.expm1(-np.abs(j) / rows.shear_modulus), j)
     return np.asarray(points.shear + c1 * points.depth * mobilised)
 
 
@@ -114,7 +117,7 @@ def _multipass(rows: WheelState, growth: float) -> WheelState:
 
 def _lateral_slip(points: ContactPoints, arc: ContactArc, rows: WheelState, share: float) -> Floats:
     """Shear grows with both displacements and has the direction of their sum."""
-    aside = share * (1.0 - rows.slip) * np.tan(rows.slip_angle)
+    aside = share * rows.travel_ratio * np.tan(rows.slip_angle)
     j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
     tau = points.strength * -np.expm1(-j / rows.shear_modulus)
     return np.asarray(tau * points.shear_displacement / j)

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import cycle, groupby, islice
+from typing import TypeVar
 
 import numpy as np
 
-from datagen.blind_sets.catalogue import mechanism_keys
+from datagen.blind_sets.catalogue import (
+    active_mechanisms,
+    mechanism_keys,
+)
 from datagen.blind_sets.soil_families import FAMILIES
+
+T = TypeVar("T")
 
 NOISE_LEVELS = (0.01, 0.02, 0.03)
 SIZES = (0.5, 1.0, 2.0)
 RUNS = (4, 8, 16)
 FREE_COUNTS = (3, 5)
+#: Rms of the smooth discrepancy, a fraction of the largest reading.
+DISCREPANCIES = (0.0, 0.01, 0.02, 0.04)
+#: Scatter of unequal soils over the usual one: 1.5 deg of phi and 15 % of the modulus.
+UNEQUAL_SCATTER = 3.0
 
 #: Number of blocks of nine plans for each mechanism of a tier.
 BLOCK_COUNTS = {"A": 4, "B": 3, "C": 3, "S": 2, "M": 3, "N0": 8, "N1": 8, "N2": 6, "N3": 6, "N4": 4}
@@ -30,6 +42,36 @@ QUICK_COUNTS = {
     "N4": 1,
 }
 
+#: Sets of the benchmark with the design `sweep`: of each mechanism, or of a tier without one, at
+#: each of some discrepancies.
+SWEEP_COUNTS = {
+    "A": (3, DISCREPANCIES),
+    "B": (2, DISCREPANCIES),
+    "C": (2, DISCREPANCIES),
+    "S": (1, DISCREPANCIES),
+    "M": (1, DISCREPANCIES),
+    "N0": (12, DISCREPANCIES[:1]),
+    "N1": (16, DISCREPANCIES[:1]),
+    "N2": (8, DISCREPANCIES[:1]),
+    "N3": (8, DISCREPANCIES[:1]),
+    "N4": (8, DISCREPANCIES[:1]),
+    "D": (16, DISCREPANCIES[1:]),
+}
+#: Sets of the benchmark with another design: with a mechanism of tiers A, B and S, and without.
+DESIGN_COUNTS = {
+    "one-load": (42, 8),
+    "one-run": (16, 4),
+    "few-runs": (20, 6),
+    "jittered": (16, 4),
+    "jittered-one-load": (10, 4),
+    "repeats": (16, 6),
+    "missing-channels": (20, 6),
+    "unequal-soils": (20, 10),
+    "braking": (16, 6),
+}
+#: Number of runs of designs that prescribe it.
+DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3)}
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -37,7 +79,9 @@ class Plan:
 
     `cause` is the key of its mechanism in the catalogue, empty in tiers without one. `size` is a
     multiple of the reference size of the mechanism (0 without one), `noise` a fraction of the
-    reading, `free` the number of soil parameters that the analyst must identify.
+    reading, `free` the number of soil parameters that the analyst must identify. `discrepancy` is
+    the rms of a smooth difference from any model, in each channel, as a fraction of its largest
+    absolute reading. `design` is a key of `run_schedules.DESIGNS`.
     """
 
     tier: str
@@ -48,11 +92,20 @@ class Plan:
     soil_family: str
     free: int
     seed: int
+    discrepancy: float = 0.0
+    design: str = "sweep"
 
     @property
     def scattered(self) -> bool:
-        """Whether the soil differs from run to run: tier N1, and half of tier B."""
-        return self.tier == "N1" or (self.tier == "B" and self.seed % 2 == 0)
+        """Whether the soil differs from run to run: tier N1, half of tier B, unequal soils."""
+        return self.scatter > 0.0
+
+    @property
+    def scatter(self) -> float:
+        """Scatter of the soil from run to run, relative to the usual one."""
+        if self.design == "unequal-soils":
+            return UNEQUAL_SCATTER
+        return float(self.tier == "N1" or (self.tier == "B" and self.seed % 2 == 0))
 
 
 def plan_matrix(full: bool, seed: int = 0) -> list[Plan]:
@@ -70,6 +123,75 @@ def plan_matrix(full: bool, seed: int = 0) -> list[Plan]:
             for block in range(blocks):
                 plans += _block(tier, cause, block, 10_000 * seed + len(plans), generator)
     return plans if full else _quick_selection(plans)
+
+
+def benchmark_plans(seed: int = 0) -> list[Plan]:
+    """The plans of the benchmark with discrepancies and designs, about 700.
+
+    Within each tier and design, all levels of noise, size, runs, soil family and number of free
+    parameters are equally frequent. Seeds differ from those of `plan_matrix`.
+    """
+    plans: list[Plan] = []
+    for number, (_, group) in enumerate(groupby(_benchmark_cells(seed), lambda c: (c[0], c[3]))):
+        cells = list(group)
+        generator = np.random.default_rng((seed, 1, number))
+        design = cells[0][3]
+        noise = _balanced(NOISE_LEVELS, len(cells), generator)
+        size = _balanced(SIZES, len(cells), generator)
+        runs = _balanced(DESIGN_RUNS.get(design, RUNS), len(cells), generator)
+        family = _balanced(tuple(FAMILIES), len(cells), generator)
+        free = _balanced(FREE_COUNTS, len(cells), generator)
+        for i, (tier, cause, discrepancy, _) in enumerate(cells):
+            plans.append(
+                Plan(
+                    tier=tier,
+                    cause=cause,
+                    size=size[i] if cause else 0.0,
+                    noise=noise[i],
+                    runs=runs[i],
+                    soil_family=family[i],
+                    free=free[i],
+                    seed=10_000 * seed + 5_000 + len(plans),
+                    discrepancy=discrepancy,
+                    design=design,
+                )
+            )
+    return plans
+
+
+def _benchmark_cells(seed: int) -> Iterator[tuple[str, str, float, str]]:
+    """Tier, mechanism, discrepancy and design of every set, sorted by tier within a design."""
+    for tier, (count, discrepancies) in SWEEP_COUNTS.items():
+        for cause in mechanism_keys(tier):
+            for discrepancy in discrepancies:
+                yield from [(tier, cause, discrepancy, "sweep")] * count
+    for number, (design, (with_cause, without)) in enumerate(DESIGN_COUNTS.items()):
+        generator = np.random.default_rng((seed, 2, number))
+        choices = [c for tier in ("A", "B", "S") for c in _testable(tier, design)]
+        order = [choices[i] for i in generator.permutation(len(choices))]
+        usual = cycle(DISCREPANCIES[:3])
+        cells = [(*cause, next(usual), design) for cause in islice(cycle(order), with_cause)]
+        nulls = cycle([("N0", "", 0.0, design), *(("D", "", d, design) for d in (0.01, 0.02))])
+        yield from sorted([*cells, *islice(nulls, without)])
+
+
+def _testable(tier: str, design: str) -> list[tuple[str, str]]:
+    """Mechanisms of a tier that act in a design, as tier and key.
+
+    One run has one value of each covariate. Alternative forms are laws of driving wheels.
+    """
+    if design == "braking" and tier == "B":
+        return []
+    keys = mechanism_keys(tier)
+    if design == "one-run":
+        keys = [key for key in keys if not active_mechanisms(tier, key)[0].needs]
+    return [(tier, key) for key in keys]
+
+
+def _balanced(levels: tuple[T, ...], count: int, generator: np.random.Generator) -> list[T]:
+    """Levels in random order, each as often as any other, or once more."""
+    order = generator.permutation(count) + int(generator.integers(len(levels)))
+    return [levels[int(i) % len(levels)] for i in order]
 
 
 def _block(

@@ -57,11 +57,13 @@ def ground_reaction(
     .. math::
         z = r (1 - \cos x), \quad
         \sigma = (k_c / b + k_\varphi) \delta^n, \quad
-        \tau = (c + \sigma \tan\varphi) (1 - e^{-j / K}), \quad
-        j = r [\theta_1 - \theta - (1 - s)(\sin\theta_1 - \sin\theta)]
+        \tau = \pm (c + \sigma \tan\varphi) (1 - e^{-|j| / K}), \quad
+        j = r [\theta_1 - \theta - u (\sin\theta_1 - \sin\theta)]
 
     x is `depth_angle`, the entry angle (rad) of a rim that does not deform; the depth delta is
-    mirrored behind the angle of maximum stress. For slip above zero. Source: Wong and Reece 1967.
+    mirrored behind the angle of maximum stress; u is the travel ratio, 1 - s when driving and
+    1 / (1 + s) when braking; tau has the sign of j, so that all forces are continuous in slip.
+    Source: Wong and Reece 1967, parts 1 and 2.
     """
     arc = _arc(depth_angle, rows, active)
     front, rear = arc.entry - arc.peak, arc.peak - arc.exit
@@ -116,8 +118,9 @@ def _points(
             normal = mechanism.pressure(normal, depth, rows, size)
     strength = rows.cohesion + normal * np.tan(rows.friction_angle)
     sine_difference = 2.0 * np.cos(0.5 * (arc.entry + theta)) * np.sin(0.5 * swept_angle)
-    shear_displacement = arc.shear_radius * (swept_angle - (1.0 - rows.slip) * sine_difference)
-    shear = strength * -np.expm1(-shear_displacement / rows.shear_modulus)
+    shear_displacement = arc.shear_radius * (swept_angle - rows.travel_ratio * sine_difference)
+    mobilised = -np.expm1(-np.abs(shear_displacement) / rows.shear_modulus)
+    shear = strength * np.copysign(mobilised, shear_displacement)
     points = ContactPoints(theta, swept_angle, depth, shear_displacement, normal, strength, shear)
     for mechanism, size in active:
         if mechanism.shear is not None:

@@ -60,8 +60,9 @@ def _load_gain(rows: WheelState, gain: float) -> WheelState:
 
 
 def _slip_scale(rows: WheelState, scale: float) -> WheelState:
-    """1 - s' = (1 - s)(1 + e), s the true slip and s' the reported one."""
-    return replace(rows, slip=np.asarray(1.0 - (1.0 - rows.slip) / (1.0 + scale)))
+    """u' = u (1 + e), u the true travel ratio v / (r omega) and u' the reported one."""
+    travel = rows.travel_ratio / (1.0 + scale)
+    return replace(rows, slip=np.where(travel > 1.0, 1.0 / travel - 1.0, 1.0 - travel))
 
 
 #: The rig: an unmeasured slope, load carried by the pull, friction in the wheel's bearing.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,27 @@ LOAD = (40.0, 150.0)  # N
 #: The region's loads over the heaviest load measured.
 REGION_LOAD_RATIOS = (1.3, 1.45, 1.6)
 #: Number of runs -> number of different loads.
-LOADS = {4: 3, 8: 4, 16: 5}
+LOADS = {2: 2, 4: 3, 8: 4, 16: 5}
+#: Rows in one run, at most, where a few runs do not make up the number of rows.
+MOST_RUN_POINTS = 24
+
+#: What a plan may say about its operating points, and about the soil of its runs.
+DESIGNS = {
+    "sweep": "runs that each sweep the slip at one of several loads",
+    "one-load": "all runs at one load",
+    "one-run": "one run, at one load",
+    "few-runs": "two or three runs, each at its own load",
+    "jittered": "the load of each row scatters about the level of its run, and is reported so",
+    "jittered-one-load": "the same about one level",
+    "repeats": "each operating point is driven two or three times, in different runs",
+    "missing-channels": "one or two of the three channels were not measured",
+    "unequal-soils": "the soil differs from run to run three times as much as usual",
+    "braking": "slips from braking to driving",
+}
+#: Slips of a design that brakes.
+BRAKING_SLIP = (-0.4, 0.6)
+#: Standard deviation of a load about its level, as a fraction, drawn for each set.
+LOAD_JITTER = (0.003, 0.08)
 
 #: Covariates, fields of `WheelState`: constant values where they do not vary, and columns.
 COVARIATE_DEFAULTS = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
@@ -37,8 +57,42 @@ class RunSchedule:
     varied: tuple[str, ...]
 
 
-def sweep_schedule(runs: int, needs: set[str], generator: np.random.Generator) -> RunSchedule:
-    """Runs that each sweep the slip at one load, 64 rows in all.
+def design_schedule(
+    design: str, runs: int, needs: set[str], generator: np.random.Generator
+) -> RunSchedule:
+    """The operating points of a design of `DESIGNS` with a number of runs.
+
+    Designs that are not about operating points have those of `sweep`. With repeats, the number of
+    runs is rounded to two loads at least, each driven two or three times.
+    """
+    if design in ("one-load", "one-run", "jittered-one-load"):
+        level = LOAD[0] * (LOAD[1] / LOAD[0]) ** generator.uniform()
+        schedule = _driven(np.full(runs, level), needs, generator)
+        return _jittered(schedule, generator) if design == "jittered-one-load" else schedule
+    if design == "jittered":
+        return _jittered(sweep_schedule(runs, needs, generator), generator)
+    if design == "repeats":
+        times = int(generator.integers(2, 4))
+        distinct = max(2, runs // times)
+        once = sweep_schedule(distinct, needs, generator, points=POINTS // (distinct * times))
+        return _repeated(once, times)
+    return sweep_schedule(runs, needs, generator, slip=slip_range(design))
+
+
+def slip_range(design: str) -> tuple[float, float]:
+    """Smallest and largest slip of a design."""
+    return BRAKING_SLIP if design == "braking" else SLIP
+
+
+def sweep_schedule(
+    runs: int,
+    needs: set[str],
+    generator: np.random.Generator,
+    *,
+    points: int | None = None,
+    slip: tuple[float, float] = SLIP,
+) -> RunSchedule:
+    """Runs that each sweep the slip at one load, 64 rows in all unless `points` of a run are given.
 
     Loads are evenly spaced in their logarithm with a small jitter, and repeat where there are more
     runs than loads. The covariates that a mechanism needs vary from run to run. In some sets, so
@@ -49,27 +103,68 @@ def sweep_schedule(runs: int, needs: set[str], generator: np.random.Generator) -
     shares[1:-1] += generator.uniform(-0.15, 0.15, level - 2) / (level - 1)
     loads = LOAD[0] * (LOAD[1] / LOAD[0]) ** shares
     load = generator.permutation(loads[np.arange(runs) % level])
+    return _driven(load, needs, generator, points=points, slip=slip)
+
+
+def heavier_schedule(
+    runs: RunSchedule, generator: np.random.Generator, slip: tuple[float, float] = SLIP
+) -> RunSchedule:
+    """Runs at 1.3 to 1.6 times the heaviest load of others, with the same covariates varied."""
+    load = runs.load.max() * np.array(REGION_LOAD_RATIOS)
+    values = {name: _spread_over_range(name, REGION_RUNS, generator) for name in COVARIATE_DEFAULTS}
+    names = [f"region_{i + 1}" for i in range(REGION_RUNS)]
+    return _schedule(names, load, REGION_POINTS, slip, set(runs.varied), values, generator)
+
+
+def _driven(
+    load: Floats,
+    needs: set[str],
+    generator: np.random.Generator,
+    *,
+    points: int | None = None,
+    slip: tuple[float, float] = SLIP,
+) -> RunSchedule:
+    """One run for each load, with the covariates that are needed, and decoys."""
+    runs = load.size
     varied = set(needs)
     decoy = str(generator.choice(list(COVARIATE_DEFAULTS)))
     if generator.random() < DECOY_PROBABILITY:
         varied.add(decoy)
     values = {name: _spread_over_range(name, runs, generator) for name in COVARIATE_DEFAULTS}
     names = [f"run_{i + 1:02d}" for i in range(runs)]
-    return _schedule(names, load, POINTS // runs, varied, values, generator)
+    points = min(POINTS // runs, MOST_RUN_POINTS) if points is None else points
+    return _schedule(names, load, points, slip, varied, values, generator)
 
 
-def heavier_schedule(runs: RunSchedule, generator: np.random.Generator) -> RunSchedule:
-    """Runs at 1.3 to 1.6 times the heaviest load of others, with the same covariates varied."""
-    load = runs.load.max() * np.array(REGION_LOAD_RATIOS)
-    values = {name: _spread_over_range(name, REGION_RUNS, generator) for name in COVARIATE_DEFAULTS}
-    names = [f"region_{i + 1}" for i in range(REGION_RUNS)]
-    return _schedule(names, load, REGION_POINTS, set(runs.varied), values, generator)
+def _jittered(schedule: RunSchedule, generator: np.random.Generator) -> RunSchedule:
+    """The schedule with a load that differs from row to row."""
+    low, high = LOAD_JITTER
+    std = low * (high / low) ** generator.uniform()
+    factor = np.exp(std * generator.standard_normal(schedule.load.size))
+    return replace(schedule, load=np.round(schedule.load * factor, 2))
+
+
+def _repeated(schedule: RunSchedule, times: int) -> RunSchedule:
+    """The runs of a schedule driven again, one after the other."""
+    runs = int(schedule.run.max()) + 1
+    again = np.arange(times).repeat(schedule.run.size)
+    run = np.tile(schedule.run, times) + runs * again
+    names = np.array([f"run_{i + 1:02d}" for i in range(runs * times)])
+    return RunSchedule(
+        run=run,
+        names=names[run],
+        slip=np.tile(schedule.slip, times),
+        load=np.tile(schedule.load, times),
+        covariates={name: np.tile(v, times) for name, v in schedule.covariates.items()},
+        varied=schedule.varied,
+    )
 
 
 def _schedule(
     names: list[str],
     load: Floats,
     points: int,
+    slip_limits: tuple[float, float],
     varied: set[str],
     values: dict[str, Floats],
     generator: np.random.Generator,
@@ -77,7 +172,8 @@ def _schedule(
     runs = len(names)
     run = np.repeat(np.arange(runs), points)
     share = (np.arange(points)[None, :] + generator.uniform(0.0, 1.0, (runs, points))) / points
-    slip = np.round((SLIP[0] + (SLIP[1] - SLIP[0]) * share).ravel(), 4)
+    low, high = slip_limits
+    slip = np.round((low + (high - low) * share).ravel(), 4)
     return RunSchedule(
         run=run,
         names=np.array(names)[run],

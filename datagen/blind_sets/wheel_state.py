@@ -31,6 +31,15 @@ class WheelState:
     pass_number: Floats
     slip_angle: Floats  # rad
 
+    @property
+    def travel_ratio(self) -> Floats:
+        """Distance travelled over distance rolled, v / (r omega), (n,).
+
+        Slip is s = 1 - v / (r omega) when driving and s = r omega / v - 1 when braking.
+        """
+        with np.errstate(divide="ignore"):
+            return np.where(self.slip < 0.0, 1.0 / (1.0 + self.slip), 1.0 - self.slip)
+
 
 @dataclass(frozen=True)
 class ContactArc:

@@ -1,0 +1,115 @@
+"""Smooth discrepancy: a difference between model and world that no mechanism describes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from datagen.blind_sets.run_schedules import RunSchedule
+from datagen.blind_sets.wheel_state import Floats
+
+#: Correlation lengths, in slip and in the logarithm of the load.
+SLIP_LENGTH, LOG_LOAD_LENGTH = (0.2, 0.6), (0.4, 1.0)
+#: Number of terms of a function: few, so that it has features and is not Gaussian noise.
+TERMS = 4
+#: Largest value, in the driven rows and in the region, over the rms of the driven rows: a function
+#: that happens to be near zero where the runs are must not be large everywhere else.
+MAX_OVER_RMS = 4.0
+#: Functions tried before a set is given up.
+ATTEMPTS = 200
+
+#: A function of slip and the logarithm of the load, both (n,) and in correlation lengths.
+SmoothFunction = Callable[[Floats, Floats], Floats]
+
+
+def draw_discrepancy(
+    rms: float,
+    schedules: tuple[RunSchedule, RunSchedule],
+    true: Floats,
+    generator: np.random.Generator,
+) -> tuple[Floats, Floats]:
+    """The discrepancy of one channel in the runs and in the held-out region.
+
+    It is one smooth function of slip and load, the same in all runs: a sum of a few cosines, bumps
+    or steps with random positions, directions and correlation lengths.
+
+    Parameters
+    ----------
+    rms
+        Root mean square over the rows of the runs, as a fraction of the largest absolute reading.
+    schedules
+        Runs and region, of n and m rows.
+    true
+        Noise-free readings of the runs, (n,).
+
+    Returns
+    -------
+    tuple of arrays
+        (n,) and (m,), in the unit of the channel.
+
+    Raises
+    ------
+    RuntimeError
+        Where no function is found that is at most `MAX_OVER_RMS` times its rms everywhere.
+    """
+    scale = rms * float(np.max(np.abs(true)))
+    for _ in range(ATTEMPTS):
+        kind = FUNCTIONS[int(generator.integers(len(FUNCTIONS)))]
+        lengths = generator.uniform(*SLIP_LENGTH), generator.uniform(*LOG_LOAD_LENGTH)
+        points = [
+            np.stack([d.slip / lengths[0], np.log(d.load) / lengths[1]], axis=0) for d in schedules
+        ]
+        function = kind(np.concatenate(points, axis=1), generator)
+        runs, region = (function(p[0], p[1]) for p in points)
+        unit = float(np.sqrt(np.mean(runs**2)))
+        if max(np.abs(runs).max(), np.abs(region).max()) <= MAX_OVER_RMS * unit:
+            return scale * runs / unit, scale * region / unit
+    raise RuntimeError("no smooth function is of similar size in the runs and in the region")
+
+
+def _cosines(points: Floats, generator: np.random.Generator) -> SmoothFunction:
+    """Plane waves with wave numbers of one to two over the correlation length."""
+    direction = generator.uniform(0.0, 2.0 * np.pi, TERMS)
+    number = generator.uniform(1.0, 2.0, TERMS)
+    phase = generator.uniform(0.0, 2.0 * np.pi, TERMS)
+    height = generator.standard_normal(TERMS)
+
+    def value(slip: Floats, load: Floats) -> Floats:
+        along = np.outer(slip, np.cos(direction)) + np.outer(load, np.sin(direction))
+        return np.asarray(np.cos(number * along + phase) @ height)
+
+    return value
+
+
+def _bumps(points: Floats, generator: np.random.Generator) -> SmoothFunction:
+    """Bumps 1 / (1 + d^2)^2 at random places among the rows."""
+    low, high = points.min(axis=1), points.max(axis=1)
+    centre = generator.uniform(low, high, (TERMS, 2))
+    height = generator.standard_normal(TERMS)
+
+    def value(slip: Floats, load: Floats) -> Floats:
+        square = np.subtract.outer(slip, centre[:, 0]) ** 2
+        square += np.subtract.outer(load, centre[:, 1]) ** 2
+        return np.asarray((1.0 + square) ** -2 @ height)
+
+    return value
+
+
+def _steps(points: Floats, generator: np.random.Generator) -> SmoothFunction:
+    """Soft steps tanh(2 d) across random lines through the rows."""
+    low, high = points.min(axis=1), points.max(axis=1)
+    centre = generator.uniform(low, high, (TERMS, 2))
+    direction = generator.uniform(0.0, 2.0 * np.pi, TERMS)
+    height = generator.standard_normal(TERMS)
+
+    def value(slip: Floats, load: Floats) -> Floats:
+        across = np.subtract.outer(slip, centre[:, 0]) * np.cos(direction)
+        across += np.subtract.outer(load, centre[:, 1]) * np.sin(direction)
+        return np.asarray(np.tanh(2.0 * across) @ height)
+
+    return value
+
+
+#: Families of functions, equally probable.
+FUNCTIONS = (_cosines, _bumps, _steps)
