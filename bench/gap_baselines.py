@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from soilml.gap.statistics.signatures import effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.quantities import CHANNELS, column
+from soilml.quantities import column
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
@@ -31,9 +33,10 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     j = linearise(case, axes, at, readings)[1] / readings.std[:, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return {
-            "residual correlation": _correlated(g, r, labels),
-            "STLSQ (pysindy)": _stlsq(g, r, labels),
+        named = {"residual correlation": _correlated(g, r, labels)}
+        if find_spec("pysindy"):  # of the extra `bench`
+            named["STLSQ (pysindy)"] = _stlsq(g, r, labels)
+        return named | {
             "Lasso, BIC": _lasso(g, r, labels),
             "stepwise, AIC": _stepwise(g, r, j, labels, 2.0),
             "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
@@ -93,9 +96,18 @@ def _forest(slip: np.ndarray, load: np.ndarray, channel: np.ndarray, r: np.ndarr
 
 
 def remainders(
-    case: Case, table: Table, plain: dict[str, np.ndarray], region: Table
+    case: Case,
+    table: Table,
+    plain: dict[str, np.ndarray],
+    region: Table,
+    measured: Sequence[str],
+    *,
+    everything: bool,
 ) -> dict[str, dict[str, np.ndarray]]:
-    """What regressions of the residuals of a soil-only fit on slip and load say in a region."""
+    """What regressions of the residuals of a soil-only fit on slip and load predict in a region.
+
+    A Gaussian process, and the other regressions where `everything` is wanted.
+    """
     from sklearn.ensemble import RandomForestRegressor
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -110,15 +122,16 @@ def remainders(
         kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0, 1.0], (0.2, 20.0)) + WhiteKernel(1.0)
         return GaussianProcessRegressor(kernel, random_state=0)
 
-    makers = {
-        "Gaussian process": process,
+    makers = {"Gaussian process": process}
+    others = {
         "random forest": lambda: RandomForestRegressor(200, min_samples_leaf=2, random_state=0),
         "quadratic": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
     }
+    makers |= others if everything else {}
     found: dict[str, dict[str, np.ndarray]] = {label: {} for label in makers}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for name in CHANNELS:
+        for name in measured:
             key = column(name)
             std = case.noise[key].std(table[key])
             scale = float(np.median(std))

@@ -1,4 +1,4 @@
-"""One hidden set, analysed, and judged against its truth."""
+"""One blind set, analysed, and compared with its truth."""
 
 from __future__ import annotations
 
@@ -10,22 +10,25 @@ from typing import Any
 
 import gap_baselines
 import numpy as np
+from gap_separation import separation
 
-from datagen.blind_sets.blind_set import draw_blind_set
+from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.factorial_plan import Plan
 from soilml.config.case import Case, read_case
 from soilml.gap import GapReport, gap
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.quantities import CHANNELS, column
+from soilml.quantities import CHANNELS, SHEAR, column
 
-#: A wrong name is added on purpose to every so many sets, and the baselines are run there.
+#: The other methods are run on one set in so many.
 EVERY = 8
+#: Statuses for which the held-out region is compared with that of a Gaussian process.
+NAMED = ("named", "partly-named")
 
 
 def judged(job: tuple[int, Plan]) -> dict[str, Any]:
-    """Everything that the benchmark wants to know of one plan."""
+    """The record of one plan: what was hidden, what was said, and how far it is from the truth."""
     number, plan = job
     drawn = draw_blind_set(plan)
     with tempfile.TemporaryDirectory() as folder:
@@ -33,44 +36,85 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
         file.write_text(drawn.model)
         case = read_case(file)
     table, region = Table(dict(drawn.columns)), Table(dict(drawn.region))
-    started = time.process_time()
-    report = gap(case, table, seed=0)
-    seconds = time.process_time() - started
     truth = tuple(sorted(cause["name"] for cause in drawn.truth["causes"]))
-    soil_only = _soil_only(case, report)
-    found: dict[str, Any] = asdict(plan) | {
+    apart = separation(case, table, drawn.truth)
+    record: dict[str, Any] = asdict(plan) | {
         "truth": truth,
+        "catalogued": bool(truth) and set(truth) <= set(EFFECTS),
+        "rows": len(table),
+        "signal": apart.signal,
+        "snr": apart.snr,
+        "rival": apart.rival,
+    }
+    started = time.process_time()
+    try:
+        report = gap(case, table, seed=0)
+    except Exception as error:  # a crash is a finding of the benchmark, not its end
+        return record | {"status": "crash", "sentence": f"{type(error).__name__}: {error}"}
+    record |= {"seconds": time.process_time() - started} | _said(report)
+    if report.gap and report.soil_before:
+        record |= _compared(number, case, report, table, region, drawn, truth)
+    return record
+
+
+def _said(report: GapReport) -> dict[str, Any]:
+    """What the report states; what its version does not state yet is empty."""
+    return {
         "status": report.status,
+        "sentence": report.sentence,
         "cause_set": [tuple(sorted(names)) for names in report.cause_set],
-        "snr": min((e.separating_snr for e in report.effects), default=0.0),
+        "probabilities": dict(getattr(report, "probabilities", {})),
+        "suspects": [tuple(sorted(s.effects)) for s in getattr(report, "suspects", ())],
         "p_gap": report.p_gap,
-        "seconds": seconds,
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
     }
-    if not report.gap:
-        return found
-    target = drawn.truth["region_true"]
-    distance = {"soil": _distance(case, soil_only, region, target)}
-    distance["named"] = _distance(case, report.model, region, target)
-    soil = drawn.truth["soil"]
-    found["soil"] = {
-        name: (
-            report.soil_before[name].value - soil[name],
-            report.soil_after[name].value - soil[name],
-            soil[name],
-        )
-        for name in ("friction_angle", "shear_modulus")
-        if name in report.soil_before
+
+
+def _compared(
+    number: int,
+    case: Case,
+    report: GapReport,
+    table: Table,
+    region: Table,
+    drawn: BlindSet,
+    truth: tuple[str, ...],
+) -> dict[str, Any]:
+    """Soil and held-out region beside the truth, and the other methods on some sets."""
+    soil, target = drawn.truth["soil"], drawn.truth["region_true"]
+    measured = tuple(n for n in CHANNELS if np.isfinite(table[column(n)]).any())
+    soil_only = case.with_values({k: v.value for k, v in report.soil_before.items()})
+    compared: dict[str, Any] = {
+        "soil": {
+            name: {
+                "before": report.soil_before[name].value,
+                "after": report.soil_after[name].value,
+                "std": report.soil_after[name].std,
+                "true": soil[name],
+            }
+            for name in SHEAR
+            if name in report.soil_before
+        }
     }
-    if number % EVERY == 0:
-        distance |= _others(case, report, table, region, target, soil_only, truth)
-        found["naming"] = gap_baselines.names(soil_only, table, case)
-    found["region"] = distance
-    return found
-
-
-def _soil_only(case: Case, report: GapReport) -> Case:
-    return case.with_values({k: v.value for k, v in report.soil_before.items()})
+    plain = _predicted(soil_only, region)
+    distance = {
+        "soil": _rms(case, plain, target, measured),
+        "named": _rms(case, _predicted(report.model, region), target, measured),
+    }
+    full = number % EVERY == 0 and len(measured) == len(CHANNELS)
+    if full:
+        compared["naming"] = gap_baselines.names(soil_only, table, case)
+        if truth and set(truth) <= set(EFFECTS):
+            own = {name: EFFECTS[name] for name in truth}
+            oracle = gap(case, table, effects=own, seed=0).model
+            distance["oracle"] = _rms(case, _predicted(oracle, region), target, measured)
+    if full or report.status in NAMED:
+        learned = gap_baselines.remainders(
+            case, table, _predicted(soil_only, table), region, measured, everything=full
+        )
+        for label, added in learned.items():
+            y = {name: plain[name] + added[name] for name in measured}
+            distance[label] = _rms(case, y, target, measured)
+    return compared | {"region": distance}
 
 
 def _predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
@@ -78,55 +122,12 @@ def _predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
     return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
 
 
-def _distance(case: Case, model: Case, table: Table, target: dict[str, Any]) -> float:
-    """RMS distance of predictions to the noise-free truth, in the declared noise."""
-    return _rms(case, _predicted(model, table), target)
-
-
-def _rms(case: Case, y: dict[str, np.ndarray], target: dict[str, Any]) -> float:
+def _rms(
+    case: Case, y: dict[str, np.ndarray], target: dict[str, Any], measured: tuple[str, ...]
+) -> float:
+    """RMS distance of predictions to the noise-free readings, in the declared noise."""
     off = []
-    for name in CHANNELS:
+    for name in measured:
         true = np.asarray(target[column(name)])
         off.append((y[name] - true) / case.noise[column(name)].std(true))
     return float(np.sqrt(np.mean(np.square(np.nan_to_num(off, nan=10.0)))))
-
-
-def _others(
-    case: Case,
-    report: GapReport,
-    table: Table,
-    region: Table,
-    target: dict[str, Any],
-    soil_only: Case,
-    truth: tuple[str, ...],
-) -> dict[str, float]:
-    """The same distance for other ways to close the gap: a wrong name, the oracle, regressions."""
-    found = {}
-    if set(truth) & set(EFFECTS):
-        own = {name: EFFECTS[name] for name in truth if name in EFFECTS}
-        oracle = gap(case, table, effects=own, seed=0)
-        found["oracle"] = _distance(case, oracle.model, region, target)
-    rejected = [
-        t for t in report.candidates if t.verdict.startswith("rejected") and len(t.names) == 1
-    ]
-    if rejected:
-        name = rejected[0].names[0]
-        wrong = gap(case, table, effects={name: EFFECTS[name]}, seed=0)
-        best = _grown_anyway(wrong, soil_only)
-        found["wrong name"] = _distance(case, best, region, target)
-        found["wrong name, gap closed in training"] = _closed(wrong)
-    plain_train, plain_region = _predicted(soil_only, table), _predicted(soil_only, region)
-    for label, learned in gap_baselines.remainders(case, table, plain_train, region).items():
-        y = {name: plain_region[name] + learned[name] for name in CHANNELS}
-        found[label] = _rms(case, y, target)
-    return found
-
-
-def _grown_anyway(report: GapReport, soil_only: Case) -> Case:
-    return report.model if report.effects else soil_only
-
-
-def _closed(report: GapReport) -> float:
-    """Share of the gap's power in training that an explanation removed."""
-    train = report.gap["train"]
-    return (train.before - train.after) / max(train.before - 1.0, 1e-9)

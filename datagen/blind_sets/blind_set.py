@@ -59,7 +59,9 @@ class BlindSet:
     `columns` and `region` are columns by name, each (rows,): run, slip, load_N, torque_Nm,
     drawbar_pull_N, sinkage_m, and the covariates that vary. `region` is 1.3 to 1.6 times heavier
     than the heaviest run. Channels that were not measured are NaN. `model` is the text of a model
-    file without the hidden mechanism.
+    file without the hidden mechanism. In `truth`, `runs_true` and `region_true` are the readings
+    without noise; `runs_steady` and `runs_without` are without scatter and discrepancy as well, and
+    `runs_without` and `region_without` without the mechanism.
     """
 
     columns: Columns
@@ -148,6 +150,7 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         "missing": list(missing),
         "covariates": sorted(COVARIATE_COLUMNS[name] for name in runs.varied),
         "runs_true": _by_channel(true[0]),
+        "runs_steady": _by_channel(_channels(_rows(runs, soil), active)),
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),
