@@ -1,13 +1,14 @@
-"""A case: gear, effects, soil, priors and sensor noise, as in a model file."""
+"""A case: gear, effects, soil, priors, sensor noise and discrepancy, as in a model file."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.model_discrepancy import Discrepancy, take_discrepancy
 from soilml.config.prior_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
@@ -22,7 +23,7 @@ from soilml.quantities import COLUMNS
 
 @dataclass(frozen=True)
 class Case:
-    """A model on a soil, with priors and sensor noise.
+    """A model on a soil, with priors, sensor noise and model discrepancy.
 
     Attributes
     ----------
@@ -34,12 +35,15 @@ class Case:
         Priors by the paths of `parameters()`: `cohesion`, `kphi`, `slip-sinkage.n1`.
     noise
         Noise of the sensors by column name: `torque_Nm`, `slip`.
+    discrepancy
+        Smooth error of the model by column name: `torque_Nm`, `drawbar_pull_N`, `sinkage_m`.
     """
 
     model: Model
     soil: Soil
     prior: dict[str, Prior] = field(default_factory=dict)
     noise: dict[str, Noise] = field(default_factory=dict)
+    discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value."""
@@ -61,11 +65,10 @@ class Case:
             for path, value in new.items()
             if path not in soils
         }
-        return Case(
+        return replace(
+            self,
             model=with_values(self.model, model),
             soil=with_values(self.soil, {p: v for p, v in new.items() if p in soils}),
-            prior=self.prior,
-            noise=self.noise,
         )
 
 
@@ -75,7 +78,7 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
     Parameters
     ----------
     path
-        The file: tables [gear], [soil] with [soil.prior], [[effect]] and [noise].
+        The file: tables [gear], [soil] with [soil.prior], [[effect]], [noise] and [discrepancy].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
 
@@ -118,7 +121,7 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
 
 
 def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
-    """The case in the tables [gear], [soil], [[effect]] and [noise]; others are left unread."""
+    """The case in the tables that `read_case` reads; others are left unread."""
     gear_settings = settings.table("gear")
     gear_type = gear_settings.text("type")
     if gear_type not in GEARS:
@@ -145,7 +148,8 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         if key in noise_settings:
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
-    return Case(model=model, soil=own_soil, prior=prior, noise=noise)
+    discrepancy = take_discrepancy(settings.table("discrepancy"))
+    return Case(model, own_soil, prior, noise, discrepancy)
 
 
 def _instance(cls: type, settings: Settings) -> Any:

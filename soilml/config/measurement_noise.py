@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from soilml.config.share_and_constant import (
+    share_and_constant_as_setting,
+    take_share_and_constant,
+)
 from soilml.io.toml_settings import Settings
 
 
@@ -33,30 +35,15 @@ class Noise:
 
     def as_setting(self) -> Any:
         """As it is written in TOML."""
-        share = f"{100 * self.share:.15g} %"
-        if self.share and self.constant:
-            return f"{share} + {self.constant!r}"
-        return share if self.share else self.constant
-
-
-_SHARE = re.compile(r"\s*([0-9.eE+-]+)\s*%\s*(?:\+\s*([0-9.eE+-]+)\s*)?")
+        return share_and_constant_as_setting(self.share, self.constant)
 
 
 def take_noise(settings: Settings, key: str) -> Noise:
     """Read `key = 0.05`, `key = "2 %"` or `key = "2 % + 0.05"`."""
     needed = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
-    value = settings.take(key, (int, float, str), needed)
-    noise = Noise()
-    try:
-        if not isinstance(value, str):
-            noise = Noise(constant=float(value))
-        elif match := _SHARE.fullmatch(value):
-            noise = Noise(constant=float(match[2] or 0.0), share=float(match[1]) / 100.0)
-        else:
-            settings.fail(f"{key} is {value!r}; needed is {needed}")
-    except ValueError:
-        settings.fail(f"{key} is {value!r}; needed is {needed}")
-    size = noise.constant + noise.share
-    if not (math.isfinite(size) and noise.constant >= 0 and noise.share >= 0 and size > 0):
-        settings.fail(f"{key} is {value!r}; a standard deviation must be above zero")
-    return noise
+    share, constant = take_share_and_constant(settings, key, needed)
+    if share + constant == 0.0:
+        settings.fail(
+            f"{key} is {settings.content[key]!r}; a standard deviation must be above zero"
+        )
+    return Noise(constant=constant, share=share)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import discrepancy_as_settings
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 
@@ -30,6 +31,10 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     if case.noise:
         lines += ["", "[noise]"]
         lines += [f"{key} = {_setting(noise.as_setting())}" for key, noise in case.noise.items()]
+    if case.discrepancy:
+        lines += ["", "[discrepancy]"]
+        settings = discrepancy_as_settings(case.discrepancy)
+        lines += [f"{key} = {_setting(value)}" for key, value in settings.items()]
     for effect in case.model.effects:
         lines += ["", "[[effect]]", f'name = "{effect.name}"']
         default = type(effect)()

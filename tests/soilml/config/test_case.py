@@ -5,6 +5,8 @@ from conftest import MODEL
 
 from soilml import read_case
 from soilml.config.measurement_noise import Noise
+from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 
@@ -52,6 +54,38 @@ def test_a_range_may_be_logarithmic(tmp_path):
     assert prior.at(0.5) == pytest.approx(0.01)
 
 
+DISCREPANCY = """
+[discrepancy]
+torque_Nm = "2 %"
+drawbar_pull_N = 0.4
+sinkage_m = "1 % + 0.0003"
+"""
+
+
+def test_discrepancy_is_read_written_and_read_again(tmp_path):
+    case = read_case(written(tmp_path, MODEL + DISCREPANCY + "log_load_length = 0.4\n"))
+    assert case.discrepancy == {
+        "torque_Nm": Discrepancy(share=0.02, log_load_length=0.4),
+        "drawbar_pull_N": Discrepancy(constant=0.4, log_load_length=0.4),
+        "sinkage_m": Discrepancy(0.0003, 0.01, log_load_length=0.4),
+    }
+    again = read_case(written(tmp_path, case_as_toml(case)))
+    assert again.discrepancy == case.discrepancy
+    assert case.with_values({"cohesion": 5.0}).discrepancy == case.discrepancy
+    assert "length" not in case_as_toml(read_case(written(tmp_path, MODEL + DISCREPANCY)))
+
+
+def test_an_amplitude_is_a_share_of_the_range_and_a_constant_in_quadrature():
+    assert Discrepancy(constant=0.3, share=0.02).amplitude(20.0) == pytest.approx(0.5)
+
+
+def test_lengths_that_differ_between_channels_cannot_be_written(tmp_path):
+    case = read_case(written(tmp_path, MODEL + DISCREPANCY))
+    case.discrepancy["torque_Nm"] = Discrepancy(share=0.02, slip_length=0.1)
+    with pytest.raises(ValueError, match="differ in slip_length"):
+        case_as_toml(case)
+
+
 MISTAKES = {
     "no such type": ('type = "wheel"', 'type = "wheels"', "wheel, linear-wheel"),
     "missing width": ("width = 0.12", "", "width is missing"),
@@ -67,6 +101,33 @@ MISTAKES = {
     "noise of zero": ('"2 %"', "0.0", "above zero"),
     "noise in words": ('"2 %"', '"two percent"', "2 %"),
     "unknown table": ("[noise]", "[noises]\n[noise]", "did you mean 'noise'"),
+    "negative noise": ('"2 %"', '"-2 %"', "zero or more"),
+    "discrepancy of a column that no model predicts": (
+        "[noise]",
+        '[discrepancy]\nslip = "2 %"\n[noise]',
+        "unknown key 'slip'",
+    ),
+    "discrepancy without unit": (
+        "[noise]",
+        '[discrepancy]\ntorque = "2 %"\n[noise]',
+        "did you mean 'torque_Nm'",
+    ),
+    "discrepancy in words": (
+        "[noise]",
+        '[discrepancy]\ntorque_Nm = "small"\n[noise]',
+        "'2 %' of the readings' range",
+    ),
+    "negative discrepancy": ("[noise]", "[discrepancy]\ntorque_Nm = -1\n[noise]", "zero or more"),
+    "discrepancy of no channel": (
+        "[noise]",
+        "[discrepancy]\nslip_length = 0.2\n[noise]",
+        "no channel has a discrepancy",
+    ),
+    "length of zero": (
+        "[noise]",
+        "[discrepancy]\ntorque_Nm = 1.0\nslip_length = 0\n[noise]",
+        "slip_length is 0; a correlation length must be above zero",
+    ),
     "no TOML": ("[gear]", "[gear", "not valid TOML"),
     "unknown effect": (
         "[noise]",
