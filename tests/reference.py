@@ -12,8 +12,14 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 
+def travel_ratio(slip, law="displacement-sign"):
+    """v / (r omega) in the shear displacement."""
+    return 1.0 - slip if slip >= 0 or law == "slip-sign" else 1.0 / (1.0 + slip)
+
+
 def stresses(theta, theta1, theta2, row):
     r, s = row["radius"], row["slip"]
+    law = row.get("braking", "displacement-sign")
     k = row["kc"] / row["width"] + row["kphi"]
     theta_m = (row["a0"] + row["a1"] * s) * theta1
     at = theta
@@ -22,20 +28,22 @@ def stresses(theta, theta1, theta2, row):
     # cos a - cos b as a product keeps the digits that a small arc would lose
     sink = 2.0 * np.sin(0.5 * (theta1 + at)) * np.sin(0.5 * (theta1 - at))
     sigma = k * max(r * sink, 0.0) ** row["n"]
-    j = r * (theta1 - theta - (1.0 - s) * (np.sin(theta1) - np.sin(theta)))
+    ratio = travel_ratio(s, law)
+    j = r * (theta1 - theta - ratio * (np.sin(theta1) - np.sin(theta)))
     tau = (row["cohesion"] + sigma * np.tan(row["friction_angle"])) * (
         1.0 - np.exp(-abs(j) / row["shear_modulus"])
     )
-    return sigma, (tau if s >= 0 else -tau)
+    driven = s >= 0 if law == "slip-sign" else j >= 0
+    return sigma, (tau if driven else -tau)
 
 
-def turning_points(theta1, theta2, s):
+def turning_points(theta1, theta2, s, law="displacement-sign"):
     """Angles between exit and entry at which j vanishes."""
     if s >= 0:
         return []
 
     def j(t):
-        return theta1 - t - (1.0 - s) * (np.sin(theta1) - np.sin(t))
+        return theta1 - t - travel_ratio(s, law) * (np.sin(theta1) - np.sin(t))
 
     grid = np.linspace(theta2, theta1, 4001)[:-1]
     value = j(grid)
@@ -51,7 +59,7 @@ def forces(theta1, row, theta2=0.0):
     r, b = row["radius"], row["width"]
     theta_m = (row["a0"] + row["a1"] * row["slip"]) * theta1
     layer = row["shear_modulus"] / r  # the shear curve bends within this angle
-    turns = turning_points(theta1, theta2, row["slip"])
+    turns = turning_points(theta1, theta2, row["slip"], row.get("braking", "displacement-sign"))
     ends = {theta2, theta1, theta_m, *turns}
     for x in (theta1, *turns):
         for width in (0.1, 1.0, 5.0, 30.0):

@@ -155,11 +155,11 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
 def _instance(cls: type, settings: Settings) -> Any:
     """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
     values = {
-        f.name: settings.number(f.name)
+        f.name: (settings.text if isinstance(f.default, str) else settings.number)(f.name)
         for f in fields(cls)
         if f.name in settings or f.default is MISSING
     }
-    settings.permit(declared(cls))
+    settings.permit(f.name for f in fields(cls))
     try:
         made = cls(**values)
     except InputError as error:

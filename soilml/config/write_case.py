@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import discrepancy_as_settings
 from soilml.parameters import declared
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.soils import Soil
 
 
@@ -22,6 +23,9 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     lines += [
         f"{k} = {_number(getattr(case.model.gear, k))}" for k in declared(type(case.model.gear))
     ]
+    braking = getattr(case.model.gear, "braking", RigidWheel.braking)
+    if braking != RigidWheel.braking:
+        lines.append(f'braking = "{braking}"')
     lines += ["", "[soil]"]
     lines += [f"{k} = {_number(getattr(case.soil, k))}" for k in declared(Soil)]
     soil_prior = {path: prior for path, prior in case.prior.items() if "." not in path}

@@ -65,7 +65,8 @@ def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     Hutangkabodee, Zweiri, Seneviratne and Althoefer, Int. J. Automation and Computing 3(4), 2006.
     """
     gear = case.model.gear
-    closed = LinearWheel(radius=gear.radius, width=gear.width)
+    law = getattr(gear, "braking", LinearWheel.braking)
+    closed = LinearWheel(radius=gear.radius, width=gear.width, braking=law)
     case = replace(case, model=replace(case.model, gear=closed))
     if data.reading_count < 3:
         raise FitError(

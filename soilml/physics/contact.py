@@ -32,6 +32,8 @@ class Contact:
     shear_lever_arm: Array  # m, of the shear stress about the axle
     width: Real  # m, the smaller dimension of the contact patch
     normal_lever_arm: Real | None = None  # m, of the normal stress, where it misses the axle
+    shear_direction: Array | None = None  # 1 or -1, of the shear stress; None: that of the slip
+    travel_ratio: Array | None = None  # v / (r omega), (batch,); None: 1 - slip
 
     if not TYPE_CHECKING:
 
@@ -85,7 +87,7 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
         \sigma = (k_c / b + k_\varphi) z^n, \qquad
         \tau = (c + \sigma \tan\varphi) (1 - e^{-|j| / K})
 
-    with the sign of the slip carried to the shear stress (a braking wheel is pulled back).
+    with the direction that the contact gives to the shear stress, else that of the slip.
     Arrays (points, batch). References: Bekker 1969; Janosi and Hanamoto, Proc. 1st ISTVS, 1961.
     Not for soils whose shear curve peaks and falls (Wong's hump), nor for repeated loading.
     """
@@ -94,7 +96,8 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     normal = modulus * xp.exp(soil.n * xp.log(contact.depth))
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
     mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), soil)
-    return Stress(contact=contact, normal=normal, shear=slip_sign(at) * strength * mobilised)
+    shear = shear_direction(contact, at) * strength * mobilised
+    return Stress(contact=contact, normal=normal, shear=shear)
 
 
 def mobilised_fraction(displacement: Array, soil: Soil) -> Array:
@@ -105,8 +108,22 @@ def mobilised_fraction(displacement: Array, soil: Soil) -> Array:
     return -namespace(displacement).expm1(-displacement / soil.shear_modulus)
 
 
+def shear_direction(contact: Contact, at: Operating) -> Array:
+    """Direction of the shear stress, 1 or -1: (points, batch), or (batch,) where it is the slip's.
+
+    The shear stress on a braking gear has the sign of the shear displacement or, by the law that
+    the source papers print, that of the slip (`soilml.physics.gears.braking_law`).
+    """
+    return slip_sign(at) if contact.shear_direction is None else contact.shear_direction
+
+
+def travel_ratio(contact: Contact, at: Operating) -> Array:
+    """Travel speed over rim speed, v / (r omega), (batch,), as the gear's shear law has it."""
+    return 1.0 - at.slip if contact.travel_ratio is None else contact.travel_ratio
+
+
 def slip_sign(at: Operating) -> Array:
-    """Direction of the shear stress: -1 where the gear brakes, else 1."""
+    """-1 where the gear brakes, else 1."""
     xp = namespace(at.slip)
     return xp.where(at.slip < 0, -xp.ones_like(at.slip), xp.ones_like(at.slip))
 

@@ -7,6 +7,7 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.braking_law import displacement_direction, displacement_slip
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.operating_point import Operating
 
@@ -53,16 +54,19 @@ class LinearWheel(RigidWheel):
         angle = xp.stack([leave, peak], axis=0)
         passed = entry - angle
         peak_depth = geometry.radius * (cos(peak) - cos(entry))
-        rolled_ahead = (1.0 - at.slip) * (sin(entry) - sin(angle))
+        travelled = 1.0 - displacement_slip(at.slip, self.braking)
+        displacement = geometry.shear_radius * (passed - travelled * (sin(entry) - sin(angle)))
         return Contact(
             depth=xp.stack([xp.full_like(peak, SMALLEST_DEPTH), peak_depth], axis=0),
-            shear_displacement=geometry.shear_radius * (passed - rolled_ahead),
+            shear_displacement=displacement,
             surface_travel=geometry.shear_radius * passed,
             area=scale * 0.5 * xp.stack([rear, front + rear], axis=0),
             horizontal_area=scale * xp.stack([cos_exit, cos_rear + cos_front], axis=0),
             frontal_area=scale * xp.stack([sin_exit, sin_rear + sin_front], axis=0),
             shear_lever_arm=geometry.lever,
             width=geometry.width,
+            shear_direction=displacement_direction(displacement, at.slip, self.braking),
+            travel_ratio=travelled,
         )
 
     def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:

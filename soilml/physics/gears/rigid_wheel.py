@@ -9,6 +9,7 @@ from typing import Annotated, final
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.gears.arc import entry_angle
+from soilml.physics.gears.braking_law import BrakingLaw, check_law
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 from soilml.row_status import Status
@@ -36,10 +37,17 @@ class WheelArc:
 
 @dataclass(frozen=True, kw_only=True)
 class RigidWheel(ABC):
-    """A rigid cylinder in the soil, for any assumption on the stresses along its arc."""
+    """A rigid cylinder in the soil, for any assumption on the stresses along its arc.
+
+    `braking` names the law of shear while it brakes (`soilml.physics.gears.braking_law`).
+    """
 
     radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]
     width: Annotated[Real, Parameter("m", 0.002, 5.0, "b, width of the rim")]
+    braking: BrakingLaw = "displacement-sign"
+
+    def __post_init__(self) -> None:
+        check_law(self.braking)
 
     @final
     def largest_sinkage(self) -> Real:

@@ -22,8 +22,9 @@ def reversals(entry: Array, leave: Array, slip: Array) -> tuple[Array, Array]:
     up. So there may be a zero between the two, on the falling branch of g, and, where the rim
     touches the soil so far behind the axle, one on the branch behind -alpha. Newton's method
     starts from the cubic that has the extremes of g, whose zeros are
-    2 alpha sin([asin(g(theta_1) / g(alpha))] / 3) and the same less a third of a turn. `entry`,
-    `leave` and `slip` have shape (batch,), the answers (2, batch).
+    2 alpha sin([asin(g(theta_1) / g(alpha))] / 3) and the same less a third of a turn. `slip` is
+    that of the shear displacement (`braking_law.displacement_slip`); `entry`, `leave` and it have
+    shape (batch,), the answers (2, batch).
     References: the shear displacement of Wong and Reece 1967; own derivation.
     """
     xp = namespace(entry)

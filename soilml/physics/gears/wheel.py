@@ -10,6 +10,11 @@ from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.gears.arc import differences_from_entry
+from soilml.physics.gears.braking_law import (
+    BrakingLaw,
+    displacement_direction,
+    displacement_slip,
+)
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.gears.shear_reversal import reversals
 from soilml.physics.operating_point import Operating
@@ -34,8 +39,18 @@ class Wheel(RigidWheel):
 
         j(\theta) = r [\theta_1 - \theta - (1 - s)(\sin\theta_1 - \sin\theta)]
 
+    While the wheel brakes, 1 - s gives way to the travel ratio v / (r omega) = 1 / (1 + s), and
+    shear stress has the sign of j: backward in front of the point where j is back at zero, forward
+    behind it. Torque, pull and sinkage are continuous through zero slip, and a wheel that is towed
+    without torque has a small negative slip. `braking="slip-sign"` is the law as the source papers
+    print it: 1 - s at any slip, |j|, and the sign of the slip all along the rim, so that the three
+    jump at zero slip.
+
     References: Wong and Reece, J. Terramechanics 4(1), 1967; the same set in Nagatani et al. 2009,
-    eqs. 3-10. Holds for a rim that does not deform, straight travel, sinkage up to the hub, and
+    eqs. 3-10; the two directions of shear under a towed wheel, Wong and Reece, J. Terramechanics
+    4(2), 1967. These let the displacement start anew at a transition angle, which follows from the
+    direction of soil flow and exists for small skid only; here it is one integral from entry on.
+    Holds for a rim that does not deform, straight travel, sinkage up to the hub, and
     wheels large against the soil's grains. Under the one wheel that Nagatani et al. measured, of
     0.11 m diameter, the stress is narrower and further forward (section IV).
 
@@ -54,12 +69,12 @@ class Wheel(RigidWheel):
         """The points along the arc; more of them where a braking wheel shears both ways."""
         xp = namespace(geometry.entry)
         if bool(xp.any(at.slip < 0)):
-            return _braking_contact(geometry, at)
-        return _two_part_contact(geometry, at, DRIVING_NODES)
+            return _braking_contact(geometry, at, self.braking)
+        return _two_part_contact(geometry, at, self.braking, DRIVING_NODES)
 
     def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """Few points, the same for driving and braking."""
-        return _two_part_contact(geometry, at, COARSE_NODES)
+        return _two_part_contact(geometry, at, self.braking, COARSE_NODES)
 
     def profile_contact(
         self, geometry: WheelArc, at: Operating, points: int
@@ -74,10 +89,11 @@ class Wheel(RigidWheel):
         depth = depth_at(geometry, xp.where(passed <= front, passed, mirrored))
         none = xp.zeros_like(passed)
         depth = xp.maximum(depth, none + SMALLEST_DEPTH)
-        return geometry.entry - passed, contact_at(geometry, at, passed, depth, none)
+        contact = contact_at(geometry, at, passed, depth, none, self.braking)
+        return geometry.entry - passed, contact
 
 
-def _two_part_contact(rim: WheelArc, at: Operating, count: int) -> Contact:
+def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
     """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
     xp = namespace(rim.entry)
     x, weight = columns(crowded_start(count), rim.entry)
@@ -86,15 +102,15 @@ def _two_part_contact(rim: WheelArc, at: Operating, count: int) -> Contact:
     # the pressure behind the maximum mirrors that before it, at the same fractions of both parts
     depth = depth_at(rim, x * front)
     arc = xp.concat([weight * front, weight * rear], axis=0)
-    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc)
+    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
 
 
-def _braking_contact(rim: WheelArc, at: Operating) -> Contact:
+def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw) -> Contact:
     """Parts that end where shear displacement changes its direction and the shear curve bends."""
     xp = namespace(rim.entry)
     x, weight = columns(crowded_ends(BRAKING_NODES), rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    ends = _braking_part_ends(rim, at)
+    ends = _braking_part_ends(rim, displacement_slip(at.slip, law))
     passed, equivalent, arc = [], [], []
     for low, high in pairwise(ends):
         length = high - low
@@ -105,10 +121,11 @@ def _braking_contact(rim: WheelArc, at: Operating) -> Contact:
         equivalent.append(xp.where(high <= rim.peak, mirrored, from_entry))
         arc.append(weight * length)
     depth = depth_at(rim, xp.concat(equivalent, axis=0))
-    return contact_at(rim, at, xp.concat(passed, axis=0), depth, xp.concat(arc, axis=0))
+    passed, arc = xp.concat(passed, axis=0), xp.concat(arc, axis=0)
+    return contact_at(rim, at, passed, depth, arc, law)
 
 
-def _braking_part_ends(rim: WheelArc, at: Operating) -> list[Array]:
+def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
     """Angles (rad) from exit to entry that bound the parts of a braking wheel's contact.
 
     Between exit and entry they are the maximum stress and the reversal of shear displacement; a
@@ -117,7 +134,7 @@ def _braking_part_ends(rim: WheelArc, at: Operating) -> list[Array]:
     """
     xp = namespace(rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    reversal, exists = reversals(rim.entry, rim.exit, at.slip)
+    reversal, exists = reversals(rim.entry, rim.exit, slip)
     halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
     inner = [rim.peak, xp.where(exists[0, :], reversal[0, :], halfway)]
     if bool(xp.any(exists[1, :])):
@@ -136,7 +153,9 @@ def depth_at(rim: WheelArc, passed: Array) -> Array:
     return rim.radius * u * (xp.sin(rim.entry) - t * xp.cos(rim.entry))
 
 
-def contact_at(rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array) -> Contact:
+def contact_at(
+    rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: Array, law: BrakingLaw
+) -> Contact:
     """Contact at points given by the angle passed since entry (rad); all arrays (points, batch).
 
     `depth` (m) sets the pressure, `arc` (rad) is the angle that a point represents.
@@ -144,14 +163,18 @@ def contact_at(rim: WheelArc, at: Operating, passed: Array, depth: Array, arc: A
     xp = namespace(passed)
     sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
     sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
+    travelled = 1.0 - displacement_slip(at.slip, law)
+    displacement = rim.shear_radius * (passed - travelled * sin_difference)
     area = rim.radius * rim.width * arc
     return Contact(
         depth=depth,
-        shear_displacement=rim.shear_radius * (passed - (1.0 - at.slip) * sin_difference),
+        shear_displacement=displacement,
         surface_travel=rim.shear_radius * passed,
         area=area,
         horizontal_area=area * (cos_entry + cos_difference),
         frontal_area=area * (sin_entry - sin_difference),
         shear_lever_arm=rim.lever,
         width=rim.width,
+        shear_direction=displacement_direction(displacement, at.slip, law),
+        travel_ratio=travelled,
     )

@@ -133,7 +133,8 @@ def integrate_profile(profile: StressProfile, inputs: ShearInputs) -> WheelForce
         width=width,
     )
     none = np.zeros_like(angle)
-    contact = contact_at(rim, Operating(slip=slip, load=none), entry - angle, none, arc)
+    at = Operating(slip=slip, load=none)
+    contact = contact_at(rim, at, entry - angle, none, arc, "slip-sign")
     pressed = magnification * normal
     strength = cohesion + pressed * np.tan(friction)
     mobilised = -np.expm1(-np.abs(contact.shear_displacement) / modulus)

@@ -38,6 +38,16 @@ def test_reads_everything_a_model_file_may_hold(tmp_path):
     assert changed.model.gear.width == 0.1
 
 
+def test_the_law_of_braking_is_read_and_written_where_it_is_not_the_default(tmp_path):
+    case = read_case(written(tmp_path, MODEL))
+    assert case.model.gear.braking == "displacement-sign"
+    assert "braking" not in case_as_toml(case)
+    printed = MODEL.replace("width = 0.12", 'width = 0.12\nbraking = "slip-sign"')
+    case = read_case(written(tmp_path, printed))
+    assert case.model.gear.braking == "slip-sign"
+    assert read_case(written(tmp_path, case_as_toml(case))).model.gear.braking == "slip-sign"
+
+
 def test_a_soil_needs_no_name_when_all_its_values_are_given(tmp_path):
     text = MODEL.replace(
         'name = "wong1989/dry_sand"',
@@ -91,6 +101,9 @@ MISTAKES = {
     "missing width": ("width = 0.12", "", "width is missing"),
     "misspelt key": ("width = 0.12", "widht = 0.12\nwidth = 0.12", "did you mean 'width'"),
     "negative radius": ("radius = 0.15", "radius = -0.15", "radius is -0.15"),
+    "no such law": ("width = 0.12", 'width = 0.12\nbraking = "no"', "there are: displacement-sign"),
+    "number for a law": ("width = 0.12", "width = 0.12\nbraking = 1.0", "needed is a text"),
+    "law of another gear": ('"wheel"', '"track"\nbase = 0.5\nbraking = "slip-sign"', "unknown key"),
     "text for a number": ("radius = 0.15", 'radius = "big"', "needed is a number"),
     "degrees": ("[soil.prior]", "friction_angle = 34\n[soil.prior]", "write 0.5934"),
     "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml soils"),

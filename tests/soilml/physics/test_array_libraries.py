@@ -49,7 +49,10 @@ def test_same_answers_in_another_array_library(library, case):
 def test_gradients_flow_through_the_size_of_every_effect(name, gear):
     size = EFFECTS[name].about.size
     bare = Model(gear(radius=0.15, width=0.12))
-    slip, known = np.asarray([0.2, 0.3, 0.6]), {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2}
+    slip, known = (
+        np.asarray([-0.4, -0.02, 0.2, 0.3, 0.6]),
+        {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2},
+    )
 
     def value(x):
         at = Operating(slip=torch.from_numpy(slip) if torch.is_tensor(x) else slip, load=70.0)
@@ -66,7 +69,8 @@ def test_gradients_flow_through_the_size_of_every_effect(name, gear):
 
 def test_gradients_flow_through_the_equilibrium():
     names = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
-    at = Operating(slip=torch.tensor([0.1, 0.3, 0.6], dtype=torch.float64), load=70.0)
+    slip = np.asarray([-0.6, -0.05, 0.1, 0.3, 0.6])
+    at = Operating(slip=torch.from_numpy(slip), load=70.0)
     values = {
         name: torch.tensor(getattr(SAND, name), dtype=torch.float64, requires_grad=True)
         for name in names
@@ -76,7 +80,7 @@ def test_gradients_flow_through_the_equilibrium():
     total.backward()
 
     def value(**changes):
-        f = WHEEL(replace(SAND, **changes), Operating(slip=np.asarray([0.1, 0.3, 0.6]), load=70.0))
+        f = WHEEL(replace(SAND, **changes), Operating(slip=slip, load=70.0))
         return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 50.0 * f.sinkage.sum()
 
     for name in names:

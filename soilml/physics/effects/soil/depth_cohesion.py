@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Stress, mobilised_fraction, slip_sign
+from soilml.physics.contact import Stress, mobilised_fraction, shear_direction
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.load_case import LoadCase
@@ -20,7 +20,7 @@ class DepthCohesion(SlipLoadScaling):
 
     .. math:: c(z) = c + c_1 z, \qquad \tau \leftarrow \tau + c_1 z (1 - e^{-|j| / K})
 
-    with z the depth that sets the pressure of a point, and the sign of the slip on tau.
+    with z the depth that sets the pressure of a point, and the direction of tau on what is added.
     References: Carrier, Olhoeft and Mendell, Lunar Sourcebook, 1991, chapter 9, cohesion of
     regolith by depth; the straight line is ours. Where n = 1 pressure too is proportional to z,
     and no run distinguishes it from a larger friction angle.
@@ -42,5 +42,5 @@ class DepthCohesion(SlipLoadScaling):
         xp = namespace(contact.depth)
         mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), load_case.soil)
         cohesion = self.scaled(self.c1, load_case) * contact.depth
-        more = slip_sign(load_case.at) * cohesion * mobilised
+        more = shear_direction(contact, load_case.at) * cohesion * mobilised
         return replace(stress, shear=stress.shear + more)

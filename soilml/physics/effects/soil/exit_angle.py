@@ -28,10 +28,9 @@ class ExitAngle(SlipLoadScaling):
     kappa is a third of the angle. Behind the axle the shear of a driving wheel pulls it down: the
     wheel mostly stands higher for the wider contact, but in some 4 % of the driving rows of the box
     of BENCHMARKS.md (kappa 0.15) it sinks deeper. Under a braking wheel whose contact is nearly
-    symmetric (kappa = 1, b0 = -1) the shear stress, which has the sign of the slip all along the
-    rim, can yield power instead of spending it: do not brake with such values. References: kappa,
-    Ishigami, Miwa, Nagatani and Yoshida, J. Field Robotics 24(3), 2007; b0, Ding et al. 2011. For
-    wheels.
+    symmetric (kappa = 1, b0 = -1) the law "slip-sign" can yield power instead of spending it: do
+    not brake with such values by that law. References: kappa, Ishigami, Miwa, Nagatani and Yoshida,
+    J. Field Robotics 24(3), 2007; b0, Ding et al. 2011. For wheels.
     """
 
     name: ClassVar[str] = "exit-angle"

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Stress
+from soilml.physics.contact import Stress, travel_ratio
 from soilml.physics.effects.base import EffectCard, covariate
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 from soilml.physics.load_case import LoadCase
@@ -22,10 +22,12 @@ class LateralSlip(SlipLoadScaling):
         j_y = a (1 - s) \tan\beta \; r (\theta_1 - \theta), \quad j = \sqrt{j_x^2 + j_y^2}, \quad
         \tau_x = (c + \sigma \tan\varphi) (1 - e^{-j / K}) \frac{|j_x|}{j}
 
-    with the sign of the slip on tau_x. References: Yoshida and Ishigami, IROS 2004, eqs. for the
-    lateral shear displacement; Ishigami et al., J. Field Robotics 24(3), 2007. They let each
-    direction reach its full strength by itself (tau_x from j_x alone, tau_y from j_y alone);
-    here both share one strength, and `share` 0 is the former. The side force itself is no output.
+    with the direction of the gear's shear stress on tau_x. While a wheel brakes, its travel ratio
+    1 / (1 + s) takes the place of 1 - s, unless its law is "slip-sign". References: Yoshida and
+    Ishigami, IROS 2004, eqs. for the lateral shear displacement; Ishigami et al., J. Field Robotics
+    24(3), 2007. They let each direction reach its full strength by itself (tau_x from j_x alone,
+    tau_y from j_y alone); here both share one strength, and `share` 0 is the former. The side force
+    itself is no output.
     """
 
     name: ClassVar[str] = "lateral-slip"
@@ -44,7 +46,8 @@ class LateralSlip(SlipLoadScaling):
         contact, modulus = stress.contact, load_case.soil.shear_modulus
         beta = covariate(load_case, "slip_angle", self.name)
         xp = namespace(contact.shear_displacement)
-        aside = self.scaled(self.share, load_case) * (1.0 - load_case.at.slip) * xp.tan(beta)
+        travelled = travel_ratio(contact, load_case.at)
+        aside = self.scaled(self.share, load_case) * travelled * xp.tan(beta)
         aside = aside * contact.surface_travel
         ahead = xp.maximum(xp.abs(contact.shear_displacement), xp.full_like(aside, 1e-100))
         both = xp.where(aside == 0, ahead, xp.hypot(ahead, aside))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, final
+from typing import Annotated, ClassVar, cast, final
 
 import numpy as np
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.contact import Force, mobilised_fraction, slip_sign
+from soilml.physics.contact import Force, mobilised_fraction
 from soilml.physics.effects.base import EffectCard
 from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.gears.braking_law import displacement_direction, displacement_slip
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 
@@ -30,9 +31,11 @@ class SidewallShear(SlipLoadScaling):
         j = r [\theta_1 - (1 - s) \sin\theta_1], \quad K_0 = 1 - \sin\varphi
 
     A is the half segment in front of the axle, y its centroid below the axle; tau has the sign of
-    the slip. References: Jaky 1944, earth pressure at rest K_0; the rest is geometry and Janosi
-    and Hanamoto 1961, put together by us. The stress is taken level and alike all over the wall,
-    its part of the vertical load is left out; not for walls with spokes or soil inside.
+    j, in which 1 / (1 + s) takes the place of 1 - s while braking. By the wheel's law "slip-sign"
+    it has the sign of the slip, and 1 - s stays. References: Jaky 1944, earth pressure at rest K_0;
+    the rest is geometry and Janosi and Hanamoto 1961, put together by us. The stress is taken level
+    and alike all over the wall, its part of the vertical load is left out; not for walls with
+    spokes or soil inside.
     """
 
     name: ClassVar[str] = "sidewall-shear"
@@ -55,8 +58,10 @@ class SidewallShear(SlipLoadScaling):
         sin = xp.sin(entry)
         pressure = (1.0 - xp.sin(soil.friction_angle)) * soil.unit_weight * radius * depth
         strength = soil.cohesion + pressure * xp.tan(soil.friction_angle)
-        moved = radius * xp.abs(entry - (1.0 - slip) * sin)
-        shear = slip_sign(load_case.at) * strength * mobilised_fraction(moved, soil)
+        law = cast("RigidWheel", load_case.gear).braking
+        moved = radius * (entry - (1.0 - displacement_slip(slip, law)) * sin)
+        direction = displacement_direction(moved, slip, law)
+        shear = direction * strength * mobilised_fraction(xp.abs(moved), soil)
         pull = 2.0 * self.scaled(self.share, load_case) * shear * radius**2 * area
         lever = radius * (depth + xp.cos(entry))
         return replace(

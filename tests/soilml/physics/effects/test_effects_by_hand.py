@@ -142,12 +142,12 @@ def test_side_walls_shear_as_their_formula_says(way):
     segment = t - np.sin(t) * np.cos(t)
     area, y = r**2 / 2 * segment, 2 * r * np.sin(t) ** 3 / (3 * segment)
     pressure = (1 - np.sin(phi)) * SAND.unit_weight * (y - r * np.cos(t))
-    moved = np.abs(r * (t - (1 - at.slip) * np.sin(t)))
-    shear = (SAND.cohesion + pressure * np.tan(phi)) * (1 - np.exp(-moved / SAND.shear_modulus))
-    np.testing.assert_allclose(
-        force.drawbar_pull - plain.drawbar_pull, way * 2 * shear * area, rtol=1e-8
-    )
-    np.testing.assert_allclose(force.torque - plain.torque, way * 2 * shear * area * y, rtol=1e-8)
+    moved = r * (t - np.where(way > 0, 1 - at.slip, 1 / (1 + at.slip)) * np.sin(t))
+    assert (np.sign(moved) == way).all()
+    mobilised = 1 - np.exp(-np.abs(moved) / SAND.shear_modulus)
+    shear = way * (SAND.cohesion + pressure * np.tan(phi)) * mobilised
+    np.testing.assert_allclose(force.drawbar_pull - plain.drawbar_pull, 2 * shear * area, rtol=1e-8)
+    np.testing.assert_allclose(force.torque - plain.torque, 2 * shear * area * y, rtol=1e-8)
     np.testing.assert_array_equal(force.sinkage, plain.sinkage)
 
 

@@ -1,0 +1,180 @@
+"""A braking wheel: continuous through zero slip, free rolling, locked, and by the printed law."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import input_box, solved
+from reference import forces, travel_ratio
+
+from soilml import EFFECTS, ExitAngle, LinearWheel, Model, Operating, Status, Wheel, soil
+from soilml.errors import InputError
+from soilml.numerics.root_finding import rising_root
+from soilml.physics.gears.braking_law import displacement_direction, displacement_slip
+
+SAND = soil("wong1989/dry_sand")
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+CHANNELS = ("torque", "drawbar_pull", "sinkage")
+GEARS = pytest.mark.parametrize("gear", [Wheel, LinearWheel])
+OF_WHEELS = [name for name, effect in EFFECTS.items() if effect.applies_to(WHEEL.gear)]
+
+
+def printed(gear):
+    """The gear with shear stress of the sign of the slip."""
+    return lambda **sizes: gear(**sizes, braking="slip-sign")
+
+
+def at_slip(slip, gear=Wheel, count=256):
+    return solved(input_box(count, seed=11) | {"slip": np.full(count, slip)}, gear=gear)
+
+
+def largest_step(before, after, box):
+    """Largest change of torque, pull and sinkage, in units of the row's own."""
+    units = (box["load"] * box["radius"], box["load"], after.sinkage)
+    both = (before.status == 0) & (after.status == 0)
+    steps = [getattr(after, c) - getattr(before, c) for c in CHANNELS]
+    return max(np.abs(s / u)[both].max() for s, u in zip(steps, units, strict=True))
+
+
+@GEARS
+def test_nothing_jumps_at_zero_slip_over_the_whole_box(gear):
+    box, at_zero = input_box(256, seed=11), at_slip(0.0, gear)
+    assert (at_zero.status == 0).sum() > 150
+    for slip in (-1e-9, -1e-7):
+        braking = at_slip(slip, gear)
+        assert braking.status.tolist() == at_zero.status.tolist()
+        assert largest_step(braking, at_zero, box) < 1e-7 + 2e3 * abs(slip)
+    assert largest_step(at_slip(-1e-9, printed(gear)), at_zero, box) > 0.1
+
+
+@GEARS
+@pytest.mark.parametrize("name", OF_WHEELS)
+def test_nothing_jumps_near_zero_slip_with_an_effect(name, gear):
+    cls = EFFECTS[name]
+
+    def largest_jump(make, step):
+        known = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2}
+        at = Operating(slip=np.arange(-0.03, 0.03, step), load=60.0, **known)
+        force = (Model(make(radius=0.15, width=0.12)) + cls(**cls.about.reference))(SAND, at)
+        return np.stack([np.abs(np.diff(getattr(force, c))).max() for c in CHANNELS])
+
+    # a step ten times smaller: ten times smaller changes, unless there is a jump
+    assert (largest_jump(gear, 1e-4) < 0.2 * largest_jump(gear, 1e-3)).all()
+    jumps = largest_jump(printed(gear), 1e-4) > 0.5 * largest_jump(printed(gear), 1e-3)
+    assert jumps[:2].all()
+
+
+def test_a_wheel_rolls_freely_at_a_small_negative_slip_and_is_towed():
+    loads = np.asarray([30.0, 60.0, 120.0])
+
+    def torque(slip):
+        return WHEEL(SAND, Operating(slip=slip, load=loads)).torque
+
+    low, high = np.full(3, -0.3), np.zeros(3)
+    assert (torque(low) < 0).all() and (torque(high) > 0).all()
+    free = rising_root(torque, low, high, 0.5 * (low + high), np.ones(3))
+    assert free.converged.all()
+    assert ((free.x > -0.15) & (free.x < -0.01)).all()
+    towed = WHEEL(SAND, Operating(slip=free.x, load=loads))
+    assert np.abs(towed.torque / (loads * 0.15)).max() < 1e-6
+    resistance = -towed.drawbar_pull / loads
+    assert (resistance > 0.1).all() and (np.diff(resistance) > 0).all()  # deeper, harder to tow
+    # shear drives the front of the rim and holds its rear
+    shear = WHEEL.profile(SAND, Operating(slip=free.x, load=loads)).shear[1:]
+    assert (np.diff(np.sign(shear), axis=0) != 0).sum(axis=0).tolist() == [1, 1, 1]
+    assert (shear[0] > 0).all() and (shear[-1] < 0).all()
+
+
+def test_torque_and_pull_rise_with_slip_from_a_locked_wheel_to_a_spinning_one():
+    slips = np.concatenate([[-1 + 1e-9], np.linspace(-0.99, 0.95, 200)])
+    force = WHEEL(SAND, Operating(slip=slips, load=60.0))
+    assert (np.diff(force.torque) > 0).all()
+    assert (np.diff(force.drawbar_pull) > 0).all()
+
+
+def test_a_locked_wheel_shears_the_soil_with_its_full_strength():
+    profile = WHEEL.profile(SAND, Operating(slip=-1 + 1e-9, load=60.0))
+    strength = SAND.cohesion + profile.normal * np.tan(SAND.friction_angle)
+    np.testing.assert_allclose(profile.shear[1:], -strength[1:], rtol=1e-9)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1.0])
+def test_a_braking_wheel_takes_power_from_its_vehicle(kappa):
+    box = input_box(256, seed=12)
+    box["slip"] = -np.abs(box["slip"])
+    force = solved(box, [ExitAngle(kappa=kappa)])
+    ratio = np.asarray([travel_ratio(s) for s in box["slip"]])
+    spent = force.torque / box["radius"] - ratio * force.drawbar_pull  # per rim speed
+    assert (spent[force.status == 0] > 0).all()
+
+
+@GEARS
+def test_driving_is_the_same_by_both_laws_to_the_last_bit(gear):
+    box = input_box(256, seed=5)
+    box["slip"] = np.abs(box["slip"])
+    box["slip"][:16] = 0.0
+    both = solved(box, gear=gear), solved(box, gear=printed(gear))
+    for field in ("load", "entry_angle", "status", *CHANNELS):
+        assert getattr(both[0], field).tobytes() == getattr(both[1], field).tobytes()
+
+
+@GEARS
+def test_the_printed_law_has_the_driving_formula_and_the_sign_of_the_slip(gear):
+    wheel = gear(radius=0.15, width=0.12, braking="slip-sign")
+    at = Operating(slip=np.asarray([-0.4, -0.05, 0.2]), load=60.0 * np.ones(3))
+    arc = wheel.contact_geometry(np.asarray([0.02, 0.06, 0.03]), SAND, at)
+    contact = wheel.contact(arc, at)
+    passed = contact.surface_travel / 0.15
+    rolled = np.sin(arc.entry) - np.sin(arc.entry - passed)
+    expected = 0.15 * (passed - (1.0 - at.slip) * rolled)
+    np.testing.assert_allclose(contact.shear_displacement, expected, rtol=1e-9, atol=1e-15)
+    assert contact.shear_direction.tolist() == [-1.0, -1.0, 1.0]
+    assert contact.travel_ratio.tolist() == (1.0 - at.slip).tolist()
+
+
+def test_the_displacement_of_a_braking_wheel_has_its_own_travel_ratio():
+    slip = np.asarray([-0.8, -0.5, -1e-12, 0.0, 0.3])
+    found = displacement_slip(slip, "displacement-sign")
+    np.testing.assert_allclose(1.0 - found, [travel_ratio(s) for s in slip], rtol=1e-15)
+    assert displacement_slip(slip, "slip-sign") is slip
+    moved = np.asarray([[1e-3], [-1e-3]]) * np.ones(5)
+    direction = displacement_direction(moved, slip, "displacement-sign")
+    assert direction.tolist() == [[1] * 5, [-1, -1, -1, 1, 1]]  # what drives is not turned round
+
+
+RESTS = [  # radius, width, c, phi, K, kphi, n, slip, load
+    (0.1, 0.05, 500.0, 0.6, 0.002, 1e6, 1.2, -0.6, 20.0),
+    (0.2, 0.05, 500.0, 0.5, 0.02, 3e6, 1.0, -0.1, 200.0),
+]
+
+
+@pytest.mark.parametrize("law", ["displacement-sign", "slip-sign"])
+@pytest.mark.parametrize("case", RESTS)
+def test_each_law_agrees_with_adaptive_quadrature(case, law):
+    radius, width, c, phi, K, kphi, n, slip, load = case
+    ground = replace(SAND, cohesion=c, friction_angle=phi, shear_modulus=K, kc=0.0, kphi=kphi, n=n)
+    model = Model(Wheel(radius=radius, width=width, braking=law))
+    force = model(ground, Operating(slip=slip, load=load))
+    assert force.status == Status.OK
+    row = {"radius": radius, "width": width, "slip": slip, "braking": law}
+    row |= {m: getattr(ground, m) for m in ("cohesion", "friction_angle", "shear_modulus")}
+    row |= {m: getattr(ground, m) for m in ("kc", "kphi", "n", "a0", "a1")}
+    carried, pull, torque = forces(float(force.entry_angle), row)
+    assert carried == pytest.approx(load, rel=1e-7)
+    assert force.torque == pytest.approx(torque, rel=1e-7, abs=1e-7 * load * radius)
+    assert force.drawbar_pull == pytest.approx(pull, rel=1e-7, abs=1e-7 * load)
+
+
+@GEARS
+def test_another_law_is_refused(gear):
+    with pytest.raises(InputError, match="braking is 'printed'; there are: displacement-sign, "):
+        gear(radius=0.15, width=0.12, braking="printed")
+
+
+def test_a_load_that_a_braking_wheel_cannot_carry_is_flagged():
+    weak = replace(SAND, kphi=2e4, kc=0.0)
+    force = WHEEL(weak, Operating(slip=np.asarray([-0.5, -0.001, 0.0]), load=400.0))
+    assert force.status.tolist() == [Status.TOO_HEAVY] * 3
+    assert np.isnan(force.torque).all() and (force.load < 400.0).all()
+    # what the soil carries at most is continuous too
+    assert force.load[1] == pytest.approx(force.load[2], rel=0.01)
