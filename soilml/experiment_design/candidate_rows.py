@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.identification.levels import rows_driven_alike
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
 
@@ -92,9 +93,16 @@ def channel_label(channels: Sequence[str]) -> str:
 
 
 def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list[CandidateRow]:
-    """The operating points of rows (n,), each once; of many, `REPETITIONS` spread over all."""
-    rows = zip(np.atleast_1d(measured.slip), np.atleast_1d(measured.load), strict=True)
-    points = sorted({(float(slip), float(load)) for slip, load in rows})
+    """The operating points of rows (n,), each once; of many, `REPETITIONS` spread over all.
+
+    The point of rows that are driven alike is their median.
+    """
+    slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
+    group = rows_driven_alike(Operating(slip=slip, load=load))
+    points = sorted(
+        (float(np.median(slip[group == i])), float(np.median(load[group == i])))
+        for i in np.unique(group)
+    )
     if len(points) > REPETITIONS:
         kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
         points = [points[i] for i in kept]

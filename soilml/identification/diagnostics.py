@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.levels import is_one_load
 from soilml.identification.observations import Observations
 from soilml.parameters import unit_text
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, column
@@ -23,19 +24,11 @@ STRONG_CORRELATION = 0.95
 EXCESS_RESIDUALS = "times the declared noise"
 #: Distance from a bound of the prior, as a fraction of it, at which a value counts as at the bound.
 BOUND_TOLERANCE = 1e-3
-#: Relative range of loads below which they count as one: a scale's error, too little to separate
-#: cohesion from friction.
-ONE_LOAD = 0.02
 
 
 def at_prior_bound(u: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether fractions of priors (p,) are at one of the bounds."""
     return np.asarray(np.minimum(u, 1.0 - u) < BOUND_TOLERANCE)
-
-
-def is_one_load(load: NDArray[np.float64]) -> bool:
-    """Whether all loads (n,) are the same within `ONE_LOAD`."""
-    return float(np.ptp(load)) <= ONE_LOAD * float(np.mean(load))
 
 
 def with_warnings(

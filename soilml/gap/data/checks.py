@@ -12,7 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.io.table import Table
 from soilml.quantities import column
 
@@ -21,8 +21,6 @@ Floats = NDArray[np.float64]
 #: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
 #: standard error is then 30 %.
 MIN_REPEAT_DEGREES_OF_FREEDOM = 6
-#: Rows are repeats if their slips and the logarithms of their loads agree within these.
-SLIP_TOLERANCE, LOG_LOAD_TOLERANCE = 0.02, 0.05
 #: Readings beyond the number of soil parameters that an analysis needs.
 MIN_RESIDUAL_READINGS = 8
 #: Fraction of duplicate rows above which the table itself is suspect.
@@ -121,10 +119,10 @@ def _check_variety(data: CheckedData) -> Iterator[Finding]:
         yield Severity.NAMING_OBSTACLE, text
     if not readings.channels:
         return
-    if count_distinct(np.log(readings.load)) < 2:
+    if readings.load_levels.count < 2:
         text = "one load only: soil parameters and effects are confounded"
         yield Severity.NAMING_OBSTACLE, text
-    if count_distinct(readings.slip) < 3:
+    if readings.slip_levels.count < 3:
         text = "fewer than three slips: effects that vary with slip cannot be distinguished"
         yield Severity.NAMING_OBSTACLE, text
 
@@ -154,11 +152,7 @@ def estimate_repeat_noise(readings: StackedReadings) -> tuple[dict[str, float], 
         undeclared = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
         if undeclared.size == 0:
             continue
-        slip, load = readings.slip[undeclared], readings.load[undeclared]
-        key = np.stack(
-            [np.round(slip / SLIP_TOLERANCE), np.round(np.log(load) / LOG_LOAD_TOLERANCE)], axis=1
-        )
-        _, group = np.unique(key, axis=0, return_inverse=True)
+        _, group = np.unique(readings.driven_alike[undeclared], return_inverse=True)
         count = np.bincount(group)
         mean = np.bincount(group, readings.reading[undeclared]) / count
         degrees_of_freedom = int((count - 1).sum())

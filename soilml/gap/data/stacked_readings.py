@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
+from soilml.identification.levels import Levels, load_levels, rows_driven_alike, slip_levels
 from soilml.identification.observations import declared_std
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
@@ -17,8 +18,6 @@ from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-#: Values that differ by less than this fraction of the range count as one.
-DISTINCT_FRACTION = 0.02
 
 
 @dataclass(frozen=True)
@@ -39,6 +38,8 @@ class StackedReadings:
     reading: Floats  # (m,)
     std: Floats  # (m,)
     noise: tuple[Noise | None, ...]  # of each channel, where the case declares it
+    slip_std: float = 0.0  # declared measurement noise of a slip, 0 where none is declared
+    load_std: float = 0.0  # likewise of a load, N
 
     def __len__(self) -> int:
         return len(self.reading)
@@ -52,6 +53,25 @@ class StackedReadings:
     def load(self) -> Floats:
         """Load of each reading, (m,), N."""
         return np.asarray(self.at.load)[self.row]
+
+    @property
+    def slip_levels(self) -> Levels:
+        """Levels of slip; `index` (m,) is that of each reading."""
+        row, which = np.unique(self.row, return_inverse=True)
+        levels = slip_levels(np.asarray(self.at.slip)[row], self.run[row], self.slip_std)
+        return replace(levels, index=levels.index[which])
+
+    @property
+    def load_levels(self) -> Levels:
+        """Levels of the logarithm of the load; `index` (m,) is that of each reading."""
+        row, which = np.unique(self.row, return_inverse=True)
+        levels = load_levels(np.asarray(self.at.load)[row], self.run[row], self.load_std)
+        return replace(levels, index=levels.index[which])
+
+    @property
+    def driven_alike(self) -> Integers:
+        """Groups of readings (m,) whose rows are repeats of each other, of all channels."""
+        return rows_driven_alike(self.at, self.run, self.slip_std, self.load_std)[self.row]
 
     def stack(self, force: dict[str, Floats]) -> Floats:
         """Values of each channel by row, (..., n), as one vector, (..., m)."""
@@ -146,6 +166,8 @@ def stack_readings(case: Case, table: Table) -> StackedReadings:
         noise=tuple(
             None if f"{column(n)}_std" in table else case.noise.get(column(n)) for n in names
         ),
+        slip_std=_typical_std(case, table, "slip"),
+        load_std=_typical_std(case, table, "load_N"),
     )
 
 
@@ -155,14 +177,7 @@ def positive_std(case: Case, table: Table, key: str) -> Floats:
     return np.where(std > 0, std, np.nan)
 
 
-def count_distinct(values: Floats) -> int:
-    """Number of distinct values; those within `DISTINCT_FRACTION` of the range count as one."""
-    ordered = np.sort(np.asarray(values, dtype=np.float64))
-    span = float(ordered[-1] - ordered[0])
-    if span <= 1e-9 * max(1.0, abs(float(ordered[-1]))):
-        return 1
-    count, last = 1, ordered[0]
-    for value in ordered:
-        if value - last > DISTINCT_FRACTION * span:
-            count, last = count + 1, value
-    return count
+def _typical_std(case: Case, table: Table, key: str) -> float:
+    """Median of the declared standard deviations of a column; 0 where none is declared."""
+    std = positive_std(case, table, key)
+    return float(np.nanmedian(std)) if np.isfinite(std).any() else 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
@@ -95,13 +95,13 @@ def region_fold(readings: StackedReadings) -> tuple[str, Mask] | None:
     Its name and its readings (m,); None where fewer than three loads and fewer than three slips
     were measured.
     """
-    by_load = count_distinct(np.log(readings.load)) >= 3
+    by_load = readings.load_levels.count >= 3
     values = readings.load if by_load else readings.slip
-    if count_distinct(values) < 3:
+    levels = readings.load_levels if by_load else readings.slip_levels
+    if levels.count < 3:
         return None
-    levels = np.unique(values)
-    fractions = np.asarray([np.mean(values >= level) for level in levels])
-    edge = levels[int(np.argmin(np.abs(fractions - REGION_FRACTION)))]
+    fractions = np.asarray([np.mean(levels.index >= i) for i in range(levels.count)])
+    edge = values[levels.index == np.argmin(np.abs(fractions - REGION_FRACTION))].min()
     name = f"load_N >= {edge:.4g}" if by_load else f"slip >= {edge:.3g}"
     return name, values >= edge
 

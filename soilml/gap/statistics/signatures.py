@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.statistics.batched_predictions import PredictionRequest, predict_many
 from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
+from soilml.identification.levels import covariate_levels
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 
@@ -110,6 +111,7 @@ def _missing_covariate(effect: type[Effect], readings: StackedReadings) -> str:
         value = getattr(readings.at, field)
         if value is None:
             return f"needs the column {COVARIATES[field]}"
-        if count_distinct(np.asarray(value, dtype=np.float64)) < 2:
+        values = np.broadcast_to(value, readings.run.shape)
+        if covariate_levels(field, values, readings.run).count < 2:
             return f"needs runs at several values of {COVARIATES[field]}"
     return ""

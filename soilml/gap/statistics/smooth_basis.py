@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.stacked_readings import StackedReadings, count_distinct
+from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.identification.levels import Levels
 
 Floats = NDArray[np.float64]
 
@@ -25,10 +26,13 @@ def smooth_basis(readings: StackedReadings) -> Floats:
     """Products of Legendre polynomials of slip and log load for each channel, (m, q).
 
     Each column is in the unit of its channel's noise. The degree is limited by the number of
-    distinct slips and loads.
+    levels of slip and load.
     """
     slip, load = _scaled(readings.slip), _scaled(np.log(readings.load))
-    degrees = _degree(slip, SLIP_DEGREE), _degree(load, LOAD_DEGREE)
+    degrees = (
+        min(SLIP_DEGREE, readings.slip_levels.count - 1),
+        min(LOAD_DEGREE, readings.load_levels.count - 1),
+    )
     columns = []
     for channel in range(len(readings.channels)):
         in_channel = readings.channel == channel
@@ -53,11 +57,6 @@ def _scaled(values: Floats) -> Floats:
     return 2.0 * (values - low) / (high - low) - 1.0 if high > low else np.zeros_like(values)
 
 
-def _degree(values: Floats, highest: int) -> int:
-    """The degree that the distinct values can determine."""
-    return int(min(highest, count_distinct(values) - 1))
-
-
 @dataclass(frozen=True)
 class Region:
     """The readings of one channel between two slips and two loads (N)."""
@@ -70,7 +69,8 @@ class Region:
 
 def regions(readings: StackedReadings) -> Iterator[Region]:
     """Channel by slip bin by load bin, those with enough readings."""
-    slips, loads = _bins(readings.slip, SLIP_BINS), _bins(readings.load, LOAD_BINS)
+    slips = _bins(readings.slip, readings.slip_levels, SLIP_BINS)
+    loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
     for i, name in enumerate(readings.channels):
         for low, high in slips:
             for light, heavy in loads:
@@ -81,8 +81,8 @@ def regions(readings: StackedReadings) -> Iterator[Region]:
                     yield Region(name, (low, high), (light, heavy), selected)
 
 
-def _bins(values: Floats, count: int) -> list[tuple[float, float]]:
-    """Bins with nearly equal numbers of distinct values."""
-    ordered = np.unique(values)
-    parts = np.array_split(ordered, min(count, count_distinct(values)))
-    return [(float(part[0]), float(part[-1])) for part in parts if part.size]
+def _bins(values: Floats, levels: Levels, count: int) -> list[tuple[float, float]]:
+    """Bins with nearly equal numbers of levels, from the lowest to the highest value of each."""
+    parts = np.array_split(np.arange(levels.count), min(count, levels.count))
+    own = [values[np.isin(levels.index, part)] for part in parts]
+    return [(float(part.min()), float(part.max())) for part in own]

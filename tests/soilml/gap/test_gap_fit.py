@@ -9,7 +9,7 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.gap.statistics.coordinates import linearise, predict_readings, size_coordinate
 from soilml.gap.statistics.least_squares import levenberg_marquardt
 from soilml.gap.statistics.signatures import effect_signatures, with_effect
-from soilml.gap.statistics.smooth_basis import count_distinct, regions, smooth_basis
+from soilml.gap.statistics.smooth_basis import regions, smooth_basis
 from soilml.physics.effects import EFFECTS
 
 
@@ -158,12 +158,6 @@ def test_the_degree_of_the_smooth_basis_follows_the_data():
     assert count["one load"] == 5  # 1, s, ..., s^4
     assert count["one load"] < count["two loads"]
     assert count["two slips"] == 5  # 1, w, w^2, s, s w
-
-
-def test_values_close_together_count_as_one():
-    assert count_distinct(np.asarray([1.0, 1.0, 1.0])) == 1
-    assert count_distinct(np.asarray([0.0, 0.001, 1.0])) == 2
-    assert count_distinct(np.asarray([0.0, 0.5, 1.0])) == 3
 
 
 def test_the_regions_of_the_map_cover_every_reading(clean):

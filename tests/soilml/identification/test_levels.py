@@ -1,0 +1,103 @@
+"""Levels: values within their scatter are one, distinct ones are counted, ranges are wide."""
+
+import numpy as np
+import pytest
+
+from soilml.identification.levels import (
+    covariate_levels,
+    is_one_load,
+    load_levels,
+    rows_driven_alike,
+    slip_levels,
+)
+from soilml.physics.operating_point import Operating
+
+SEEDS = 100
+
+
+def share(draw, count):
+    """Share of seeds in which `draw(rng)` has so many load levels."""
+    found = [load_levels(*draw(np.random.default_rng(s))).count for s in range(SEEDS)]
+    return np.mean(np.asarray(found) == count)
+
+
+@pytest.mark.parametrize("scatter", [0.003, 0.02, 0.08])
+@pytest.mark.parametrize("runs", [2, 4, 16, 64])
+def test_loads_that_scatter_about_one_value_are_one_level(scatter, runs):
+    run = np.repeat(np.arange(runs), 8)
+    by_run = share(lambda g: (20.0 * (1.0 + g.uniform(-scatter, scatter, runs))[run], run), 1)
+    by_row = share(lambda g: (20.0 * (1.0 + scatter * g.standard_normal(run.size)), run), 1)
+    assert min(by_run, by_row) >= 0.93
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_spaced_loads_with_jitter_are_counted(count):
+    loads = np.geomspace(30.0, 120.0, count)
+    run = np.repeat(np.arange(2 * count), 8)
+    base = np.tile(loads, 2)[run]
+    assert share(lambda g: (base * (1.0 + 0.03 * g.standard_normal(run.size)), run), count) >= 0.95
+    once = np.repeat(np.arange(count), 8)
+    assert (
+        share(lambda g: ((loads * (1 + 0.03 * g.standard_normal(count)))[once], once), count) > 0.9
+    )
+
+
+def test_a_range_without_gaps_has_several_levels_that_cover_it():
+    load = np.random.default_rng(0).uniform(13.0, 30.0, 64)
+    levels = load_levels(load, np.arange(64))
+    assert levels.count >= 3 and not is_one_load(load)
+    assert np.all(levels.low[1:] > levels.high[:-1])
+    assert np.all(np.diff(levels.index[np.argsort(load)]) >= 0)
+    assert set(levels.index) == set(range(levels.count))
+
+
+def test_repeats_show_levels_that_are_set_more_finely():
+    load = np.repeat([60.0, 64.0, 60.0, 64.0], 8)
+    repeated = np.repeat(np.arange(4), 8)
+    assert load_levels(load, repeated).count == 2
+    assert load_levels(load, repeated % 2).count == 1  # one run of each: may be its scatter
+
+
+def test_declared_noise_of_the_load_widens_a_level():
+    load = np.repeat([50.0, 60.0], 4)
+    assert load_levels(load).count == 2
+    assert load_levels(load, std=5.0).count == 1
+
+
+@pytest.mark.parametrize(
+    "slips, count",
+    [
+        (np.tile(np.linspace(0.05, 0.6, 8), 3), 8),
+        (np.asarray([0.30, 0.305, 0.295, 0.31]), 1),
+        (np.asarray([0.02, 0.04, 0.06, -0.1]), 4),
+        (np.asarray([0.2]), 1),
+    ],
+)
+def test_slips_are_counted(slips, count):
+    levels = slip_levels(slips)
+    assert levels.count == count and levels.index.max() == count - 1
+
+
+def test_covariates_have_levels_on_their_own_scales():
+    assert covariate_levels("speed", np.asarray([0.05, 0.051, 0.049])).count == 1
+    assert covariate_levels("speed", np.asarray([0.05, -0.05, 0.5, 0.05])).count == 3
+    assert covariate_levels("pass_number", np.asarray([1.0, 2.0, 1.0, 2.0])).count == 2
+    assert covariate_levels("slip_angle", np.zeros(5)).count == 1
+
+
+def test_rows_are_driven_alike_where_all_that_is_set_agrees():
+    at = Operating(
+        slip=np.asarray([0.30, 0.305, 0.30, 0.30, 0.45]),
+        load=np.asarray([60.0, 61.0, 60.5, 90.0, 60.0]),
+        speed=np.asarray([0.05, 0.05, -0.05, 0.05, 0.05]),
+    )
+    group = rows_driven_alike(at)
+    assert group[0] == group[1]
+    assert len(set(group.tolist())) == 4
+
+
+def test_rows_of_a_range_are_alike_only_where_they_are_close():
+    load = np.linspace(13.0, 30.0, 64)
+    group = rows_driven_alike(Operating(slip=np.full(64, 0.3), load=load))
+    widths = [np.ptp(np.log(load[group == i])) for i in range(group.max() + 1)]
+    assert max(widths) <= 0.0501 and group.max() > 10
