@@ -155,7 +155,9 @@ def _reestimate_covariance(
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
     readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
 
-    is_outlier = outliers(assemble_covariance(readings, columns, typical), residual, space)
+    covariance = assemble_covariance(readings, columns, typical)
+    alike = readings.driven_alike * len(readings.channels) + readings.channel
+    is_outlier = outliers(covariance, residual, space, alike, readings.run[readings.row])
     excluded = [
         (column(readings.channels[readings.channel[i]]), int(readings.row[i]))
         for i in np.flatnonzero(is_outlier)

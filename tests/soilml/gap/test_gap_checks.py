@@ -49,6 +49,41 @@ def test_only_planted_outliers_are_detected():
     np.testing.assert_array_equal(outliers(problem.covariance, far, space), struck)
 
 
+@pytest.mark.parametrize("both", [True, False])
+def test_a_reading_that_a_repeat_confirms_is_no_outlier(both):
+    case = case_of()
+    problem = fit_problem(case, driven(case, loads=(40.0, 40.0, 60.0, 90.0, 140.0), seed=4))
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    residual = problem.readings.reading - soil.prediction
+    space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)
+    struck = np.isin(np.arange(len(residual)), (3, 11) if both else (3,))  # runs 0 and 1
+    far = residual + np.where(struck, 9.0, 0.0) * problem.covariance.std
+    alike = problem.readings.driven_alike * 3 + problem.readings.channel
+    run = problem.readings.run[problem.readings.row]
+    found = outliers(problem.covariance, far, space, alike, run)
+    np.testing.assert_array_equal(found, struck & (not both))
+    np.testing.assert_array_equal(outliers(problem.covariance, far, space), struck)
+
+
+def test_a_repeat_that_strays_to_the_other_side_confirms_nothing():
+    case = case_of()
+    problem = fit_problem(case, driven(case, loads=(40.0, 40.0, 60.0, 90.0, 140.0), seed=4))
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    far = problem.readings.reading - soil.prediction
+    far[3] += 9.0 * problem.covariance.std[3]
+    far[11] -= 9.0 * problem.covariance.std[11]
+    space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)
+    alike = problem.readings.driven_alike * 3 + problem.readings.channel
+    found = outliers(problem.covariance, far, space, alike)
+    np.testing.assert_array_equal(np.flatnonzero(found), [3, 11])
+
+
+def test_loads_that_scatter_about_one_level_are_reported_as_one():
+    loads = 20.0 * (1.0 + np.random.default_rng(3).uniform(-0.08, 0.08, 8))
+    table = driven(case_of(), loads=tuple(loads))
+    assert any("one load only" in reason for reason in check(table).naming_obstacles)
+
+
 def test_exact_duplicates_are_excluded():
     table = driven(case_of())
     again = joined(table, table.rows(np.asarray([2, 5])))

@@ -1,0 +1,96 @@
+"""Repeated rows: their agreement, the words about the worst pair, and overstated noise."""
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.repeats import (
+    overstated_noise,
+    overstated_noise_notes,
+    repeat_disagreement,
+)
+from soilml.io.table import Table
+
+TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
+
+
+def scaled(table, rows, factor, name="torque_Nm"):
+    """The table with some readings multiplied."""
+    values = table[name].copy()
+    values[rows] *= factor
+    return Table(table.columns | {name: values})
+
+
+def problem_of(seed=0, **how) -> FitProblem:
+    case = case_of()
+    return fit_problem(case, driven(case, loads=TWICE, seed=seed, **how))
+
+
+def test_repeats_with_the_declared_noise_agree():
+    ratios, p_values = [], []
+    for seed in range(40):
+        case = case_of()
+        found = repeat_disagreement(stack_readings(case, driven(case, loads=TWICE, seed=seed)))
+        assert [f.degrees_of_freedom for f in found] == [24, 24, 24]
+        ratios += [f.scatter_ratio for f in found]
+        p_values += [f.p_value for f in found]
+    assert np.mean(np.square(ratios)) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(np.asarray(p_values) < 0.1) == pytest.approx(0.1, abs=0.06)
+
+
+def test_runs_whose_torques_differ_are_told_in_words():
+    case = case_of()
+    table = scaled(driven(case, loads=TWICE, noise=0.0), slice(11, 12), 1.43)
+    first = repeat_disagreement(stack_readings(case, table))[0]
+    assert first.channel == "torque" and first.disagree
+    own = table["torque_Nm"]
+    slip = table["slip"][3]
+    assert first.sentence == (
+        f"run run_0 and run run_1 at slip {slip:.2f} under 40 N: torque {own[3]:.3g} and "
+        f"{own[11]:.3g} N m, which differ by 43 %"
+    )
+    assert first.worst_sigma == pytest.approx(0.43 / np.hypot(0.01, 0.0143), rel=1e-6)
+
+
+def test_usual_scatter_from_run_to_run_is_no_disagreement():
+    soils = {"friction_angle": [0.52, 0.53, 0.515, 0.525, 0.52, 0.51]}
+    table_readings = problem_of(soils=soils)
+    case = case_of()
+    table = driven(case, loads=TWICE, soils=soils)
+    tolerant = fit_problem(case, table, run_effects=(1.0, 0.0))
+    strict = repeat_disagreement(table_readings.readings)
+    usual = repeat_disagreement(tolerant.readings, tolerant.covariance.matrix)
+    assert strict[0].disagree
+    assert not any(f.disagree for f in usual)
+
+
+def test_small_differences_of_slip_are_subtracted():
+    case = case_of()
+    table = driven(case, loads=TWICE, noise=0.0)
+    slip = table["slip"] + np.where(np.arange(len(table)) % 16 < 8, 0.0, 0.01)
+    model = case.model
+    from soilml.physics.operating_point import Operating
+
+    force = model(case.soil, Operating(slip=slip, load=table["load_N"]))
+    columns = {"slip": slip, "torque_Nm": force.torque}
+    columns |= {"drawbar_pull_N": force.drawbar_pull, "sinkage_m": force.sinkage}
+    readings = stack_readings(case, Table(table.columns | columns))
+    raw = repeat_disagreement(readings)
+    exact = repeat_disagreement(readings, expected=readings.reading)
+    assert raw[0].chi_square > 10.0 and exact[0].chi_square == 0.0
+
+
+def test_rows_without_repeats_are_not_compared():
+    case = case_of()
+    assert repeat_disagreement(stack_readings(case, driven(case))) == []
+
+
+def test_overstated_noise_is_noted():
+    case = case_of()
+    calm = stack_readings(case, driven(case, loads=TWICE, noise=0.2))
+    assert set(overstated_noise(calm)) == {"torque", "drawbar_pull", "sinkage"}
+    note = overstated_noise_notes(calm)[0]
+    assert "repeated rows of" in note and "times the declared noise" in note
+    assert overstated_noise(stack_readings(case, driven(case, loads=TWICE))) == {}
