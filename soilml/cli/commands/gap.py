@@ -27,6 +27,8 @@ from soilml.physics.effects.base import Effect
 
 #: Files that the output folder receives.
 FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
+#: A further file where causes are suspected but not named: the model with the first suspect.
+SUSPECTED = "model_suspected.toml"
 
 HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
@@ -47,8 +49,10 @@ error in them appears as an effect.
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. DIR receives report.html (start here),
-gap.json, model.toml (the model with the effect added) and next_runs.csv (runs
-to measure next). The exit status is 0 whatever the result and 2 for bad input.
+gap.json, model.toml (the model with the effects that the evidence supports) and
+next_runs.csv (runs to measure next); and model_suspected.toml where causes are
+suspected but not named. The exit status is 0 whatever the result and 2 for bad
+input.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
 after calibration, in the unit that `soilml effects` lists.
@@ -89,7 +93,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     folder = Path(args.out)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {args.out} is a file; needed is a folder")
-    return [folder / name for name in FILES] if folder.is_dir() else []
+    return [folder / name for name in (*FILES, SUSPECTED)] if folder.is_dir() else []
 
 
 def run(args: argparse.Namespace) -> int:
@@ -116,17 +120,23 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.gap.html.page import page
 
-    texts = (
-        page(report, str(args.model), str(args.runs)),
-        json_text(report.as_json()),
-        case_as_toml(report.model, [report.sentence]),
-        csv_text(_next_runs(report)),
-    )
+    texts = {
+        "report.html": page(report, str(args.model), str(args.runs)),
+        "gap.json": json_text(report.as_json()),
+        "model.toml": case_as_toml(report.model, [report.sentence]),
+        "next_runs.csv": csv_text(_next_runs(report)),
+    }
+    if report.suspected_model is not None:
+        first = " + ".join(report.best_unclaimed)
+        heading = f"With {first}, which is suspected, not named. {report.sentence}"
+        texts[SUSPECTED] = case_as_toml(report.suspected_model, [heading])
     with create_folder(args.out) as folder:
-        names = [folder / name for name in FILES]
+        names = [folder / name for name in texts]
         with atomic_outputs(names) as parts:
-            for part, text in zip(parts, texts, strict=True):
+            for part, text in zip(parts, texts.values(), strict=True):
                 part.write_text(text, encoding="utf-8")
+        if SUSPECTED not in texts:  # one of an earlier analysis would contradict this one
+            (folder / SUSPECTED).unlink(missing_ok=True)
     print(_text(report))
     print(f"\n{', '.join(str(name) for name in names)}", file=sys.stderr)
     return 0
@@ -164,20 +174,9 @@ def _next_runs(report: Any) -> dict[str, list[Any]]:
 
 
 def _text(report: Any) -> str:
-    parts = [f"{report.status}: {report.sentence}"]
-    if report.gap:
-        rows = [
-            (name.replace("_", " "), f"{s.before:.3g}", f"{s.after:.3g}", s.description)
-            for name, s in report.gap.items()
-        ]
-        parts.append(format_table(("gap", "before", "after", "rows"), rows, last_left=True))
-    if report.effects:
-        rows = [
-            (f"{e.name} {k}", f"{v.value:.4g}", f"{v.std:.2g}", v.unit)
-            for e in report.effects
-            for k, v in e.parameters.items()
-        ]
-        parts.append(format_table(("effect", "value", "std", "unit"), rows))
+    """The verdict and its tables, for the terminal."""
+    tables = (_gap_table, _effect_table, _suspect_table, _discrepancy_table)
+    parts = [f"{report.status}: {report.sentence}", *(table(report) for table in tables)]
     if report.next_runs:
         best = report.next_runs[0]
         apart = (
@@ -187,4 +186,40 @@ def _text(report: Any) -> str:
         )
         parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}")
     parts += [f"! {note}" for note in report.notes]
-    return "\n\n".join(parts)
+    return "\n\n".join(part for part in parts if part)
+
+
+def _gap_table(report: Any) -> str:
+    rows = [
+        (name.replace("_", " "), f"{s.before:.3g}", f"{s.after:.3g}", s.description)
+        for name, s in report.gap.items()
+    ]
+    return format_table(("gap", "before", "after", "rows"), rows, last_left=True) if rows else ""
+
+
+def _effect_table(report: Any) -> str:
+    rows = [
+        (f"{e.name} {k}", f"{v.value:.4g}", f"{v.std:.2g}", v.unit, f"{e.probability:.3f}")
+        for e in report.effects
+        for k, v in e.parameters.items()
+    ]
+    heading = ("effect", "value", "std", "unit", "probability")
+    return format_table(heading, rows) if rows else ""
+
+
+def _suspect_table(report: Any) -> str:
+    """The likeliest suspects, where no cause is named."""
+    if report.status not in ("suspected", "unknown", "not-testable"):
+        return ""
+    rows = [(" + ".join(s.effects), f"{s.log_odds:+.1f}") for s in report.suspects[:5]]
+    return format_table(("suspect", "ln(odds)"), rows) if rows else ""
+
+
+def _discrepancy_table(report: Any) -> str:
+    rows = [
+        (name, f"{d.before_value:.3g}", f"{d.after_value:.3g}", d.unit, f"{d.after_sigma:.2g}")
+        for name, d in report.discrepancy.items()
+    ]
+    if not any(d.after_sigma > 0.0 for d in report.discrepancy.values()):
+        return ""
+    return format_table(("discrepancy (rms)", "before", "after", "unit", "sigma"), rows)

@@ -171,3 +171,10 @@ def _minus(text: str) -> str:
 
 def _trimmed(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text and "×" not in text else text
+
+
+def format_probability(p: float) -> str:
+    """A probability with two digits; near 0 and 1 as a bound."""
+    if p < 0.005:
+        return "< 0.01"
+    return "> 0.99" if p > 0.995 else f"{p:.2f}"

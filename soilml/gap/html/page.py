@@ -14,7 +14,13 @@ from soilml.gap.html.discrepancy_map import discrepancy_maps
 from soilml.gap.html.gap_bars import gap_bars
 from soilml.gap.html.prediction_curves import prediction_curves
 from soilml.gap.html.soil_table import soil_table
-from soilml.gap.html.verdict_section import advice, effect_descriptions, effect_tables, model_after
+from soilml.gap.html.verdict_section import (
+    advice,
+    effect_descriptions,
+    effect_tables,
+    model_after,
+    suspect_table,
+)
 from soilml.gap.results import STATUSES, GapReport
 from soilml.optional_imports import need
 
@@ -70,6 +76,8 @@ def _content(report: GapReport) -> dict[str, Any]:
         "maps": discrepancy_maps(report),
         "curves": report.curves and prediction_curves(report.curves, changed),
         "soil": soil_table(report),
+        "soil_changed": report.soil_before != report.soil_after,
+        "suspects": suspect_table(report),
         "variance_components": [
             formatting.format_variance_component(key, value) for key, value in components
         ],

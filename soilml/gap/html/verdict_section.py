@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from soilml.gap.html.formatting import format_estimate, format_in_si
+from soilml.gap.html.formatting import format_estimate, format_in_si, format_probability
 from soilml.gap.results import GapReport
 from soilml.physics.effects import EFFECTS
 
 #: What the reader should do, by status.
 _ADVICE = {
     "no-gap": "Use the model as it is, within the measured range of slip and load.",
+    "undecided": "Do not use the model as it is yet: find out why the measurements disagree, then "
+    "correct the noise in the model file or the runs, and analyse again.",
+    "suspected": "Make the first run under Next runs. model.toml contains the soil alone, with its "
+    "discrepancy; model_suspected.toml contains the first suspect.",
+    "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
+    "left, which widens every interval computed from it. Make the first run under Next runs.",
     "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",
     "class": "Make the first run under Next runs: it discriminates best between the explanations.",
     "form-open": "model.toml contains the effect with a law fitted to these data. Use it within "
@@ -36,9 +43,9 @@ def model_after(report: GapReport) -> str:
     names = " + ".join(e.name for e in report.effects)
     if report.status == "class":
         return f"with {names}, one of the equally good explanations"
-    if report.status in ("named", "form-open"):
+    if report.status in ("named", "form-open", "partly-named"):
         return f"with {names}"
-    return f"with {names or 'the best candidate'}, which is not claimed"
+    return f"with {' + '.join(report.best_unclaimed) or 'the best candidate'}, which is not claimed"
 
 
 def effect_descriptions(report: GapReport) -> dict[str, str]:
@@ -54,6 +61,7 @@ def effect_tables(report: GapReport) -> list[dict[str, Any]]:
     return [
         {
             "effect": e,
+            "probability": format_probability(e.probability),
             "parameters": [
                 (
                     k,
@@ -65,4 +73,24 @@ def effect_tables(report: GapReport) -> list[dict[str, Any]]:
             ],
         }
         for e in report.effects
+    ]
+
+
+#: Suspects that are listed, and statuses under which the list is shown: a named cause is not one of
+#: several suspects.
+_LISTED, _WITH_SUSPECTS = 6, ("suspected", "unknown", "class", "not-testable")
+
+
+def suspect_table(report: GapReport) -> list[dict[str, Any]]:
+    """The suspects with their probabilities, where no single cause is named."""
+    if report.status not in _WITH_SUSPECTS:
+        return []
+    return [
+        {
+            "effects": s.effects,
+            "given": s.given,
+            "log_odds": s.log_odds,
+            "probability": format_probability(1.0 / (1.0 + math.exp(-s.log_odds))),
+        }
+        for s in report.suspects[:_LISTED]
     ]

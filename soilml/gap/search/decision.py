@@ -15,8 +15,6 @@ from soilml.gap.search.stepwise import SearchResult
 #: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
 #: several adjustable laws together fit almost any data.
 MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
-#: Probability of the soil alone above which there are no suspects worth a list.
-NO_SUSPECT = 0.5
 
 
 @dataclass(frozen=True)
@@ -52,8 +50,8 @@ def decide(
     """
     if not result.has_gap:
         return Decision("undecided" if disagreements else "no-gap", (), None)
-    likeliest = result.likeliest
-    suspects = likeliest is not None and result.posterior.weight(()) < NO_SUSPECT
+    likeliest, none = result.likeliest, result.none
+    suspects = bool(likeliest and none and likeliest.objective < none.objective)
     if naming_obstacles:
         return (
             Decision("suspected", (), likeliest) if suspects else Decision("not-testable", (), None)
