@@ -14,6 +14,10 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.statistics.coordinates import SoilCoordinate, linearise
+from soilml.gap.statistics.restricted_likelihood import (
+    RestrictedLikelihood,
+    restricted_likelihood,
+)
 from soilml.numerics.prior import Prior
 from soilml.numerics.subspaces import column_space
 from soilml.parameters import declared
@@ -23,9 +27,6 @@ Floats = NDArray[np.float64]
 
 #: One unit of run-to-run variation: half a degree of friction angle, 5 % of the bearing moduli.
 RUN_EFFECT_UNITS = {"friction_angle": np.deg2rad(0.5), "bearing": 0.05}
-#: Prior standard deviations of the run-to-run variation, in those units, and of the logarithm of a
-#: channel's noise scale.
-RUN_EFFECT_PRIOR_STD, LOG_NOISE_SCALE_PRIOR_STD = 1.0, 0.3
 #: With fewer runs than this the run-to-run variation cannot be estimated; it is then assumed to be
 #: at least this many units.
 FEW_RUNS, MIN_RUN_EFFECT = 6, 0.8
@@ -113,7 +114,19 @@ def assemble_covariance(
         ]
     )
     matrix += _same_run_indicator(readings) * ((columns * run_effects**2) @ columns.T)
-    return Covariance(matrix, np.linalg.inv(np.linalg.cholesky(matrix)), components)
+    return Covariance(matrix, _whitening_matrix(matrix, readings.run[readings.row]), components)
+
+
+def _whitening_matrix(matrix: Floats, run: NDArray[np.int64]) -> Floats:
+    """Inverse of the Cholesky factor of a covariance without correlation between runs, (m, m).
+
+    Neither the factor nor its inverse mixes runs, so that each run has its own block in them.
+    """
+    whiten = np.zeros_like(matrix)
+    for number in np.unique(run):
+        block = np.ix_(run == number, run == number)
+        whiten[block] = np.linalg.inv(np.linalg.cholesky(matrix[block]))
+    return whiten
 
 
 def estimate_covariance(
@@ -142,12 +155,13 @@ def estimate_covariance(
     whitened = space / readings.std[:, None]
     basis = column_space(whitened, **FIXED_EFFECT_TOLERANCES) * readings.std[:, None]
     grid = _run_effect_grid(len(readings.runs))
-    likelihood = _RestrictedLikelihood(readings, columns, residual, basis)
-    best, lowest = _coordinate_search(likelihood, np.eye(len(readings)), 0.0, grid)
+    best, lowest = _coordinate_search(
+        restricted_likelihood(readings, columns, residual, basis, 0.0), 0.0, grid
+    )
     if _is_autocorrelated(readings, residual, basis):
         for autocorrelation in AUTOCORRELATION_GRID:
-            noise = _noise_correlation(readings, autocorrelation)
-            components, value = _coordinate_search(likelihood, noise, autocorrelation, grid)
+            likelihood = restricted_likelihood(readings, columns, residual, basis, autocorrelation)
+            components, value = _coordinate_search(likelihood, autocorrelation, grid)
             if value < lowest - AUTOCORRELATION_PENALTY:
                 best, lowest = components, value
     degrees_of_freedom = max(float(len(readings) - basis.shape[1]), 2.0)
@@ -164,64 +178,28 @@ def _run_effect_grid(runs: int) -> tuple[float, ...]:
     return RUN_EFFECT_GRID
 
 
-@dataclass(frozen=True)
-class _RestrictedLikelihood:
-    """The restricted likelihood of residuals, as a function of the variance components."""
-
-    readings: StackedReadings
-    columns: Floats
-    residual: Floats
-    basis: Floats  # of the fixed effects
-
-    def objective(self, scale: Floats, run_effects: Floats, noise: Floats, same: Floats) -> float:
-        """-2 log posterior; infinite where the covariance is not positive definite."""
-        columns = self.columns
-        std = self.readings.std * scale[self.readings.channel]
-        matrix = np.outer(std, std) * noise + same * ((columns * run_effects**2) @ columns.T)
-        try:
-            factor = np.linalg.cholesky(matrix)
-        except np.linalg.LinAlgError:
-            return np.inf
-        white = np.linalg.solve(factor, np.column_stack([self.basis, self.residual]))
-        q, r = np.linalg.qr(white[:, :-1])
-        projected = white[:, -1] - q @ (q.T @ white[:, -1])
-        value = 2.0 * np.log(np.diag(factor)).sum()  # ln |V|
-        value += 2.0 * np.log(np.abs(np.diag(r)) + 1e-300).sum() + projected @ projected
-        value += float(np.sum((np.log(scale) / LOG_NOISE_SCALE_PRIOR_STD) ** 2))
-        return float(value + np.sum((run_effects / RUN_EFFECT_PRIOR_STD) ** 2))
-
-
 def _coordinate_search(
-    likelihood: _RestrictedLikelihood,
-    noise: Floats,
-    autocorrelation: float,
-    grid: tuple[float, ...],
+    likelihood: RestrictedLikelihood, autocorrelation: float, grid: tuple[float, ...]
 ) -> tuple[VarianceComponents, float]:
     """Minimise over run effects and noise scales in turn, at one autocorrelation."""
-    same = _same_run_indicator(likelihood.readings)
-    channels = len(likelihood.readings.channels)
-    scale, run_effects = np.ones(channels), np.full(2, grid[0])
-
-    def objective(scale: Floats, run_effects: Floats) -> float:
-        return likelihood.objective(scale, run_effects, noise, same)
-
-    value = objective(scale, run_effects)
+    scale, run_effects = np.ones((1, len(likelihood.counts))), np.full((1, 2), grid[0])
+    value = float(likelihood.objective(scale, run_effects)[0])
     for _ in range(SWEEPS):
         for k in range(2):
-            trials = [(objective(scale, _replaced(run_effects, k, t)), t) for t in grid]
-            value, best = min(trials)
-            run_effects = _replaced(run_effects, k, best)
-        for k in range(channels):
-            candidates = (1.0, *(scale[k] * factor for factor in NOISE_SCALE_FACTORS))
-            trials = [
-                (objective(_replaced(scale, k, s), run_effects), s) for s in candidates if s >= 1.0
-            ]
-            value, best = min(trials)
-            scale = _replaced(scale, k, best)
+            trials = _with_column(run_effects, k, np.asarray(grid))
+            values = likelihood.objective(np.repeat(scale, len(trials), axis=0), trials)
+            best = int(np.argmin(values))
+            value, run_effects = float(values[best]), trials[best : best + 1]
+        for k in range(scale.shape[1]):
+            candidates = np.asarray([1.0, *(scale[0, k] * f for f in NOISE_SCALE_FACTORS)])
+            trials = _with_column(scale, k, np.unique(candidates[candidates >= 1.0]))
+            values = likelihood.objective(trials, np.repeat(run_effects, len(trials), axis=0))
+            best = int(np.argmin(values))
+            value, scale = float(values[best]), trials[best : best + 1]
     components = VarianceComponents(
-        scale,
-        float(run_effects[0] * RUN_EFFECT_UNITS["friction_angle"]),
-        float(run_effects[1] * RUN_EFFECT_UNITS["bearing"]),
+        scale[0],
+        float(run_effects[0, 0] * RUN_EFFECT_UNITS["friction_angle"]),
+        float(run_effects[0, 1] * RUN_EFFECT_UNITS["bearing"]),
         autocorrelation,
         1.0,
     )
@@ -264,7 +242,8 @@ def _noise_correlation(readings: StackedReadings, autocorrelation: float) -> Flo
     return np.asarray(same_series * autocorrelation**lag)
 
 
-def _replaced(values: Floats, index: int, value: float) -> Floats:
-    changed = values.copy()
-    changed[index] = value
+def _with_column(row: Floats, index: int, values: Floats) -> Floats:
+    """The row (1, k) repeated with each of the values in one of its columns, (values, k)."""
+    changed = np.repeat(row, len(values), axis=0)
+    changed[:, index] = values
     return changed

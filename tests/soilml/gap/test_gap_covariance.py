@@ -13,6 +13,12 @@ from soilml.gap.statistics.reml_covariance import (
     estimate_covariance,
     run_effect_columns,
 )
+from soilml.gap.statistics.restricted_likelihood import (
+    LOG_NOISE_SCALE_PRIOR_STD,
+    RUN_EFFECT_PRIOR_STD,
+    restricted_likelihood,
+    whiten_series,
+)
 from soilml.gap.statistics.smooth_basis import smooth_basis
 
 LOADS = (40.0, 65.0, 100.0, 150.0) * 4
@@ -119,3 +125,77 @@ def test_run_effect_columns_agree_with_the_model(rig):
     more = linearise(case.with_values({"friction_angle": phi}), [], np.zeros(0), readings)[0]
     off = more - linearise(case, [], np.zeros(0), readings)[0]
     np.testing.assert_allclose(columns[:, 0], off, rtol=0.1, atol=0.05 * np.abs(off).max())
+
+
+def dense_objective(readings, columns, residual, basis, components):
+    """-2 log posterior, from the covariance of all readings."""
+    matrix = assemble_covariance(readings, columns, components).matrix
+    inverse = np.linalg.inv(matrix)
+    information = basis.T @ inverse @ basis
+    weights = np.linalg.solve(information, basis.T @ inverse @ residual)
+    left = residual - basis @ weights
+    units = (RUN_EFFECT_UNITS["friction_angle"], RUN_EFFECT_UNITS["bearing"])
+    tau = np.asarray([components.friction_angle_std, components.bearing_std]) / units
+    return (
+        np.linalg.slogdet(matrix)[1]
+        + np.linalg.slogdet(information)[1]
+        + left @ inverse @ left
+        + np.sum((np.log(components.noise_scale) / LOG_NOISE_SCALE_PRIOR_STD) ** 2)
+        + np.sum((tau / RUN_EFFECT_PRIOR_STD) ** 2)
+    )
+
+
+@pytest.mark.parametrize("autocorrelation", [0.0, 0.5, 0.95])
+@pytest.mark.parametrize("angle, bearing", [(0.0, 0.0), (1.2, 0.0), (0.5, 5.0)])
+def test_sums_by_run_give_the_likelihood_of_the_full_covariance(
+    rig,
+    autocorrelation,
+    angle,
+    bearing,
+):
+    readings, columns, space = rig
+    kept = np.arange(len(readings)) % 7 != 3  # series with gaps
+    readings, columns, space = readings.subset(kept), columns[kept], space[kept]
+    residual = np.random.default_rng(2).standard_normal(len(readings)) * readings.std
+    scales = np.asarray([[1.0, 1.0, 1.0], [1.3, 1.0, 2.0]])
+    found = restricted_likelihood(readings, columns, residual, space, autocorrelation).objective(
+        scales, np.tile([angle, bearing], (2, 1))
+    )
+    for value, scale in zip(found, scales, strict=True):
+        components = scatter(scale, angle, bearing, autocorrelation)
+        dense = dense_objective(readings, columns, residual, space, components)
+        assert value == pytest.approx(dense, rel=1e-8, abs=1e-6)
+
+
+def test_a_series_is_whitened_by_the_sample_before(rig):
+    readings, columns, _ = rig
+    white, log_determinant = whiten_series(readings, np.eye(len(readings)), 0.7)
+    components = scatter(1.0, 0.0, 0.0, 0.7)
+    covariance = assemble_covariance(readings, columns, components).matrix
+    correlation = covariance / np.outer(readings.std, readings.std)
+    np.testing.assert_allclose(white @ correlation @ white.T, np.eye(len(readings)), atol=1e-12)
+    assert log_determinant == pytest.approx(np.linalg.slogdet(correlation)[1])
+
+
+def test_residuals_within_the_fixed_effects_leave_nothing(rig):
+    readings, columns, space = rig
+    weights = np.linspace(0.5, 1.0, space.shape[1])
+    likelihood = restricted_likelihood(readings, columns, space @ weights, space, 0.0)
+    nothing = restricted_likelihood(readings, columns, 0.0 * readings.std, space, 0.0)
+    one, none = np.ones((1, 3)), np.zeros((1, 2))
+    assert likelihood.objective(one, none) == pytest.approx(nothing.objective(one, none))
+
+
+def test_whitening_by_run_inverts_the_covariance(rig):
+    readings, columns, _ = rig
+    covariance = assemble_covariance(readings, columns, scatter(1.2, 0.8, 0.5, 0.5))
+    dense = np.linalg.inv(np.linalg.cholesky(covariance.matrix))
+    np.testing.assert_allclose(covariance.whiten, dense, rtol=1e-9, atol=1e-9 * dense.max())
+
+
+def test_runs_of_one_sample_have_no_neighbours():
+    case = case_of()
+    table = driven(case, loads=LOADS[:4], slips=1)
+    readings = stack_readings(case, table)
+    white, log_determinant = whiten_series(readings, np.eye(len(readings)), 0.9)
+    assert np.array_equal(white, np.eye(len(readings))) and log_determinant == 0.0
