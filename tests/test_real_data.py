@@ -1,5 +1,6 @@
 """Measured tests, where `SOILML_DATA` names a folder that holds them."""
 
+import csv
 import importlib.util
 import json
 import os
@@ -65,3 +66,22 @@ def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
     assert lugged["fits_best_but_not_claimed"] == ["grousers", "slip-sinkage"]
     assert said("cmu_driving")["cause_set"] == [["slip-sinkage"]]
     assert said("cmu_all")["status"] == "unknown"
+
+
+def test_the_continuous_law_of_braking_explains_driving_and_braking_far_better(tmp_path, capsys):
+    """A smooth wheel, slips -0.7 to 0.9, soil alone: it leaves a third of the misfit."""
+    table = Path(DATA) / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
+    with table.open() as lines:
+        rows = [row for row in csv.DictReader(lines) if float(row["slip_angle_rad"]) == 0.0]
+    columns = ("slip", "load_N", "drawbar_pull_N", "sinkage_m")
+    kept = [",".join(row[c] for c in columns) for row in rows if float(row["slip"]) > -1.0]
+    runs = tmp_path / "runs.csv"
+    runs.write_text("\n".join(["run,torque_Nm," + ",".join(columns), *(f"a,,{k}" for k in kept)]))
+    text = (ROOT / "examples/gap/cmu.toml").read_text()
+    misfit = []
+    for law in ("displacement-sign", "slip-sign"):
+        model = tmp_path / f"{law}.toml"
+        model.write_text(text.replace("[gear]", f'[gear]\nbraking = "{law}"'))
+        assert main(["identify", str(model), str(runs)]) == 0
+        misfit.append(json.loads(capsys.readouterr().out)["misfit"])
+    assert misfit[0] < 0.4 * misfit[1]
