@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from soilml.config.share_and_constant import (
     share_and_constant_as_setting,
     take_share_and_constant,
@@ -51,7 +54,7 @@ class Discrepancy:
     def amplitude(self, span: float) -> float:
         """Standard deviation a of the model error, in the unit of the column.
 
-        `span` is the range of the channel's readings, which includes zero: max(y, 0) - min(y, 0).
+        `span` is the range of the channel's readings, which `range_with_zero` returns.
 
         >>> Discrepancy(share=0.02).amplitude(50.0)
         1.0
@@ -61,6 +64,18 @@ class Discrepancy:
     def as_setting(self) -> Any:
         """The amplitude as it is written in TOML."""
         return share_and_constant_as_setting(self.share, self.constant)
+
+
+def range_with_zero(readings: NDArray[np.float64]) -> float:
+    """max(y, 0) - min(y, 0) of the readings that are not NaN; zero where there is none.
+
+    It includes zero, so that a channel with nearly equal readings has the range of its size.
+
+    >>> range_with_zero(np.asarray([9.0, np.nan, 10.0]))
+    10.0
+    """
+    known = readings[np.isfinite(readings)]
+    return float(np.max(known, initial=0.0) - np.min(known, initial=0.0))
 
 
 def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.identification.discrepancy import ignored_discrepancy, included_discrepancy
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.linear import linear
@@ -96,7 +97,8 @@ def identify(
         )
     data = read_observations(case, table)
     fit = METHODS[method](case, data, select_free(case, free))
-    return replace(fit, warnings=(*fit.warnings, *_method_limits(fit, data, free), *data.notes))
+    texts = [*_method_limits(fit, data, free), *_about_discrepancy(case, fit, data), *data.notes]
+    return replace(fit, warnings=(*fit.warnings, *texts))
 
 
 def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:
@@ -110,6 +112,13 @@ def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> 
     if fit.method in CLOSED_FORM and (np.any(data.slip_std) or np.any(data.load_std)):
         texts.append(f"the {fit.method} method does not propagate noise of slip and load into std")
     return texts
+
+
+def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[str]:
+    """Whether the discrepancy of the case is in the intervals."""
+    if fit.method in CLOSED_FORM:
+        return ignored_discrepancy(case, f"the {fit.method} method")
+    return included_discrepancy(case, data)
 
 
 __all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]

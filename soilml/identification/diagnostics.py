@@ -62,9 +62,10 @@ def with_warnings(
         texts.append(f"{count} for {len(free)} parameters: the prior determines the rest")
     texts += _trade_offs(fit)
     if excess_residuals:
+        allowed = f"{EXCESS_RESIDUALS}{' and discrepancy' if case.discrepancy else ''}"
         texts.append(
-            f"residuals are {np.sqrt(fit.misfit):.1f} {EXCESS_RESIDUALS}: the model lacks an "
-            "effect or the noise is understated; std is multiplied by this factor"
+            f"residuals are {np.sqrt(fit.misfit):.1f} {allowed}: the model lacks an effect or "
+            "the noise is understated; std is multiplied by this factor"
         )
     if undeclared:
         names = ", ".join(column(c.name) for c in data.channels if not c.declared)

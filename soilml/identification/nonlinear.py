@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
+from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.observations import Observations
@@ -22,6 +24,7 @@ from soilml.identification.predictions import (
     stack_channels,
     stacked_readings,
 )
+from soilml.numerics.noise_and_process import Whitener
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -49,7 +52,7 @@ NO_EQUILIBRIUM = 1e3
 @dataclass(frozen=True)
 class _Optimum:
     u: Floats  # (p,) fractions of the priors
-    residual: Floats  # (k,) in standard deviations
+    residual: Floats  # (k,) of unit covariance
     jacobian: Floats  # (k, p)
 
     @property
@@ -64,29 +67,40 @@ class _Problem:
     free: Sequence[FreeParameter]
     reading: Floats  # (k,)
     std: Floats  # (k,)
+    columns: Floats  # (k, q) of the model discrepancy
+
+    @cached_property
+    def whitener(self) -> Whitener:
+        """Inverse root of the covariance of noise and discrepancy."""
+        return Whitener.of(self.std, self.columns)
 
     def predict(self, u: Floats) -> Floats:
         """Predictions (sets, k) at u (sets, p)."""
         return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
 
     def whitened(self, prediction: Floats) -> Floats:
-        """Residuals in standard deviations."""
-        return np.nan_to_num((prediction - self.reading) / self.std, nan=NO_EQUILIBRIUM)
+        """Residuals of unit covariance: in standard deviations, where there is no discrepancy."""
+        return self.whitener(self.residual(prediction))
+
+    def residual(self, prediction: Floats) -> Floats:
+        """Residuals in the units of the readings."""
+        residual = prediction - self.reading
+        return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
 
     def linearised(self, u: Floats) -> tuple[Floats, Floats]:
         """Whitened residuals (k,) and Jacobian (k, p)."""
         prediction, jacobian = linearise(self.case, self.data, self.free, u)
-        return self.whitened(prediction), np.nan_to_num(jacobian / self.std[:, None])
+        return self.whitened(prediction), self.whitener(np.nan_to_num(jacobian).T).T
 
     def with_noise_at(self, optimum: _Optimum) -> _Problem:
         """The same problem, noise taken at the optimum's predictions or from its residuals."""
         case, data, free = self.case, self.data, self.free
-        declared = noise_at_prediction(case, data, self.predict(optimum.u[None, :]))[0]
-        from_inputs = propagated_input_noise(
-            case, free, optimum.u, data.at, data.slip_std, data.load_std
-        )
+        prediction = self.predict(optimum.u[None, :])
+        declared = noise_at_prediction(case, data, prediction)[0]
+        slip_std, load_std = data.slip_std, data.load_std
+        from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
         total = np.hypot(declared, stack_channels(data, from_inputs)[0])
-        estimated = _residual_noise(data, self.reading, optimum.residual * self.std, len(free))
+        estimated = _residual_noise(data, self.reading, self.residual(prediction)[0], len(free))
         return replace(self, std=np.where(np.isfinite(total), total, estimated))
 
 
@@ -97,7 +111,8 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
 
     Noise of slip and load is propagated into sigma (effective variance). Relative noise is taken
     relative to the prediction: relative to the reading it would bias the fit low, by about twice
-    its square, since readings with negative errors would have the larger weights.
+    its square, since readings with negative errors would have the larger weights. With a model
+    discrepancy, residuals are weighted by the inverse covariance of noise and discrepancy.
 
     The covariance is that of the linearised problem with a Gaussian prior of the uniform one's
     variance, enlarged by the squared distance between the optimum and the posterior mean: `std`
@@ -139,7 +154,8 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         )
     reading, declared = stacked_readings(data)
     std = np.where(np.isfinite(declared), declared, _initial_noise(data))
-    problem = _Problem(case, data, free, reading, std)
+    columns = stacked_columns(discrepancy_columns(case, data))
+    problem = _Problem(case, data, free, reading, std, columns)
     optimum = _global_optimum(problem)
     for _ in range(NOISE_ROUNDS if undeclared else 1):
         problem = problem.with_noise_at(optimum)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.diagnostics import with_warnings
+from soilml.identification.discrepancy import discrepancy_columns
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
@@ -26,6 +27,7 @@ from soilml.numerics.importance_sampling import (
     ImportanceSample,
     importance_sample,
 )
+from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -66,12 +68,13 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
 
     Its mean has the least expected squared error of all estimators on data from this model, prior
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
-    added in quadrature, linearised at the best of the first samples. A parameter that the rows do
-    not determine has its prior as posterior.
+    added in quadrature, linearised at the best of the first samples. A model discrepancy is
+    integrated out: its covariance is added to that of the noise. A parameter that the rows do not
+    determine has its prior as posterior.
 
     Where the residuals exceed the declared noise significantly (one data set in a thousand does by
-    chance), all noise is multiplied by the root of the misfit and the posterior is sampled again.
-    This does not correct the bias of a model that lacks an effect.
+    chance), noise and discrepancy are multiplied by the root of the misfit and the posterior is
+    sampled again. This does not correct the bias of a model that lacks an effect.
 
     Parameters
     ----------
@@ -145,10 +148,13 @@ def posterior_samples(
 def sample_posterior(
     case: Case, data: Observations, free: Sequence[FreeParameter], noise_scale: float = 1.0
 ) -> tuple[ImportanceSample, float]:
-    """Weighted fractions of the priors with all noise multiplied by `noise_scale`, and the misfit.
+    """Weighted fractions of the priors, and the misfit.
+
+    Noise and discrepancy are multiplied by `noise_scale`.
 
     The misfit is the sum of squared residuals over declared variances, per degree of freedom, at
-    the sample of largest weight. Raises `FitError` as `posterior` does.
+    the sample of largest weight; with a discrepancy, weighted by the inverse covariance. Raises
+    `FitError` as `posterior` does.
     """
     density = _LogDensity(case, data, free, noise_scale)
     sample = importance_sample(density, len(free))
@@ -184,6 +190,7 @@ class _LogDensity:
             )
         self.case, self.data, self.free, self.noise_scale = case, data, free, noise_scale
         self.reading = stacked_readings(data)[0]
+        self.columns = discrepancy_columns(case, data)
         #: noise that slip and load cause, (k,); linearised at the best of the first samples
         self.input_std: Floats | None = None
 
@@ -194,14 +201,24 @@ class _LogDensity:
 
     def squared_residuals(self, u: Floats) -> float:
         """Sum of squared residuals in declared standard deviations, of one parameter set (1, p)."""
-        y, std = self._predict(u)
-        return float((((y - self.reading) / std) ** 2).sum())
+        return float(self._squares_and_log_determinant(*self._predict(u))[0].sum())
 
     def _of_block(self, u: Floats) -> Floats:
-        y, std = self._predict(u)
-        std = self.noise_scale * std
-        logs = -0.5 * (((y - self.reading) / std) ** 2).sum(axis=1) - np.log(std).sum(axis=1)
+        squares, log_determinant = self._squares_and_log_determinant(*self._predict(u))
+        # the factor on all noise enters the determinant as a constant, which does not matter
+        logs = -0.5 * squares / self.noise_scale**2 - log_determinant
         return np.where(np.isfinite(logs), logs, -np.inf)
+
+    def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
+        """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
+        squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
+        for columns in self.columns:
+            start, stop = stop, stop + len(columns)
+            own = squared_residuals_and_log_determinant(
+                y[:, start:stop] - self.reading[start:stop], std[:, start:stop], columns
+            )
+            squares, log_determinant = squares + own[0], log_determinant + own[1]
+        return squares, log_determinant
 
     def _predict(self, u: Floats) -> tuple[Floats, Floats]:
         """Predictions and standard deviations of the readings under each set, (sets, k)."""
@@ -209,8 +226,8 @@ class _LogDensity:
         y = stack_channels(self.data, channels)
         std = noise_at_prediction(self.case, self.data, y)
         if self.input_std is None:
-            squares = np.nan_to_num(((y - self.reading) / std) ** 2, nan=np.inf).sum(axis=1)
-            self.input_std = self._propagated(u[int(np.argmin(squares))])
+            squares = self._squares_and_log_determinant(y, std)[0]
+            self.input_std = self._propagated(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
         return y, np.asarray(np.hypot(std, self.input_std))
 
     def _propagated(self, u: Floats) -> Floats:

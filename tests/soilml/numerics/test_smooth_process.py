@@ -18,7 +18,7 @@ def test_products_of_the_columns_are_the_covariance():
     amplitude = rng.uniform(0.5, 2.0, 50)
     columns = process_columns(points, amplitude)
     assert columns.shape[1] < 50
-    assert columns @ columns.T == pytest.approx(covariance(points, amplitude), abs=1e-5)
+    assert columns @ columns.T == pytest.approx(covariance(points, amplitude), abs=1e-4)
 
 
 def test_a_load_twice_as_large_is_as_far_wherever_it_begins():

@@ -1,0 +1,66 @@
+"""Model discrepancy at measured rows: the columns of its process, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.identification.observations import Observations
+from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.quantities import QUANTITIES, column
+
+Floats = NDArray[np.float64]
+
+
+def discrepancy_columns(case: Case, data: Observations) -> tuple[Floats, ...]:
+    """For each channel, columns (k_c, q_c) of its discrepancy at its k_c readings.
+
+    The product of the columns with their transpose is the covariance. A channel without
+    discrepancy has no columns.
+    """
+    parts = []
+    for channel in data.channels:
+        measured = np.isfinite(channel.reading)
+        own = case.discrepancy.get(column(channel.name), Discrepancy())
+        amplitude = own.amplitude(range_with_zero(channel.reading))
+        if amplitude == 0.0:
+            parts.append(np.zeros((int(measured.sum()), 0)))
+            continue
+        points = slip_load_points(
+            data.slip[measured], data.load[measured], own.slip_length, own.log_load_length
+        )
+        parts.append(process_columns(points, amplitude))
+    return tuple(parts)
+
+
+def stacked_columns(parts: Sequence[Floats]) -> Floats:
+    """Columns (k, q) for all readings, one channel after another; zero outside their channel."""
+    stacked = np.zeros((sum(len(p) for p in parts), sum(p.shape[1] for p in parts)))
+    row = first = 0
+    for part in parts:
+        stacked[row : row + len(part), first : first + part.shape[1]] = part
+        row, first = row + len(part), first + part.shape[1]
+    return stacked
+
+
+def included_discrepancy(case: Case, data: Observations) -> list[str]:
+    """A sentence with the standard deviation of each channel's discrepancy; none without one."""
+    texts = []
+    for channel in data.channels:
+        own = case.discrepancy.get(column(channel.name), Discrepancy())
+        amplitude = own.amplitude(range_with_zero(channel.reading))
+        if amplitude > 0.0:
+            texts.append(f"{channel.name} {amplitude:.3g} {QUANTITIES[channel.name].unit}")
+    return [f"errors of the model are included in std: {', '.join(texts)}"] if texts else []
+
+
+def ignored_discrepancy(case: Case, what: str) -> list[str]:
+    """A sentence that `what` ignores [discrepancy]; none for a case without one."""
+    names = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
+    if not names:
+        return []
+    return [f"{what} ignores the [discrepancy] of {', '.join(names)}: its intervals are too narrow"]
