@@ -87,6 +87,31 @@ def check_seed(args: argparse.Namespace) -> None:
         raise InputError(f"--seed is {args.seed}; needed is a whole number, 0 or more")
 
 
+def add_cost_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--cost`, which `parse_costs` reads."""
+    parser.add_argument(
+        "--cost",
+        metavar="KIND=NUMBER",
+        action="append",
+        default=[],
+        help="cost of a kind of run to add, in any unit (default: 1); can be repeated",
+    )
+
+
+def parse_costs(args: argparse.Namespace) -> dict[str, float]:
+    """The costs of `--cost` by kind; raises `InputError` for a text that is not KIND=NUMBER."""
+    costs = {}
+    for text in args.cost:
+        kind, _, number = text.rpartition("=")
+        try:
+            costs[kind] = float(number)
+        except ValueError:
+            kind = ""
+        if not kind:
+            raise InputError(f"--cost {text!r}: needed is KIND=NUMBER, such as reverse=2")
+    return costs
+
+
 def parse_names(text: str | None) -> list[str] | None:
     """The names of `a,b,c`; None where the option is absent."""
     return None if text is None else [name.strip() for name in text.split(",")]

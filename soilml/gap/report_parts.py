@@ -158,6 +158,7 @@ class NextRun:
     text: str
     discrimination: float  # expected, in sigma, between the remaining explanations
     rows: tuple[dict[str, float], ...]  # operating points and predictions of each explanation
+    cost: float | None = None  # where costs are given, in their unit
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,7 @@ class GapReport:
             "candidates": [t.as_json() for t in self.candidates],
             "next_runs": [
                 {"kind": n.kind, "text": n.text, "separates_sigma": n.discrimination}
+                | ({} if n.cost is None else {"cost": n.cost})
                 for n in self.next_runs
             ],
             "unnamed_remainder": self.residual_trend,

@@ -18,6 +18,7 @@ from soilml.gap.data.checks import (
 from soilml.gap.data.holdout import HoldoutSplit, split_holdout
 from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
 from soilml.gap.design.discriminating_runs import next_runs
+from soilml.gap.design.run_costs import check_costs, rank_by_cost
 from soilml.gap.messages import unsupported_conclusions, verdict_sentence
 from soilml.gap.results import GapReport
 from soilml.gap.search.cross_validation import predict_held_out
@@ -63,6 +64,7 @@ def gap(
     holdout: str | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
     calibration: Mapping[str, float] | None = None,
+    costs: Mapping[str, float] | None = None,
     seed: int = 0,
 ) -> GapReport:
     """Find where a model disagrees with measured rows, and the effect that the model lacks.
@@ -87,6 +89,9 @@ def gap(
     calibration : mapping, optional
         Standard deviation of the remaining error of a calibrated sensor, by effect name, in the
         unit of the effect's size.
+    costs : mapping, optional
+        Cost of each kind of next run or check, in any unit, 1 where none is given; they are then
+        ranked by what they discriminate per cost.
     seed : int
         Of all random draws; the same input gives the same report.
 
@@ -124,6 +129,7 @@ def gap(
     'no-gap'
     """
     effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
+    known_costs = check_costs(costs or {})
     check_wheel_size(case, table)
     usable = table.answered
     if not usable.any():
@@ -154,7 +160,8 @@ def gap(
     if split.held_out is not None:
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
-    return _build_report(case, analysis, checks, soil, split, held_out, seed)
+    report = _build_report(case, analysis, checks, soil, split, held_out, seed)
+    return replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
 
 
 def _free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[FreeParameter]:

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
+    add_cost_option,
     add_effects_option,
     add_ignore_extra_option,
     available_effects,
+    parse_costs,
     parse_names,
 )
 from soilml.cli.output import json_text
@@ -40,7 +42,8 @@ In the table, `left` is the signal of an effect of its reference size in
 standard deviations of the noise (sigma) after the free soil parameters have
 absorbed what they can, and `apart` is the part of it that its most similar
 rival cannot explain: an effect can be named from about 3. `detectable` is the
-smallest size that is noticed in four of five data sets.
+smallest size that is noticed in four of five data sets. With --cost, runs to
+add are ranked by the effects that they gain per cost.
 """
 
 
@@ -54,6 +57,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
     )
     parser.add_argument("--out", metavar="FILE.json", help="write the audit to this file")
+    add_cost_option(parser)
     add_ignore_extra_option(parser)
     add_effects_option(parser)
 
@@ -70,7 +74,9 @@ def run(args: argparse.Namespace) -> int:
     effects = available_effects(args)
     case = read_case(args.model, effects)
     design = read_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
-    found = audit(case, design, free=parse_names(args.free), effects=effects)
+    found = audit(
+        case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
+    )
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     print(_text(found))
@@ -101,8 +107,8 @@ def _text(found: Audit) -> str:
     if found.untestable:
         lines = [f"  {name}: {why}" for name, why in found.untestable.items()]
         parts.append("cannot be tested:\n" + "\n".join(lines))
-    gaining = [entry for entry in found.added_runs if entry[3]]
-    lines = [f"  {kind} ({text}): {', '.join(gained)}" for kind, text, _, gained in gaining[:5]]
+    gaining = [run for run in found.added_runs if run.gained]
+    lines = [f"  {run.kind} ({run.text}): {', '.join(run.gained)}" for run in gaining[:5]]
     parts.append(
         "runs to add, and the effects that could then be named:\n" + ("\n".join(lines) or "  none")
     )

@@ -9,11 +9,13 @@ from typing import Any
 
 from soilml.cli.options import (
     InputFile,
+    add_cost_option,
     add_effects_option,
     add_ignore_extra_option,
     add_seed_option,
     available_effects,
     check_seed,
+    parse_costs,
     parse_names,
 )
 from soilml.cli.output import json_text
@@ -55,7 +57,9 @@ suspected but not named. The exit status is 0 whatever the result and 2 for bad
 input.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
-after calibration, in the unit that `soilml effects` lists.
+after calibration, in the unit that `soilml effects` lists. --cost second-pass=3
+gives the cost of a kind of run in next_runs.csv, in any unit; runs are then
+ranked by what they discriminate per cost.
 """
 
 
@@ -84,6 +88,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="standard deviation of a sensor's fault after calibration; can be repeated",
     )
+    add_cost_option(parser)
     add_ignore_extra_option(parser)
     add_effects_option(parser)
 
@@ -116,6 +121,7 @@ def run(args: argparse.Namespace) -> int:
         holdout=args.holdout,
         effects=effects,
         calibration=_calibration(args.checked, effects),
+        costs=parse_costs(args),
         seed=args.seed,
     )
     from soilml.gap.html.page import page
@@ -167,8 +173,12 @@ def _next_runs(report: Any) -> dict[str, list[Any]]:
     for number, option in enumerate(report.next_runs, 1):
         head = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
         head["separates_sigma"] = option.discrimination
+        if option.cost is not None:
+            head["cost"] = option.cost
         lines += [head | row for row in option.rows or [{}]]
-    names = ["run", "kind", "what", "separates_sigma", "slip", "load_N"]
+    names = ["run", "kind", "what", "separates_sigma"]
+    names += ["cost"] if any("cost" in line for line in lines) else []
+    names += ["slip", "load_N"]
     names += [name for line in lines for name in line if name not in names]
     return {name: [line.get(name, "") for line in lines] for name in dict.fromkeys(names)}
 
@@ -184,7 +194,8 @@ def _text(report: Any) -> str:
             if best.discrimination >= 10.0
             else f"{best.discrimination:.2g} sigma"
         )
-        parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}")
+        cost = "" if best.cost is None else f" at a cost of {best.cost:g}"
+        parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}{cost}")
     parts += [f"! {note}" for note in report.notes]
     return "\n\n".join(part for part in parts if part)
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.design.run_options import SENSOR_CHECKS, expected_readings, run_options
+from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
+from soilml.gap.design.run_options import RunOption, run_options
+from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import covariance_at
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
 from soilml.gap.statistics.least_squares import GapFit
+from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 
@@ -23,8 +27,12 @@ Floats = NDArray[np.float64]
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
 MAX_DISCRIMINATION = 10.0
-#: Explanations that are compared, and proposals that are listed.
-COMPARED, LISTED = 5, 8
+#: Sigma below which a run or check does not discriminate at all, and is not proposed.
+MIN_DISCRIMINATION = 0.1
+#: Largest difference, in sigma of a reading, of two predictions that count as equal.
+SAME_PREDICTION = 0.1
+#: Explanations that are compared.
+COMPARED = 5
 #: Relative singular value below which the rival's parameters cannot be determined by the rows.
 LEAST_SQUARES_TOLERANCE = 1e-10
 
@@ -37,34 +45,139 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
 
     The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all
     its parameters to the present and the new rows together. With fewer than two explanations there
-    is nothing to discriminate.
+    is nothing to discriminate. A run for which every explanation predicts what it predicts for a
+    plain repeat is left out, and of runs with equal rows one is listed.
     """
     if len(explanations) < 2:
         return []
     fits = {"+".join(c.names): c.fit for c in explanations[:COMPARED]}
     first, *rivals = fits.values()
+    effects = [
+        problem.effects[name] for name in _effects_of(fits.values()) if name in problem.effects
+    ]
     whiten = problem.covariance.whiten
     present = [_difference(first, rival, problem.readings, whiten) for rival in rivals]
-    proposals = []
-    for option in run_options(problem.readings):
+    proposals: list[NextRun] = []
+    for option in run_options(problem.readings, first.fitted(), effects):
+        changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
+        one, *others = changed.values()
         try:
-            readings = expected_readings(option, problem.readings, first.fitted())
-            whiten = covariance_at(problem, first, readings).whiten
+            readings = expected_readings(option.at, problem.readings, one.fitted(), option.kind)
+            if _is_plain_repeat(option, readings, changed):
+                continue
+            whiten = covariance_at(problem, one, readings).whiten
             sigmas = [
-                _discrimination(rival, old, _difference(first, rival, readings, whiten))
-                for rival, old in zip(rivals, present, strict=True)
+                _discrimination(
+                    rival,
+                    old,
+                    _all_columns(rival, _difference(one, other, readings, whiten), other),
+                )
+                for rival, other, old in zip(rivals, others, present, strict=True)
             ]
         except (InputError, np.linalg.LinAlgError):
             continue
-        if not np.isfinite(sigmas).all():
-            continue
-        rows = _rows(readings, fits)
-        proposals.append(NextRun(option.kind, option.text, _mean_capped(sigmas), rows))
+        if np.isfinite(sigmas).all():
+            rows = _rows(readings, changed, option)
+            proposals.append(NextRun(option.kind, option.text, _mean_capped(sigmas), rows))
+    proposals += _static_proposals(fits, present, effects)
+    useful = [
+        run for run in _without_equal_rows(proposals) if run.discrimination >= MIN_DISCRIMINATION
+    ]
+    return sorted(useful, key=lambda run: -run.discrimination)
+
+
+def _effects_of(fits: Iterable[GapFit]) -> list[str]:
+    """The effects of some fits, sorted."""
+    return sorted({effect.name for fit in fits for effect in fit.case.model.effects})
+
+
+def _with_gear(fit: GapFit, option: RunOption) -> GapFit:
+    """The fit on the gear of a run; coordinates of effects that the gear has not are dropped."""
+    if option.gear is None:
+        return fit
+    case = option.changed(fit.case)
+    known = case.parameters()
+    kept = [i for i, c in enumerate(fit.coordinates) if c.path in known]
+    coordinates = tuple(fit.coordinates[i] for i in kept)
+    return replace(fit, case=case, coordinates=coordinates, x=fit.x[kept])
+
+
+def _all_columns(fit: GapFit, difference: Difference, changed: GapFit) -> Difference:
+    """The difference with the Jacobian of all coordinates of a fit: 0 for those dropped."""
+    paths = [c.path for c in fit.coordinates]
+    jacobian = np.zeros((len(difference[0]), len(paths)))
+    jacobian[:, [paths.index(c.path) for c in changed.coordinates]] = difference[1]
+    return difference[0], jacobian
+
+
+def _is_plain_repeat(
+    option: RunOption, readings: StackedReadings, fits: Mapping[str, GapFit]
+) -> bool:
+    """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
+    if option.plain is None:
+        return False
+    for fit in fits.values():
+        plain = replace(readings, at=with_default_covariates(option.plain, fit.case))
+        new = replace(readings, at=with_default_covariates(option.at, fit.case))
+        y, usual = (
+            predict_readings(fit.case, fit.coordinates, fit.x[None, :], r)[0] for r in (new, plain)
+        )
+        if np.any(np.abs(y - usual) > SAME_PREDICTION * readings.std):
+            return False
+    return True
+
+
+def _without_equal_rows(runs: Sequence[NextRun]) -> list[NextRun]:
+    """The runs, those with equal rows merged to one with both kinds of instruction."""
+    merged: dict[object, NextRun] = {}
+    for run in runs:
+        key = tuple(tuple(row.items()) for row in run.rows) if run.rows else run.kind
+        first = merged.get(key)
+        merged[key] = replace(first, text=f"{first.text}; or {run.text}") if first else run
+    return list(merged.values())
+
+
+def _static_proposals(
+    fits: Mapping[str, GapFit], present: Sequence[Difference], effects: Sequence[type[Effect]]
+) -> list[NextRun]:
+    """Checks of the sensors, and tests of the soil where an explanation concerns the soil."""
+    first, *rivals = fits.values()
+    proposals = []
     for kind, (text, std_after) in SENSOR_CHECKS.items():
         sigmas = [_check_discrimination(first, rival, std_after) for rival in rivals]
         if max(sigmas) > 0.0:
             proposals.append(NextRun(kind, text, _mean_capped(sigmas), ()))
-    return sorted(proposals, key=lambda run: -run.discrimination)[:LISTED]
+    if not any(effect.about.kind == "soil" for effect in effects):
+        return proposals
+    values = {name: fit.values() for name, fit in fits.items()}
+    for kind, (text, after) in SOIL_TESTS.items():
+        names = [c.path for c in first.coordinates if c.path in after]
+        if not names:
+            continue
+        sigmas = [
+            _discrimination(
+                rival, old, _soil_difference(first, rival, {k: after[k] for k in names})
+            )
+            for rival, old in zip(rivals, present, strict=True)
+        ]
+        row = {f"{column(k)} if {name}": v[k] for name, v in values.items() for k in names}
+        proposals.append(NextRun(kind, text, _mean_capped(sigmas), (row,)))
+    return proposals
+
+
+def _soil_difference(
+    first: GapFit, rival: GapFit, after: Mapping[str, tuple[float, bool]]
+) -> Difference:
+    """Whitened difference of two explanations in the soil parameters that a test determines."""
+    own, others = first.values(), rival.values()
+    difference, jacobian = np.zeros(len(after)), np.zeros((len(after), len(rival.x)))
+    for i, (name, (std, is_relative)) in enumerate(after.items()):
+        std = std * abs(own[name]) if is_relative else std
+        difference[i] = (own[name] - others[name]) / std
+        for j, c in enumerate(rival.coordinates):
+            if c.path == name:
+                jacobian[i, j] = c.rate(float(rival.x[j])) / std
+    return difference, jacobian
 
 
 def _mean_capped(sigmas: Sequence[float]) -> float:
@@ -107,8 +220,10 @@ def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, flo
     return largest
 
 
-def _rows(readings: StackedReadings, fits: dict[str, GapFit]) -> tuple[dict[str, float], ...]:
-    """Operating points of a run with the prediction of each explanation."""
+def _rows(
+    readings: StackedReadings, fits: Mapping[str, GapFit], option: RunOption
+) -> tuple[dict[str, float], ...]:
+    """Operating points and gear of a run with the prediction of each explanation."""
     rows = len(readings.run)
     columns: dict[str, Floats] = {
         "slip": np.asarray(readings.at.slip),
@@ -117,6 +232,8 @@ def _rows(readings: StackedReadings, fits: dict[str, GapFit]) -> tuple[dict[str,
     for field, key in COVARIATES.items():
         if getattr(readings.at, field) is not None:
             columns[key] = np.broadcast_to(getattr(readings.at, field), (rows,))
+    for key, size in (option.gear.columns() if option.gear else {}).items():
+        columns[key] = np.full(rows, size)
     for name, fit in fits.items():
         y = predict_readings(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
         for i, channel in enumerate(readings.channels):

@@ -12,44 +12,26 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.design.run_options import expected_readings, run_options
+from soilml.gap.design.effect_identifiability import (
+    NAMEABLE_SIGMA,
+    EffectIdentifiability,
+    identifiability,
+    indistinguishable_classes,
+)
+from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
+from soilml.gap.design.run_costs import check_costs
+from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.statistics.coordinates import SoilCoordinate, linearise, soil_coordinate
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
-from soilml.numerics.subspaces import project_out
-from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
-#: Approximate 95 % quantile of the largest score of the catalogue in data without a gap.
-DETECTION_THRESHOLD = 3.0
-#: 80 % quantile of the standard normal distribution: the power at which an effect is detectable.
-POWER_QUANTILE = 0.8416
-#: Separation, in sigma, from which an effect can be named, and below which two effects are
-#: indistinguishable.
-NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
-#: Rivals that are listed for each effect.
-LISTED_RIVALS = 3
-
-
-@dataclass(frozen=True)
-class EffectIdentifiability:
-    """How well a design identifies one effect at its reference size."""
-
-    name: str
-    kind: str
-    size: float  # reference size, in `unit`
-    unit: str
-    signal: float  # norm of the signature, in sigma
-    residual_signal: float  # norm that remains after the soil parameters have adapted, in sigma
-    absorbed: float  # fraction of the squared norm that the soil parameters absorb
-    rivals: tuple[tuple[str, float], ...]  # most similar effects, with their cosine
-    separating_snr: float  # sigma, against the most similar effect
-    detectable_size: float  # smallest size detected with a power of 80 %, in `unit`
+#: Largest difference, in sigma of a reading, of two signatures that count as equal.
+SAME_PREDICTION = 0.1
 
 
 class AddedRun(NamedTuple):
@@ -59,6 +41,7 @@ class AddedRun(NamedTuple):
     text: str
     nameable: int
     gained: tuple[str, ...]
+    cost: float | None = None
 
 
 @dataclass(frozen=True)
@@ -106,6 +89,7 @@ class Audit:
             "runs_to_add": [
                 {"kind": run.kind, "text": run.text, "nameable": run.nameable}
                 | {"gained": list(run.gained)}
+                | ({} if run.cost is None else {"cost": run.cost})
                 for run in self.added_runs
             ],
         }
@@ -117,6 +101,7 @@ def audit(
     *,
     free: Sequence[str] | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
+    costs: Mapping[str, float] | None = None,
 ) -> Audit:
     """Determine which effects runs at the slips and loads of a design could identify.
 
@@ -133,6 +118,9 @@ def audit(
         Soil parameters that would be fitted; by default those with a prior.
     effects : mapping, optional
         The catalogue of effects by name.
+    costs : mapping, optional
+        Cost of each kind of run to add, 1 where none is given; they are then ranked by the effects
+        that they gain per cost.
 
     Raises
     ------
@@ -160,6 +148,7 @@ def audit(
     ('slip-sinkage', True, 0.121)
     """
     effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
+    known_costs = check_costs(costs or {})
     readings = planned_readings(case, design.rows(design.answered))
     selected = select_free(case, free if free is not None or case.prior else SHEAR)
     soil = [f for f in selected if "." not in f.path]
@@ -167,113 +156,70 @@ def audit(
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in soil])
     jacobian = linearise(case, coordinates, nominal, readings)[1] / readings.std[:, None]
     signatures, untestable = effect_signatures(case, readings, effects)
-    table = _identifiability(signatures, readings.std, jacobian, effects)
+    table = identifiability(signatures, readings.std, jacobian, effects)
     before = {e.name for e in table if e.separating_snr >= NAMEABLE_SIGMA}
     added_runs = []
-    for option in run_options(readings):
+    for option in run_options(readings, case, tuple(effects.values())):
         try:
-            new = expected_readings(option, readings, case)
-            extended = _with_added_run(case, readings, new, coordinates, nominal, effects)
+            extended = _with_added_run(case, readings, option, coordinates, nominal, effects)
         except (InputError, np.linalg.LinAlgError):
+            continue
+        if not extended:
             continue
         after = {e.name for e in extended if e.separating_snr >= NAMEABLE_SIGMA}
         gained = tuple(sorted(after - before))
-        added_runs.append(AddedRun(option.kind, option.text, len(before) + len(gained), gained))
-    added_runs.sort(key=lambda run: -run.nameable)
+        cost = known_costs.get(option.kind, 1.0) if known_costs else None
+        nameable = len(before) + len(gained)
+        added_runs.append(AddedRun(option.kind, option.text, nameable, gained, cost))
+    added_runs.sort(key=lambda run: -len(run.gained) / (run.cost or 1.0))
     return Audit(
         tuple(sorted(table, key=lambda e: -e.separating_snr)),
-        _indistinguishable_classes(signatures, readings.std, jacobian),
+        indistinguishable_classes(signatures, readings.std, jacobian),
         {u.name: u.reason for u in untestable},
         tuple(added_runs),
     )
 
 
-def _identifiability(
-    signatures: Sequence[Signature],
-    std: Floats,
-    jacobian: Floats,
-    effects: Mapping[str, type[Effect]],
-) -> list[EffectIdentifiability]:
-    """Norms, cosines and separations of signatures on readings with independent noise."""
-    if not signatures:
-        return []
-    columns = np.stack([s.column for s in signatures], axis=1) / std[:, None]
-    projected = project_out(columns, jacobian)
-    signal, residual = np.linalg.norm(columns, axis=0), np.linalg.norm(projected, axis=0)
-    unit = projected / np.maximum(residual, 1e-300)
-    cosine = np.abs(unit.T @ unit)
-    np.fill_diagonal(cosine, 0.0)
-    table = []
-    for i, s in enumerate(signatures):
-        nearest = np.argsort(-cosine[i])[:LISTED_RIVALS]
-        about = effects[s.name].about
-        size = about.reference[about.size]
-        sine = np.sqrt(max(0.0, 1.0 - float(cosine[i].max(initial=0.0)) ** 2))
-        detectable = float("inf")
-        if residual[i] > 1e-6:
-            detectable = float((DETECTION_THRESHOLD + POWER_QUANTILE) / residual[i] * size)
-        table.append(
-            EffectIdentifiability(
-                name=s.name,
-                kind=s.kind,
-                size=size,
-                unit=declared(effects[s.name])[about.size].unit,
-                signal=float(signal[i]),
-                residual_signal=float(residual[i]),
-                absorbed=float(1.0 - (residual[i] / signal[i]) ** 2),
-                rivals=tuple((signatures[j].name, float(cosine[i, j])) for j in nearest if j != i),
-                separating_snr=float(residual[i] * sine),
-                detectable_size=detectable,
-            )
-        )
-    return table
-
-
 def _with_added_run(
     case: Case,
     readings: StackedReadings,
-    new: StackedReadings,
+    option: RunOption,
     coordinates: Sequence[SoilCoordinate],
     x: Floats,
     effects: Mapping[str, type[Effect]],
 ) -> list[EffectIdentifiability]:
-    """The identifiability of effects by a design with one run added."""
+    """The identifiability of effects by a design with one run added; none if it adds a repeat."""
+    new = expected_readings(option.at, readings, option.changed(case), option.kind)
+    parts = [(case, joined_readings(readings, new))]
+    if option.gear is not None:
+        parts = [(case, readings), (option.changed(case), new)]
     by_part, stds, jacobians = [], [], []
-    for part in (readings, new):
-        signatures, _ = effect_signatures(case, part, effects)
+    for changed, part in parts:
+        removed = option.gear.removed if option.gear and part is new else ()
+        known = {name: e for name, e in effects.items() if name not in removed}
+        signatures, _ = effect_signatures(changed, part, known)
         by_part.append({s.name: s for s in signatures})
         stds.append(part.std)
-        jacobians.append(linearise(case, coordinates, x, part)[1] / part.std[:, None])
+        jacobians.append(linearise(changed, coordinates, x, part)[1] / part.std[:, None])
+    if option.plain is not None:
+        plain = joined_readings(readings, expected_readings(option.plain, readings, case))
+        usual = {s.name: s.column for s in effect_signatures(case, plain, effects)[0]}
+        if _are_equal(usual, by_part[0], stds[0]):
+            return []
     pooled = []
-    for name in sorted(by_part[0].keys() | by_part[1].keys()):
+    for name in sorted(set().union(*by_part)):
         columns = [
             own[name].column if name in own else np.zeros(len(std))
             for own, std in zip(by_part, stds, strict=True)
         ]
-        signature = by_part[0].get(name) or by_part[1][name]
+        signature = next(own[name] for own in by_part if name in own)
         pooled.append(replace(signature, column=np.concatenate(columns)))
-    return _identifiability(pooled, np.concatenate(stds), np.vstack(jacobians), effects)
+    return identifiability(pooled, np.concatenate(stds), np.vstack(jacobians), effects)
 
 
-def _indistinguishable_classes(
-    signatures: Sequence[Signature], std: Floats, jacobian: Floats
-) -> tuple[tuple[str, ...], ...]:
-    """Effects that this design cannot distinguish at their reference sizes."""
-    if not signatures:
-        return ()
-    columns = np.stack([s.column for s in signatures], axis=1) / std[:, None]
-    projected = project_out(columns, jacobian)
-    norm = np.linalg.norm(projected, axis=0)
-    unit = projected / np.maximum(norm, 1e-300)
-    sine = np.sqrt(np.maximum(0.0, 1.0 - (unit.T @ unit) ** 2))
-    label = list(range(len(signatures)))
-    for i in range(len(signatures)):
-        for j in range(i):
-            weaker = min(norm[i], norm[j])
-            if weaker > SAME_CLASS_SIGMA and weaker * sine[i, j] < SAME_CLASS_SIGMA:
-                old, new = label[i], label[j]
-                label = [new if k == old else k for k in label]
-    groups = [
-        tuple(s.name for s, k in zip(signatures, label, strict=True) if k == g) for g in set(label)
-    ]
-    return tuple(sorted(g for g in groups if len(g) > 1))
+def _are_equal(usual: Mapping[str, Floats], new: Mapping[str, Signature], std: Floats) -> bool:
+    """Whether all effects change the readings of two runs equally, to a tenth of a sigma."""
+    return usual.keys() == new.keys() and all(
+        bool(np.all(np.abs(usual[name] - s.column) <= SAME_PREDICTION * std))
+        for name, s in new.items()
+    )

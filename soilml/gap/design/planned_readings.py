@@ -1,16 +1,23 @@
-"""Readings that a case expects of an experimental design."""
+"""Readings that a case expects of an experimental design, or of a run that could be driven."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, positive_std
 from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
+from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
+
+#: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on.
+USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 
 
 def planned_readings(case: Case, design: Table) -> StackedReadings:
@@ -45,3 +52,74 @@ def planned_readings(case: Case, design: Table) -> StackedReadings:
         std=np.concatenate(stds),
         noise=tuple(case.noise.get(column(n)) for n in names),
     )
+
+
+def expected_readings(
+    at: Operating, like: StackedReadings, case: Case, run: str = "next"
+) -> StackedReadings:
+    """The readings that a case expects of rows, in the channels and with the noise of `like`."""
+    rows, channels = np.asarray(at.slip).size, len(like.channels)
+    row = np.tile(np.arange(rows), channels)
+    channel = np.repeat(np.arange(channels), rows)
+    at = with_default_covariates(at, case)
+    force = case.model(case.soil, at)
+    expected = np.stack([getattr(force, name) for name in like.channels], axis=-1)
+    reading = expected[row, channel]
+    std = np.empty(row.size)
+    for i, name in enumerate(like.channels):
+        in_channel = channel == i
+        noise = like.noise[i] or case.noise.get(column(name))
+        present = like.std[like.channel == i]
+        typical = float(np.median(present)) if present.size else np.nan
+        std[in_channel] = typical if noise is None else noise.std(reading[in_channel])
+    return StackedReadings(
+        at=at,
+        run=np.zeros(rows, dtype=np.int64),
+        runs=(run,),
+        order=np.arange(rows),
+        channels=like.channels,
+        row=row,
+        channel=channel,
+        reading=reading,
+        std=np.maximum(std, 1e-12),
+        noise=like.noise,
+    )
+
+
+def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedReadings:
+    """The readings of two sets of rows together; covariates that one of them lacks are usual."""
+    sizes = len(first.run), len(second.run)
+    columns = {}
+    for name in ("slip", "load", *USUAL_COVARIATES):
+        values = [getattr(part.at, name) for part in (first, second)]
+        if all(value is None for value in values):
+            continue
+        known = [USUAL_COVARIATES.get(name) if value is None else value for value in values]
+        columns[name] = np.concatenate(
+            [np.broadcast_to(v, (n,)) for v, n in zip(known, sizes, strict=True)]
+        )
+    return replace(
+        first,
+        at=Operating(**columns),
+        run=np.concatenate([first.run, second.run + len(first.runs)]),
+        runs=(*first.runs, *second.runs),
+        order=np.concatenate([first.order, second.order]),
+        row=np.concatenate([first.row, second.row + sizes[0]]),
+        **{
+            name: np.concatenate([getattr(first, name), getattr(second, name)])
+            for name in ("channel", "reading", "std")
+        },
+    )
+
+
+def carried_rows(case: Case, at: Operating) -> NDArray[np.bool_]:
+    """Rows (n,) at which the model finds an equilibrium: the soil carries the load."""
+    status = case.model(case.soil, with_default_covariates(at, case)).status
+    return np.broadcast_to(np.asarray(status) == 0, np.shape(at.slip))
+
+
+def with_default_covariates(at: Operating, case: Case) -> Operating:
+    """The operating points with default values of covariates that the case's effects need."""
+    needs = {field for effect in case.model.effects for field in effect.about.needs}
+    missing = {f: USUAL_COVARIATES[f] for f in needs if getattr(at, f) is None}
+    return replace(at, **missing) if missing else at

@@ -1,138 +1,156 @@
-"""Runs and sensor checks that could be proposed."""
+"""Runs that could be proposed, at operating points that a rig can drive."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.quantities import column
+from soilml.gap.design.gear_changes import GearChange, gear_changes
+from soilml.gap.design.planned_readings import USUAL_COVARIATES, carried_rows
+from soilml.physics.effects.base import Effect
+from soilml.physics.operating_point import Operating
 
 Floats = NDArray[np.float64]
 
-#: Rows of a proposed run.
-ROWS_PER_RUN = 8
+#: Rows of a proposed run, and the fewest that make a run.
+ROWS_PER_RUN, FEWEST_ROWS = 8, 3
+#: Highest slip that is proposed: near 1 a wheel digs itself in before its readings are steady.
+HIGHEST_SLIP = 0.8
+#: Steps of proposed slips, the first that gives enough rows: what speed control can set.
+SLIP_STEPS = (0.05, 0.01)
+#: Heavier loads that are tried, as multiples of the heaviest driven, until the soil carries one:
+#: none above twice that load, for which the rig may not be built. The lighter load likewise.
+HEAVIER, LIGHTER = (1.5, 1.25), 0.6
 
 
 @dataclass(frozen=True)
 class RunOption:
-    """A possible run: its kind, a description, and its operating points."""
+    """A possible run: its kind, a description, its operating points and the gear it needs.
+
+    `plain` are the same slips and loads driven as usual, where the run differs by a covariate:
+    the run tells more than a repeat only if some model predicts other readings for it.
+    """
 
     kind: str
     text: str
     at: Operating
+    plain: Operating | None = None
+    gear: GearChange | None = None
+
+    def changed(self, case: Case) -> Case:
+        """The case with the gear of this run."""
+        return case if self.gear is None else self.gear.apply(case)
 
 
-#: Checks of sensors and rig: kind -> (instruction, effect -> standard deviation of its size after
-#: the check, in the unit of the size).
-SENSOR_CHECKS: dict[str, tuple[str, dict[str, float]]] = {
-    "dead-weight torque": (
-        "hang a known weight on a lever at the hub and read the torque sensor",
-        {"torque-gain": 0.003, "torque-offset": 0.01},
-    ),
-    "weighed wheel": (
-        "place the wheel on a scale and read the load sensor",
-        {"load-gain": 0.003, "load-transfer": 0.005},
-    ),
-    "lifted wheel": (
-        "lift the wheel off the soil, turn it, and read all sensors",
-        {"torque-offset": 0.01, "bearing-friction": 0.001, "drawbar-offset": 0.05},
-    ),
-    "pulled spring scale": (
-        "pull the axle with a known force and read the drawbar sensor",
-        {"drawbar-gain": 0.003, "drawbar-offset": 0.05},
-    ),
-    "gauge blocks": (
-        "set the wheel on blocks of known height and read the sinkage sensor",
-        {"sinkage-offset": 0.0001, "sinkage-gain": 0.003},
-    ),
-    "levelled bed": ("put an inclinometer on the bed", {"slope": 0.001}),
-    "marked wheel": (
-        "roll the wheel ten turns without slip and measure the distance",
-        {"slip-scale": 0.002},
-    ),
-}
+def run_options(
+    readings: StackedReadings, case: Case, effects: Sequence[type[Effect]]
+) -> Iterator[RunOption]:
+    """Runs that differ from those driven, at rows that the soil of the case carries.
 
-
-def run_options(readings: StackedReadings) -> Iterator[RunOption]:
-    """Runs at operating points that the data do not cover."""
+    `effects` are those that the runs are to distinguish: a change of the gear is proposed where
+    one of them depends on it.
+    """
     loads = np.asarray(readings.at.load, dtype=np.float64)
     slips = np.asarray(readings.at.slip, dtype=np.float64)
-    low, high = float(loads.min()), float(loads.max())
-    middle = float(np.exp(np.mean(np.log(loads))))
-    usual = np.linspace(float(slips.min()), float(slips.max()), ROWS_PER_RUN)
-    if np.ptp(usual) < 0.1:
-        usual = np.linspace(0.05, 0.6, ROWS_PER_RUN)
-    yield _run("heavier", f"the same slips under {1.5 * high:.3g} N", usual, 1.5 * high)
-    yield _run("lighter", f"the same slips under {0.6 * low:.3g} N", usual, 0.6 * low)
-    most = min(0.9, float(slips.max()) + 0.3, MOST_SLIP)
-    yield _run(
-        "higher slip", f"slips up to {most:.2g}", np.linspace(0.2, most, ROWS_PER_RUN), middle
-    )
-    yield _run("low slip", "slips close to zero", np.linspace(0.01, 0.12, ROWS_PER_RUN), middle)
+    middle, highest = _middle_load(readings), float(slips.max())
+    usual = drivable_slips(float(slips.min()), highest)
+    if usual.size < FEWEST_ROWS:
+        usual = drivable_slips(0.05, 0.6)
+
+    def run(kind: str, text: str, slip: Floats, load: float, **covariates: float) -> RunOption:
+        plain = Operating(slip=slip, load=np.full(slip.size, load), **_usual(readings))
+        if not covariates:
+            return RunOption(kind, f"{text} under {load:g} N", plain)
+        own: dict[str, Any] = {name: np.full(slip.size, v) for name, v in covariates.items()}
+        return RunOption(kind, f"{text} under {load:g} N", replace(plain, **own), plain)
+
+    heavier = [
+        run("heavier", "the same slips", usual, _whole(factor * float(loads.max())))
+        for factor in HEAVIER
+    ]
+    lighter = run("lighter", "the same slips", usual, _whole(LIGHTER * float(loads.min())))
+    options = [
+        next((option for option in heavier if carried_rows(case, option.at).all()), heavier[-1]),
+        lighter,
+    ]
+    if highest <= HIGHEST_SLIP - 0.1:
+        most = min(HIGHEST_SLIP, highest + 0.3)
+        high = drivable_slips(0.2, most)
+        options.append(run("higher slip", f"slips up to {high.max():g}", high, middle))
+    low = drivable_slips(0.01, 0.12)
+    options.append(run("low slip", "slips close to zero", low, middle))
     if float(slips.min()) >= 0.0:
-        yield _run("braking", "a braked wheel", np.linspace(-0.4, -0.05, ROWS_PER_RUN), middle)
-    reverse = _run("reverse", "the same run in reverse", usual, middle)
-    yield replace(reverse, at=replace(reverse.at, speed=-0.05 + 0.0 * usual))
-    if _unvaried(readings.at.speed):
-        fast = _run("other speed", "the same run ten times as fast", usual, middle)
-        speed = (
-            0.5 if readings.at.speed is None else 10.0 * float(np.max(np.abs(readings.at.speed)))
-        )
-        yield replace(fast, at=replace(fast.at, speed=speed + 0.0 * usual))
+        options.append(run("braking", "a braked wheel", drivable_slips(-0.4, -0.05), middle))
+    speed = readings.at.speed
+    pace = USUAL_COVARIATES["speed"] if speed is None else float(np.median(np.abs(speed)))
+    if speed is None or float(np.min(speed)) >= 0.0:
+        options.append(run("reverse", "the same slips in reverse", usual, middle, speed=-pace))
+    if _unvaried(speed):
+        text = f"the same slips ten times as fast, at {10.0 * pace:.2g} m/s,"
+        options.append(run("other speed", text, usual, middle, speed=10.0 * pace))
     if _unvaried(readings.at.pass_number):
-        again = _run("second pass", "the same run again in the same rut", usual, middle)
-        yield replace(again, at=replace(again.at, pass_number=2.0 + 0.0 * usual))
+        text = "the same slips again in the same rut"
+        options.append(run("second pass", text, usual, middle, pass_number=2.0))
     if _unvaried(readings.at.slip_angle):
-        skew = _run("slip angle", "the wheel at a slip angle of 0.2 rad", usual, middle)
-        yield replace(skew, at=replace(skew.at, slip_angle=0.2 + 0.0 * usual))
+        text = "the wheel at a slip angle of 0.2 rad"
+        options.append(run("slip angle", text, usual, middle, slip_angle=0.2))
+    for change in gear_changes(case, effects):
+        option = run(change.kind, f"the same slips with {change.text}", usual, middle)
+        options.append(replace(option, gear=change))
+    for option in options:
+        carried = carried_rows(option.changed(case), option.at)
+        if carried.sum() >= FEWEST_ROWS:
+            plain = None if option.plain is None else _selected(option.plain, carried)
+            yield replace(option, at=_selected(option.at, carried), plain=plain)
 
 
-def _run(kind: str, text: str, slips: Floats, load: float) -> RunOption:
-    return RunOption(kind, text, Operating(slip=slips, load=np.full(slips.size, load)))
+def drivable_slips(low: float, high: float) -> Floats:
+    """At most `ROWS_PER_RUN` slips between two, in steps that a rig can set."""
+    high = min(high, HIGHEST_SLIP)
+    for step in SLIP_STEPS:
+        first, last = round(low / step), round(high / step)
+        if last - first + 1 >= ROWS_PER_RUN:
+            break
+    grid = np.arange(first, last + 1)
+    count = min(ROWS_PER_RUN, grid.size)
+    chosen = grid[np.linspace(0, grid.size - 1, count).round().astype(int)] if count else grid
+    return np.asarray(np.round(chosen * step, 2))
+
+
+def _whole(load: float) -> float:
+    """A load in whole newton; below 10 N in two digits."""
+    step = min(1.0, 10.0 ** (np.floor(np.log10(load)) - 1.0))
+    return float(np.round(np.round(load / step) * step, 9))
+
+
+def _middle_load(readings: StackedReadings) -> float:
+    """The driven load level that is closest to the mean in logarithms, N."""
+    levels = readings.load_levels
+    log_load = np.log(readings.load)
+    centres = np.asarray([np.median(log_load[levels.index == i]) for i in range(levels.count)])
+    return _whole(float(np.exp(centres[np.argmin(np.abs(centres - np.mean(log_load)))])))
+
+
+def _usual(readings: StackedReadings) -> dict[str, Any]:
+    """The covariates of a plain run, those that the rows have."""
+    usual = {k: v for k, v in USUAL_COVARIATES.items() if getattr(readings.at, k) is not None}
+    if "speed" in usual:
+        usual["speed"] = float(np.median(np.abs(np.asarray(readings.at.speed))))
+    return usual
+
+
+def _selected(at: Operating, kept: NDArray[np.bool_]) -> Operating:
+    """Some of the rows (n,) of operating points."""
+    given = {f.name: getattr(at, f.name) for f in fields(at)}
+    known = {k: np.broadcast_to(v, kept.shape)[kept] for k, v in given.items() if v is not None}
+    return Operating(**known)
 
 
 def _unvaried(value: object) -> bool:
     return value is None or float(np.ptp(np.asarray(value))) == 0.0
-
-
-def expected_readings(option: RunOption, like: StackedReadings, case: Case) -> StackedReadings:
-    """The readings that a case expects of a run, in the channels and with the noise of `like`."""
-    rows, channels = np.asarray(option.at.slip).size, len(like.channels)
-    row = np.tile(np.arange(rows), channels)
-    channel = np.repeat(np.arange(channels), rows)
-    force = case.model(case.soil, with_default_covariates(option.at, case))
-    expected = np.stack([getattr(force, name) for name in like.channels], axis=-1)
-    reading = expected[row, channel]
-    std = np.empty(row.size)
-    for i, name in enumerate(like.channels):
-        in_channel = channel == i
-        noise = like.noise[i] or case.noise.get(column(name))
-        present = like.std[like.channel == i]
-        typical = float(np.median(present)) if present.size else np.nan
-        std[in_channel] = typical if noise is None else noise.std(reading[in_channel])
-    return StackedReadings(
-        at=with_default_covariates(option.at, case),
-        run=np.zeros(rows, dtype=np.int64),
-        runs=(option.kind,),
-        order=np.arange(rows),
-        channels=like.channels,
-        row=row,
-        channel=channel,
-        reading=reading,
-        std=np.maximum(std, 1e-12),
-        noise=like.noise,
-    )
-
-
-def with_default_covariates(at: Operating, case: Case) -> Operating:
-    """The operating points with default values of covariates that the case's effects need."""
-    usual = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
-    needs = {field for effect in case.model.effects for field in effect.about.needs}
-    missing = {f: usual[f] for f in needs if getattr(at, f) is None}
-    return replace(at, **missing) if missing else at

@@ -8,7 +8,9 @@ from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.config.write_case import case_as_toml
 from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.design.run_options import SENSOR_CHECKS, expected_readings, run_options
+from soilml.gap.design.planned_readings import expected_readings
+from soilml.gap.design.run_options import run_options
+from soilml.gap.design.static_checks import SENSOR_CHECKS
 from soilml.gap.search.candidate_fits import fit_candidate
 from soilml.gap.search.updated_case import updated_case
 from soilml.physics.effects import EFFECTS
@@ -104,7 +106,7 @@ def test_the_updated_case_is_the_fit_with_priors_of_the_added_effects(rivals):
 
 def test_run_options_extend_the_operating_range(rivals):
     readings = rivals[0].readings
-    options = {option.kind: option.at for option in run_options(readings)}
+    options = {option.kind: option.at for option in run_options(readings, rivals[0].case, [])}
     assert options["heavier"].load[0] > readings.load.max()
     assert options["lighter"].load[0] < readings.load.min()
     assert options["higher slip"].slip.max() > readings.slip.max()
@@ -118,14 +120,14 @@ def test_run_options_extend_the_operating_range(rivals):
 def test_a_covariate_that_was_varied_is_not_suggested_again():
     case = case_of()
     table = driven(case, loads=(40.0, 60.0, 90.0), slips=4, speed=(0.02, 0.05, 0.1))
-    kinds = {option.kind for option in run_options(fit_problem(case, table).readings)}
+    kinds = {option.kind for option in run_options(fit_problem(case, table).readings, case, [])}
     assert "other speed" not in kinds and "second pass" in kinds
 
 
 def test_expected_readings_have_the_channels_and_noise_of_the_rig(rivals):
     problem = rivals[0]
-    option = next(iter(run_options(problem.readings)))
-    readings = expected_readings(option, problem.readings, problem.case)
+    option = next(iter(run_options(problem.readings, problem.case, [])))
+    readings = expected_readings(option.at, problem.readings, problem.case)
     assert len(readings) == 3 * len(option.at.slip)
     torque = readings.channel == 0
     np.testing.assert_allclose(readings.std[torque], 0.01 * np.abs(readings.reading[torque]))
@@ -145,8 +147,7 @@ def test_proposals_are_ranked_and_contain_predictions(rivals):
     assert row["torque_Nm if slip-sinkage"] == pytest.approx(float(force.torque))
 
 
-def test_a_sensor_check_distinguishes_a_fault_from_physics(rivals, monkeypatch):
-    monkeypatch.setattr("soilml.gap.design.discriminating_runs.LISTED", 99)
+def test_a_sensor_check_distinguishes_a_fault_from_physics(rivals):
     found = {run.kind: run for run in next_runs(*rivals)}
     gain = abs(rivals[1][1].fit.values()["torque-gain.gain"])
     assert found["dead-weight torque"].discrimination == pytest.approx(min(gain / 0.003, 10.0))

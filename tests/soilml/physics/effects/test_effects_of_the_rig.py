@@ -71,6 +71,16 @@ def test_a_sensor_changes_its_own_channel_alone(name, size, channel, times, more
         np.testing.assert_allclose(getattr(found, other), expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "name, channel", [("torque-offset", "torque"), ("drawbar-offset", "drawbar_pull")]
+)
+def test_the_zero_of_a_sensor_turns_around_in_reverse(name, channel):
+    at = replace(AT, speed=np.where(np.arange(np.size(AT.slip)) % 2, -0.05, 0.05))
+    found = getattr((WHEEL + EFFECTS[name](offset=0.4))(SAND, at), channel)
+    added = np.where(at.speed < 0.0, -0.4, 0.4)
+    np.testing.assert_allclose(found, getattr(WHEEL(SAND, at), channel) + added, rtol=1e-12)
+
+
 @pytest.mark.parametrize("error", [-0.2, -0.015, 0.015, 0.2])
 def test_slip_from_a_wrong_speed_is_mended(error):
     rim_speed = 0.1
