@@ -18,7 +18,11 @@ LEAST_EIGENVALUE = 1e-6
 SAME_POINT_DECIMALS = 6
 
 
-def process_columns(points: Floats, amplitude: float | Floats = 1.0) -> Floats:
+def process_columns(
+    points: Floats,
+    amplitude: float | Floats = 1.0,
+    least_eigenvalue: float = LEAST_EIGENVALUE,
+) -> Floats:
     r"""Columns C (n, q) of a process of zero mean, with C C^T its covariance at n points.
 
     .. math:: (C C^T)_{ij} = a_i a_j e^{-|x_i - x_j|^2 / 2}
@@ -34,6 +38,8 @@ def process_columns(points: Floats, amplitude: float | Floats = 1.0) -> Floats:
         Coordinates over their correlation lengths, such as slip / 0.3 and ln(load) / 0.6.
     amplitude : float or array (n,)
         Standard deviation a of the process, in the unit of the values.
+    least_eigenvalue : float
+        Directions with a smaller fraction of the largest eigenvalue are dropped.
 
     References
     ----------
@@ -52,7 +58,7 @@ def process_columns(points: Floats, amplitude: float | Floats = 1.0) -> Floats:
         return np.zeros((0, 0))
     centres = _spread_centres(points)
     eigenvalue, vector = np.linalg.eigh(_squared_exponential(centres, centres))
-    kept = eigenvalue > LEAST_EIGENVALUE * eigenvalue[-1]
+    kept = eigenvalue > least_eigenvalue * eigenvalue[-1]
     basis = vector[:, kept] / np.sqrt(eigenvalue[kept])
     unit = _squared_exponential(points, centres) @ basis
     return np.asarray(np.reshape(amplitude, (-1, 1)) * unit)

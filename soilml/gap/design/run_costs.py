@@ -9,7 +9,7 @@ from dataclasses import replace
 from soilml.errors import InputError
 from soilml.gap.design.gear_changes import SIZES, SMOOTH_GEAR
 from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
-from soilml.gap.results import NextRun
+from soilml.gap.report_parts import NextRun
 
 #: Kinds of runs on the present gear.
 DRIVEN = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from soilml.errors import InputError
@@ -10,7 +12,12 @@ from soilml.gap.search.cross_validation import region_fold
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import linearise
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
-from soilml.gap.statistics.reml_covariance import RUN_EFFECT_UNITS
+from soilml.gap.statistics.reml_covariance import (
+    RUN_EFFECT_UNITS,
+    assemble_covariance,
+    run_effect_columns,
+)
+from soilml.gap.statistics.repeats import repeat_disagreement
 from soilml.quantities import column
 
 #: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
@@ -20,12 +27,14 @@ NOISE_SCALED_UP = 1.3
 UNUSUAL_RUN_EFFECT = 3.0
 #: Significance level of the test of the region that a fit to the rest predicts.
 REGION_LEVEL = 0.001
+#: Significance level of the test of rows driven alike.
+REPEAT_LEVEL = 0.001
 
 
 def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
     """What disagrees with what although no smooth gap was found; empty where nothing does."""
-    found = []
     components, readings = problem.covariance.components, problem.readings
+    found = _repeats(problem, soil)
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale >= NOISE_SCALED_UP:
             found.append(
@@ -42,6 +51,25 @@ def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
         )
     found += _region(problem, soil)
     return found
+
+
+def _repeats(problem: FitProblem, soil: GapFit) -> list[str]:
+    """Rows driven alike that differ by more than declared noise and usual scatter explain."""
+    readings = problem.readings
+    several = len(readings.runs) > 1
+    usual = replace(
+        problem.covariance.components,
+        noise_scale=np.ones(len(readings.channels)),
+        friction_angle_std=RUN_EFFECT_UNITS["friction_angle"] * several,
+        bearing_std=RUN_EFFECT_UNITS["bearing"] * several,
+    )
+    columns = run_effect_columns(soil.fitted(), readings)
+    covariance = assemble_covariance(readings, columns, usual).matrix
+    return [
+        comparison.sentence
+        for comparison in repeat_disagreement(readings, covariance, soil.prediction)
+        if comparison.p_value < REPEAT_LEVEL
+    ]
 
 
 def _region(problem: FitProblem, soil: GapFit) -> list[str]:

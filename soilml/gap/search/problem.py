@@ -56,7 +56,9 @@ class FitProblem:
     @cached_property
     def discrepancy(self) -> DiscrepancyModel:
         """Noise, scatter and a smooth discrepancy of the readings."""
-        return DiscrepancyModel(self.covariance, discrepancy_process(self.readings))
+        return DiscrepancyModel(
+            self.covariance, discrepancy_process(self.readings, self.case.discrepancy)
+        )
 
     def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap.statistics.coordinates import EffectCoordinate
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.numerics.prior import Prior
@@ -31,4 +32,8 @@ def updated_case(fit: GapFit, discrepancy: dict[str, float]) -> Case:
         upper = min(bounds[c.path].upper, value + reach)
         if lower < upper:
             prior[c.path] = Prior(lower, upper)
-    return replace(case, prior=prior, noise=dict(fit.case.noise))
+    declared = next(iter(fit.case.discrepancy.values()), Discrepancy())
+    remaining = {
+        name: replace(declared, share=0.0, constant=std) for name, std in discrepancy.items()
+    }
+    return replace(case, prior=prior, noise=dict(fit.case.noise), discrepancy=remaining)

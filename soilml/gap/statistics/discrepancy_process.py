@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Correlation lengths of the discrepancy in slip and in the logarithm of the load.
-SLIP_LENGTH, LOG_LOAD_LENGTH = 0.3, 0.6
-#: Usual model error as a fraction of a channel's range, where the case does not state another.
-USUAL_FRACTION = 0.02
-#: Points that represent the process: beyond some tens, points closer than the correlation lengths
-#: add nothing.
-MOST_POINTS = 60
+#: Usual model error of a channel, where the case does not state another.
+USUAL = Discrepancy(share=0.02)
 #: Eigenfunctions with a smaller fraction of the largest eigenvalue are dropped: at ten times the
-#: usual amplitude they still change the readings by less than a thousandth of their range.
-MIN_EIGENVALUE = 1e-4
+#: usual amplitude they still change the readings by less than a five-hundredth of their range.
+LEAST_EIGENVALUE = 1e-4
+#: Amplitude in place of none, which has no logarithm.
+SMALLEST = 1e-300
 
 
 @dataclass(frozen=True)
@@ -53,35 +53,28 @@ class DiscrepancyProcess:
     channel: Integers
     usual: Floats
 
-    @cached_property
-    def variance(self) -> Floats:
-        """Variance of each reading at unit amplitude, (m,)."""
-        return np.asarray((self.columns**2).sum(axis=1))
-
 
 def discrepancy_process(
-    readings: StackedReadings, fraction: dict[str, float] | None = None
+    readings: StackedReadings, declared: Mapping[str, Discrepancy] | None = None
 ) -> DiscrepancyProcess:
     """The process of these readings.
 
     Parameters
     ----------
-    fraction : dict, optional
-        Usual model error by channel, as a fraction of the channel's range, which includes zero.
+    declared : mapping, optional
+        Usual model error by column, where it differs from `USUAL`.
     """
-    points = np.column_stack(
-        [
-            np.asarray(readings.at.slip, dtype=np.float64) / SLIP_LENGTH,
-            np.log(np.asarray(readings.at.load, dtype=np.float64)) / LOG_LOAD_LENGTH,
-        ]
-    )
-    functions = _eigenfunctions(points)
+    declared = declared or {}
+    lengths = next(iter(declared.values()), USUAL)
+    slip = np.asarray(readings.at.slip, dtype=np.float64)
+    load = np.asarray(readings.at.load, dtype=np.float64)
+    points = slip_load_points(slip, load, lengths.slip_length, lengths.log_load_length)
+    functions = process_columns(points, least_eigenvalue=LEAST_EIGENVALUE)
     columns, channel, usual = [], [], []
     for i, name in enumerate(readings.channels):
         in_channel = readings.channel == i
-        values = readings.reading[in_channel]
-        span = max(float(values.max(initial=0.0)), 0.0) - min(float(values.min(initial=0.0)), 0.0)
-        usual.append((fraction or {}).get(name, USUAL_FRACTION) * max(span, 1e-300))
+        span = range_with_zero(readings.reading[in_channel])
+        usual.append(max(declared.get(column(name), USUAL).amplitude(span), SMALLEST))
         own = np.where(in_channel[:, None], functions[readings.row], 0.0)
         columns.append(usual[-1] * own)
         channel.append(np.full(functions.shape[1], i))
@@ -90,30 +83,3 @@ def discrepancy_process(
         np.concatenate(channel) if channel else np.zeros(0, dtype=np.int64),
         np.asarray(usual),
     )
-
-
-def _eigenfunctions(points: Floats) -> Floats:
-    """Functions (n, r) whose products sum to the squared-exponential kernel of points (n, 2).
-
-    The kernel is represented by at most `MOST_POINTS` of the points (Nystroem's approximation;
-    Williams and Seeger, NIPS 13, 2001).
-    """
-    chosen = _spread(points)
-    square = ((chosen[:, None, :] - chosen) ** 2).sum(axis=-1)
-    value, vector = np.linalg.eigh(np.exp(-0.5 * square))
-    kept = value > MIN_EIGENVALUE * value[-1]
-    cross = np.exp(-0.5 * ((points[:, None, :] - chosen) ** 2).sum(axis=-1))
-    return np.asarray(cross @ (vector[:, kept] / np.sqrt(value[kept])))
-
-
-def _spread(points: Floats) -> Floats:
-    """At most `MOST_POINTS` distinct points, each the farthest from those chosen before."""
-    distinct = np.unique(np.round(points, 6), axis=0)
-    if len(distinct) <= MOST_POINTS:
-        return np.asarray(distinct)
-    chosen = [0]
-    distance = ((distinct - distinct[0]) ** 2).sum(axis=1)
-    while len(chosen) < MOST_POINTS:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, ((distinct - distinct[chosen[-1]]) ** 2).sum(axis=1))
-    return np.asarray(distinct[chosen])

@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 #: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
 #: about 1.6, which change the evidence by less than 1 near its maximum.
 AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Prior probability that a channel has no discrepancy at all.
+NO_DISCREPANCY = 0.5
 #: Sweeps over the channels; the amplitudes of different channels depend little on each other.
 SWEEPS = 2
 
@@ -124,7 +126,7 @@ class _Linearised:
     cross: Floats  # (q, p + 1) of the process with Jacobian and residual
     plain: Floats  # (p + 1, p + 1) of Jacobian and residual
     precision: Floats  # (p,)
-    x: Floats  # (p,)
+    pull: Floats  # (p,) half the derivative of -2 ln prior density
     movable: NDArray[np.bool_]  # (p,) not at a bound
     constant: float  # -2 ln prior density of the coordinates
     channel: NDArray[np.int64]  # (q,)
@@ -143,9 +145,9 @@ class _Linearised:
         factor = np.linalg.cholesky(m)
         reduced = np.linalg.solve(factor, t[:, :, None] * self.cross)
         product = self.plain - np.swapaxes(reduced, 1, 2) @ reduced  # (b, p + 1, p + 1)
-        p = len(self.x)
+        p = len(self.pull)
         h = product[:, :p, :p] + np.diag(self.precision)
-        gradient = np.where(self.movable, product[:, :p, p] - self.precision * self.x, 0.0)
+        gradient = np.where(self.movable, product[:, :p, p] - self.pull, 0.0)
         both = self.movable[:, None] & self.movable
         inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
         step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient
@@ -153,7 +155,7 @@ class _Linearised:
         value += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         if p:
             value += np.linalg.slogdet(h)[1]
-        return value + self.constant + amplitude_prior(amplitudes), step
+        return value + self.constant + amplitude_penalty(amplitudes), step
 
 
 def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _Linearised:
@@ -161,9 +163,8 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _
     added = np.zeros((len(fit.reading), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
     block = np.column_stack([jacobian, whiten @ (fit.reading - fit.prediction)])
-    precision, constant = zip(
-        *[_prior(c, float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)], strict=True
-    )
+    priors = [_prior(c, float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)]
+    precision = np.asarray([p for p, _, _ in priors])
     k = added.shape[1]
     lower = np.asarray([c.lower for c in fit.coordinates])
     upper = np.asarray([c.upper for c in fit.coordinates])
@@ -173,15 +174,15 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _
         cross=model.columns.T @ block,
         plain=block.T @ block,
         precision=np.concatenate([precision, np.full(k, 2.0)]),
-        x=np.concatenate([fit.x, np.zeros(k)]),
+        pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]),
         movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
-        constant=float(np.sum(constant)) - k * np.log(2.0),
+        constant=sum(constant for _, _, constant in priors) - k * float(np.log(2.0)),
         channel=model.process.channel,
     )
 
 
-def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float]:
-    r"""Precision of a coordinate's prior at x, and -2 ln of its density.
+def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float, float]:
+    r"""Precision of a coordinate's prior at x, and half the derivative and the value of -2 ln p.
 
     A soil coordinate is uniform. A size or shape with a standard deviation is Gaussian. The size of
     a physical effect has the Cauchy density with a scale of one reference size, because sizes of
@@ -190,13 +191,32 @@ def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float]:
     determine leaves the evidence unchanged.
     """
     if not isinstance(coordinate, EffectCoordinate):
-        return UNIFORM_PRECISION, 0.0
+        return UNIFORM_PRECISION, 0.0, 0.0
     if np.isfinite(coordinate.std):
         precision = coordinate.std**-2
-        return precision, precision * x**2 - float(np.log(precision))
-    return 2.0 / (1.0 + x**2), 2.0 * float(np.log1p(x**2)) - float(np.log(2.0))
+        return precision, precision * x, precision * x**2 - float(np.log(precision))
+    weight = 2.0 / (1.0 + x**2)
+    return weight, weight * x, 2.0 * float(np.log1p(x**2)) - float(np.log(2.0))
 
 
-def amplitude_prior(amplitudes: Floats) -> Floats:
-    """-2 ln of the prior density of the amplitudes (b, channels), summed over channels, (b,)."""
-    return np.asarray(2.0 * np.log1p(amplitudes**2).sum(axis=-1))
+def _amplitude_masses() -> Floats:
+    """Prior probability of each of `AMPLITUDES`.
+
+    With probability `NO_DISCREPANCY` a channel has none; otherwise its amplitude has the
+    half-Cauchy distribution with a scale of one usual amplitude, whose heavy tail allows for causes
+    that the catalogue lacks (Gelman, Bayesian Analysis 1(3), 2006).
+    """
+    positive = AMPLITUDES[1:]
+    edges = np.concatenate([[0.0], np.sqrt(positive[1:] * positive[:-1]), [np.inf]])
+    cumulative = 2.0 / np.pi * np.arctan(edges)
+    return np.concatenate([[NO_DISCREPANCY], (1.0 - NO_DISCREPANCY) * np.diff(cumulative)])
+
+
+#: -2 ln of the prior probability of each of `AMPLITUDES`.
+_AMPLITUDE_PENALTY = -2.0 * np.log(_amplitude_masses())
+
+
+def amplitude_penalty(amplitudes: Floats) -> Floats:
+    """-2 ln prior probability of amplitudes (b, channels) out of `AMPLITUDES`, by set, (b,)."""
+    nearest = np.abs(amplitudes[..., None] - AMPLITUDES).argmin(axis=-1)
+    return np.asarray(_AMPLITUDE_PENALTY[nearest].sum(axis=-1))

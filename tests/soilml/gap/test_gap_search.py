@@ -6,14 +6,23 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.search.candidate_fits import fit_candidate, fit_shapes
+from soilml.gap.search.candidate_fits import (
+    EFFECT_PENALTY,
+    CandidateFit,
+    fit_candidates,
+    fit_shapes,
+)
 from soilml.gap.search.cross_validation import (
     gap_reduction,
     held_out_region,
     held_out_runs,
     predict_held_out,
 )
-from soilml.gap.search.stepwise import MIN_IMPROVEMENT, _drop_effects, predicted_gains, search
+from soilml.gap.search.law_difference import law_matters
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.posterior import explanations, posterior
+from soilml.gap.search.stepwise import predicted_gains, search
+from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.physics.effects import EFFECTS
 
@@ -33,36 +42,49 @@ def dug():
     return problem, problem.fit_soil([np.full(3, 0.5)])
 
 
+def alone(soil):
+    """The soil alone without discrepancy."""
+    return MarginalFit(soil, Evidence(soil.objective, np.zeros(3), np.zeros(len(soil.x))))
+
+
+def fitted(problem, soil, *names):
+    """A candidate by its catalogue law, with free shapes beside it."""
+    none = np.zeros(len(problem.readings.channels))
+    found = fit_candidates(problem, [(names, soil.start_values(), none)])
+    return fit_shapes(problem, found)[0]
+
+
 @pytest.fixture(scope="module")
 def named(dug):
-    problem, soil = dug
-    return fit_shapes(problem, fit_candidate(problem, ["slip-sinkage"], soil.start_values()))
+    return fitted(*dug, "slip-sinkage")
 
 
 def test_the_true_law_needs_no_shape(named):
     assert not named.shape_supported
     assert named.shape_deviation == 0.0
-    assert named.objective == named.catalogue_fit.objective
-    assert named.fit is named.catalogue_fit
-    assert named.occam_penalty > 0.0
+    assert named.fit is named.catalogue_law.fit
+    assert named.objective == named.catalogue_law.evidence.value + EFFECT_PENALTY
+    assert named.free_law.fit.objective <= named.catalogue_law.fit.objective + 0.1
 
 
-def test_free_shapes_lower_the_objective_and_are_penalised(dug):
+def test_free_shapes_are_supported_where_the_law_is_another(dug):
     case = case_of()
     bent = DIGGING(n1=0.4, by_slip=3.0)
     problem = small(fit_problem(case, driven(case, [bent], seed=2)))
-    found = fit_shapes(problem, fit_candidate(problem, ["slip-sinkage"], dug[1].start_values()))
-    assert found.shape_fit.objective + found.occam_penalty < found.catalogue_fit.objective
-    assert found.shape_supported and found.fit is found.shape_fit
-    assert found.objective == pytest.approx(found.shape_fit.objective + found.occam_penalty)
+    found = fitted(problem, dug[1], "slip-sinkage")
+    assert found.shape_supported and found.fit is found.free_law.fit
     assert found.shape_deviation == pytest.approx(1.0, abs=0.3)  # by_slip 3 is one prior spread
     assert found.fit.values()["slip-sinkage.by_slip"] == pytest.approx(3.0, abs=0.5)
+    assert law_matters(problem, found)
 
 
-def test_an_effect_with_a_certain_law_has_no_shape_penalty(dug):
-    problem, soil = dug
-    found = fit_shapes(problem, fit_candidate(problem, ["torque-gain"], soil.start_values()))
-    assert found.occam_penalty == 0.0 and not found.shape_supported
+def test_an_effect_with_a_certain_law_has_no_free_shape(dug):
+    found = fitted(*dug, "torque-gain")
+    assert found.free_law is found.catalogue_law and not found.shape_supported
+
+
+def test_a_law_that_predicts_the_same_does_not_matter(dug, named):
+    assert not law_matters(dug[0], named)
 
 
 def test_slopes_are_shaped_only_as_far_as_slip_and_load_vary():
@@ -74,9 +96,11 @@ def test_slopes_are_shaped_only_as_far_as_slip_and_load_vary():
 def test_the_effect_that_acts_promises_most_and_keeps_it(dug, named):
     problem, soil = dug
     known, _ = effect_signatures(soil.fitted(), problem.readings, problem.effects)
-    gains = predicted_gains(problem, soil, known)
+    none = MarginalFit(soil, problem.discrepancy.evidence(soil))
+    alone = CandidateFit((), none, none)
+    gains = predicted_gains(problem, alone, alone.objective, known)
     assert max(gains, key=gains.get) == "slip-sinkage"
-    assert soil.objective - named.objective > 0.5 * gains["slip-sinkage"]
+    assert alone.objective - named.objective > 0.5 * gains["slip-sinkage"] > 10.0
     assert named.fit.values()["slip-sinkage.n1"] == pytest.approx(0.4, abs=0.02)
 
 
@@ -84,7 +108,10 @@ def test_the_search_names_what_acts(dug):
     problem, soil = dug
     found = search(problem, soil, 0)
     assert found.has_gap and found.adequate
-    assert found.accepted[0].names == ("slip-sinkage",)
+    assert [c.names for c in found.accepted] == [("slip-sinkage",)]
+    assert found.posterior.probability("slip-sinkage") > 0.99
+    assert found.likeliest.names == ("slip-sinkage",)
+    assert np.all(found.likeliest.amplitude < 0.5)  # nothing is left for a discrepancy
 
 
 def test_the_search_looks_no_further_where_nothing_is_missing():
@@ -95,23 +122,22 @@ def test_the_search_looks_no_further_where_nothing_is_missing():
     assert found.accepted == found.candidates == ()
 
 
-def test_a_larger_set_gives_way_to_a_smaller_that_explains_as_much(dug):
+def test_a_larger_set_gives_way_to_a_smaller_that_explains_as_much(dug, named):
     problem, soil = dug
-    pair = fit_candidate(problem, ["bulldozing", "slip-sinkage"], soil.start_values())
-    tried = {pair.names: pair}
-    kept = _drop_effects(problem, pair, tried)
-    assert kept is not None and kept.names == ("slip-sinkage",)
-    assert kept.objective <= pair.objective + MIN_IMPROVEMENT
-    assert set(tried) == {pair.names, ("slip-sinkage",), ("bulldozing",)}
+    pair = fitted(problem, soil, "bulldozing", "slip-sinkage")
+    assert pair.objective > named.objective
+    none = MarginalFit(soil, problem.discrepancy.evidence(soil))
+    candidates = (pair, named, CandidateFit((), none, none))
+    found = posterior(candidates, {}, candidates[-1])
+    assert [c.names for c in explanations(candidates, found)] == [("slip-sinkage",)]
 
 
 def test_a_set_of_which_each_is_needed_stays():
     case = case_of()
     both = [DIGGING(n1=0.4), EFFECTS["bulldozing"](share=1.0)]
     problem = small(fit_problem(case, driven(case, both, seed=3)))
-    soil = problem.fit_soil([np.full(3, 0.5)])
-    pair = fit_candidate(problem, ["bulldozing", "slip-sinkage"], soil.start_values())
-    assert _drop_effects(problem, pair, {pair.names: pair}) is None
+    found = search(problem, problem.fit_soil([np.full(3, 0.5)]), 0)
+    assert [c.names for c in found.accepted] == [("bulldozing", "slip-sinkage")]
 
 
 def test_the_true_model_leaves_nothing_of_readings_without_noise(dug):
@@ -123,15 +149,15 @@ def test_the_true_model_leaves_nothing_of_readings_without_noise(dug):
     )
     assert found.before == pytest.approx(9.0) and found.after == 0.0
     assert set(found.channels) == {"torque_Nm", "drawbar_pull_N", "sinkage_m"}
-    soil = problem.fit_soil([np.full(3, 0.5)])
+    soil = alone(problem.fit_soil([np.full(3, 0.5)]))
     for made in (held_out_runs(problem, soil, soil, 0), held_out_region(problem, soil, soil)):
         assert made.before == made.after < 0.05
 
 
 def test_the_right_model_leaves_the_noise_and_the_soil_alone_more(dug, named):
     problem, soil = dug
-    runs = held_out_runs(problem, soil, named.fit, 0)
-    region = held_out_region(problem, soil, named.fit)
+    runs = held_out_runs(problem, alone(soil), named.best, 0)
+    region = held_out_region(problem, alone(soil), named.best)
     train = gap_reduction(
         problem.readings, problem.covariance.std, soil.prediction, named.fit.prediction, "all"
     )

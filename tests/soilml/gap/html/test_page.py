@@ -13,17 +13,18 @@ from soilml.config.case import Case
 from soilml.gap.html import formatting
 from soilml.gap.html.page import page
 from soilml.gap.html.prediction_curves import MOST_RUNS, select_runs
-from soilml.gap.results import (
-    STATUSES,
+from soilml.gap.report_parts import (
     CandidateSummary,
     Discrepancy,
     EstimatedValue,
     GapReduction,
-    GapReport,
     NamedEffect,
     NextRun,
     ReadingsAndPredictions,
+    RemainingDiscrepancy,
+    Suspect,
 )
+from soilml.gap.results import STATUSES, GapReport
 from soilml.physics.effects import EFFECTS
 
 pytest.importorskip("jinja2")
@@ -114,7 +115,7 @@ def report(status="named", **changes):
         sentence="The gap is explained by slip-sinkage: mean squared residual 320 -> 1.00 "
         "(noise alone gives 1).",
         model=case,
-        effects=(NamedEffect("slip-sinkage", n1, (), 184.3, "exit-angle"),),
+        effects=(NamedEffect("slip-sinkage", n1, (), 184.3, "exit-angle", 0.9991, 7.0),),
         cause_set=(("slip-sinkage",), ("grousers", "bulldozing")),
         where=(
             Discrepancy("sinkage_m", (0.4, 0.6), (40.0, 80.0), 122.9, 0.0002),
@@ -153,6 +154,12 @@ def report(status="named", **changes):
             "friction_angle_from_run_to_run_rad": 0.00698,
         },
         residual_trend={"torque_Nm": 0.25, "sinkage_m": 0.0},
+        suspects=(Suspect(("slip-sinkage",), 7.0, "if the bed was the same for all rows"),),
+        discrepancy={
+            "torque_Nm": RemainingDiscrepancy(
+                "N m", 0.404, 0.137, 2.3, 1.6, "measured below the model, at slip 0.14 under 71 N"
+            )
+        },
         p_gap=0.00025,
         p_residual=0.86,
         seed=7,
@@ -204,9 +211,13 @@ def test_hostile_names_stay_text():
         not_claimed=(EVIL,),
         untestable={EVIL: EVIL},
         residual_trend={EVIL: 1.0},
+        suspects=(Suspect((EVIL,), 0.0, EVIL),),
+        discrepancy={EVIL: RemainingDiscrepancy(EVIL, 2.0, 1.0, 2.0, 1.0, EVIL)},
         variance_components={EVIL: 1.0},
         cause_set=((EVIL,),),
-        effects=(NamedEffect(EVIL, {EVIL: EstimatedValue(1.0, 0.1, EVIL)}, (EVIL,), 1.0, EVIL),),
+        effects=(
+            NamedEffect(EVIL, {EVIL: EstimatedValue(1.0, 0.1, EVIL)}, (EVIL,), 1.0, EVIL, 0.5, 0.0),
+        ),
         where=(Discrepancy(EVIL, (0.1, 0.2), (1.0, 2.0), 5.0, 0.01),),
         candidates=(CandidateSummary((EVIL,), 1.0, 1.0, 0.0, EVIL),),
         next_runs=(NextRun(EVIL, EVIL, 1.0, ()),),
@@ -237,6 +248,8 @@ def test_the_page_contains_the_figures_of_the_report():
         *("61203", "61284", "more effects than needed"),
         "7.25 σ",
         "p = 0.86",
+        *("0.404 N m", "0.137 N m", "1.60", "at slip 0.14 under 71 N"),  # the discrepancy
+        "> 0.99",
         "0.87 × the declared noise",
         *("rover.toml", "runs.csv", "seed 7", "needs speed_m_s"),
         "6 of 8 runs are shown",
@@ -246,7 +259,8 @@ def test_the_page_contains_the_figures_of_the_report():
 
 def test_an_unchanged_gap_is_shown_once():
     same = GapReduction(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
-    html = page(report("no-gap", gap={"train": same}, effects=(), cause_set=()), "m", "r")
+    whole = report("no-gap", gap={"train": same}, effects=(), cause_set=())
+    html = page(replace(whole, soil_after=whole.soil_before), "m", "r")
     assert "before and after" not in html
     assert "Dashed lines" not in html
 

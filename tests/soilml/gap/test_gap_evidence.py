@@ -1,0 +1,106 @@
+"""Evidence beside a smooth discrepancy: against dense algebra, and on data with one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.config.model_discrepancy import Discrepancy
+from soilml.gap.search.problem import StartedFit, fit_many
+from soilml.gap.statistics.discrepancy_process import discrepancy_process
+from soilml.gap.statistics.evidence import AMPLITUDES, amplitude_penalty
+from soilml.gap.statistics.least_squares import UNIFORM_PRECISION
+from soilml.physics.effects import EFFECTS
+
+
+@pytest.fixture(scope="module")
+def problem():
+    case = case_of()
+    return fit_problem(case, driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=2), (0.8, 0.8))
+
+
+@pytest.fixture(scope="module")
+def soil(problem):
+    return problem.fit_soil([np.full(3, 0.5)])
+
+
+def test_the_process_has_the_stated_covariance(problem):
+    readings = problem.readings
+    process = discrepancy_process(readings, {"torque_Nm": Discrepancy(constant=0.3)})
+    own = readings.channel == readings.channels.index("torque")
+    s, w = readings.slip[own] / 0.3, np.log(readings.load[own]) / 0.6
+    kernel = np.exp(-0.5 * ((s[:, None] - s) ** 2 + (w[:, None] - w) ** 2))
+    columns = process.columns[own]
+    assert columns @ columns.T == pytest.approx(0.09 * kernel, abs=0.002 * 0.09)
+    other = process.columns[~own][:, process.channel == readings.channels.index("torque")]
+    assert np.all(other == 0.0)
+    span = readings.reading[own].max()  # positive, so that the range from zero is the largest
+    assert discrepancy_process(readings).usual[0] == pytest.approx(0.02 * span)
+
+
+@pytest.mark.parametrize("amplitude", [(0.0, 0.0, 0.0), (1.0, 0.0, 4.0), (25.0, 10.0, 0.4)])
+def test_whitening_leaves_unit_covariance(problem, amplitude):
+    model, amplitude = problem.discrepancy, np.asarray(amplitude)
+    whiten, matrix = model.whiten(amplitude), model.matrix(amplitude)
+    assert whiten @ matrix @ whiten.T == pytest.approx(np.eye(len(matrix)), abs=1e-6)
+
+
+def test_the_evidence_is_that_of_dense_algebra(problem, soil):
+    found = problem.discrepancy.evidence(soil)
+    base = problem.covariance.matrix
+
+    def dense(amplitude):
+        matrix = problem.discrepancy.matrix(amplitude)
+        inverse = np.linalg.inv(matrix)
+        residual = soil.reading - soil.prediction
+        h = soil.derivatives.T @ inverse @ soil.derivatives + UNIFORM_PRECISION * np.eye(3)
+        inside = (soil.x > 0.0) & (soil.x < 1.0)  # coordinates at a bound stay there
+        gradient = (soil.derivatives.T @ inverse @ residual)[inside]
+        step = np.linalg.solve(h[np.ix_(inside, inside)], gradient)
+        value = residual @ inverse @ residual - gradient @ step
+        value += np.linalg.slogdet(matrix)[1] - np.linalg.slogdet(base)[1]
+        return value + np.linalg.slogdet(h)[1] + amplitude_penalty(amplitude[None, :])[0]
+
+    assert found.value == pytest.approx(dense(found.amplitude), rel=1e-6)
+    for i in range(3):  # no amplitude of one channel is better
+        for other in AMPLITUDES:
+            trial = found.amplitude.copy()
+            trial[i] = other
+            assert dense(trial) >= found.value - 0.11
+
+
+def test_prior_probabilities_of_the_amplitudes_sum_to_one():
+    single = amplitude_penalty(AMPLITUDES[:, None])
+    assert np.exp(-0.5 * single).sum() == pytest.approx(1.0)
+
+
+def test_the_true_effect_has_more_evidence_than_any_discrepancy(problem, soil):
+    request = StartedFit(
+        problem.with_effects(["slip-sinkage"]),
+        [*problem.soil, *problem.size_coordinates(["slip-sinkage"])],
+        soil.start_values(),
+    )
+    dug = problem.discrepancy.evidence(fit_many(problem, [request])[0])
+    none = problem.discrepancy.evidence(soil)
+    assert none.value - dug.value > 30.0
+    assert np.max(dug.amplitude) < 0.5 < np.max(none.amplitude)
+
+
+def test_an_effect_that_changes_nothing_leaves_the_evidence_unchanged(problem, soil):
+    plain = problem.discrepancy.evidence(soil)
+    nothing = problem.discrepancy.evidence(soil, extra=np.zeros((len(problem.readings), 1)))
+    assert nothing.value == pytest.approx(plain.value)
+    assert nothing.step[-1] == 0.0
+
+
+def test_a_smooth_discrepancy_is_recognised_by_its_size(problem):
+    case = problem.case
+    table = driven(case, seed=4)
+    slip, torque = table["slip"], table["torque_Nm"]
+    wave = 0.05 * torque.max() * np.sin(9.0 * slip + 0.02 * table["load_N"])
+    wavy = replace(table, columns=table.columns | {"torque_Nm": torque + wave})
+    other = fit_problem(case, wavy)
+    found = other.discrepancy.evidence(other.fit_soil([np.full(3, 0.5)]))
+    assert 1.0 <= found.amplitude[0] <= 6.3  # its rms is 1.8 usual amplitudes
+    assert found.amplitude[0] > 2.0 * found.amplitude[1]
