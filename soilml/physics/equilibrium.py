@@ -11,16 +11,17 @@ from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase
-from soilml.physics.sinkage_search import SinkageEstimate, first_equilibrium
+from soilml.physics.nearby_equilibrium import SinkageEstimate, equilibrium_near
+from soilml.physics.sinkage_search import first_equilibrium
 
 #: Relative step in sinkage of the central difference for dW/dz. Its truncation error is of the
 #: order of the step squared, and an error in the slope of a Newton step only scales its derivative.
 RELATIVE_STEP = 1e-5
 
 
-def sensor_readings(load_case: LoadCase) -> Force:
-    """Forces at equilibrium as the sensors report them; arrays (batch,)."""
-    force = equilibrium_forces(load_case)
+def sensor_readings(load_case: LoadCase, estimate: SinkageEstimate | None = None) -> Force:
+    """Forces at equilibrium as the sensors report them; see `equilibrium_forces`."""
+    force = equilibrium_forces(load_case, estimate)
     true_case = apply_input_effects(load_case)
     return without_unsolved(apply_stage(load_case.effects, "on_reading", force, true_case))
 
@@ -28,13 +29,16 @@ def sensor_readings(load_case: LoadCase) -> Force:
 def equilibrium_forces(load_case: LoadCase, estimate: SinkageEstimate | None = None) -> Force:
     """Forces at the smallest sinkage at which the soil carries the load; arrays (batch,).
 
-    From an estimate of the sinkage the search is shorter. Its answer is the same within
-    `soilml.physics.sinkage_search.LOAD_TOLERANCE`, and not to the last bit.
+    From an estimate of the sinkage the search is shorter; see `equilibrium_near`.
     """
     load_case = apply_input_effects(load_case)
     parameters = list(values(load_case).values())
     with no_gradient(parameters):
-        force = first_equilibrium(load_case, estimate)
+        force = (
+            first_equilibrium(load_case)
+            if estimate is None
+            else equilibrium_near(load_case, estimate)
+        )
     if requires_gradient(parameters):
         force = _with_gradients(load_case, force)
     return without_unsolved(force)

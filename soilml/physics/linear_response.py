@@ -13,8 +13,8 @@ from soilml.physics.effects.base import apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
-from soilml.physics.model import in_chunks
-from soilml.physics.sinkage_search import SinkageEstimate
+from soilml.physics.model import in_chunks, in_chunks_near
+from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 #: Step in the logarithm of sinkage of the difference for dW/d(ln z): a truncation error of the
 #: order of the step, and a rounding error of 1e-10.
@@ -66,9 +66,8 @@ def linear_response(
     base_rows = xp.sort(xp.unique_values(base))
     position = xp.searchsorted(base_rows, base)
     everything = xp.arange(base.shape[0], device=base.device)
-    columns = () if estimate is None else (estimate.log_sinkage, estimate.slope)
     with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-        solved = in_chunks(rows(load_case, base_rows), _solve, *columns)
+        solved = in_chunks_near(rows(load_case, base_rows), equilibrium_forces, estimate)
         evaluated = xp.concat([everything, base_rows], axis=0)
         sinkage = xp.concat(
             [xp.take(solved.sinkage, position, axis=0), solved.sinkage * math.exp(SINKAGE_STEP)],
@@ -108,10 +107,6 @@ def _first_order(
     slope = rising / here["load"][base_rows]
     sinkage = SinkageEstimate(xp.log(here["sinkage"]) + step, slope[position])
     return LinearResponse(without_unsolved(reading), sinkage)
-
-
-def _solve(load_case: LoadCase, *columns: Array) -> Force:
-    return equilibrium_forces(load_case, SinkageEstimate(*columns) if columns else None)
 
 
 def _at_sinkage(load_case: LoadCase, sinkage: Array) -> Force:

@@ -19,6 +19,7 @@ from soilml.physics.forces import stress_profile
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.nearby_equilibrium import SinkageEstimate
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 
@@ -185,3 +186,17 @@ def in_chunks(load_case: LoadCase, solve: Callable[..., Force], *columns: Array)
         for f in fields(Force)
     }
     return Force(**joined)
+
+
+def in_chunks_near(
+    load_case: LoadCase, solve: Callable[..., Force], estimate: SinkageEstimate | None
+) -> Force:
+    """The same, solved from an estimate of the sinkage of all rows, if there is one."""
+    if estimate is None:
+        return in_chunks(load_case, solve)
+    nearest = estimate.nearest
+
+    def solve_near(part: LoadCase, log_sinkage: Array, slope: Array) -> Force:
+        return solve(part, SinkageEstimate(log_sinkage, slope, nearest))
+
+    return in_chunks(load_case, solve_near, estimate.log_sinkage, estimate.slope)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
@@ -52,25 +52,17 @@ REFINEMENTS, REFINED_INTERVALS = 2, 16
 PEAK_BRACKET = 1e-3
 
 
-@dataclass(frozen=True)
-class SinkageEstimate:
-    """Where a search for equilibrium may start, arrays (batch,); NaN in rows that are not known."""
-
-    log_sinkage: Array  # ln(z / m)
-    slope: Array  # d ln W / d ln z, of the load that the soil carries
-
-
-def first_equilibrium(load_case: LoadCase, estimate: SinkageEstimate | None = None) -> Force:
+def first_equilibrium(load_case: LoadCase) -> Force:
     """Forces at the smallest sinkage that carries the load; rows without one by their status."""
     xp = namespace(load_case.at.load)
-    force, solved = _solve_by_secant(load_case, estimate)
+    force, solved = _solve_by_secant(load_case)
     if not bool(xp.all(solved)):
         unsolved = xp.nonzero(~solved)[0]
         force = merge_rows(force, solved, _solve_by_scan(rows(load_case, unsolved)))
     return force
 
 
-def _solve_by_secant(load_case: LoadCase, estimate: SinkageEstimate | None) -> tuple[Force, Array]:
+def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
     """Forces at the root that secant steps reach, and which rows need no further search."""
     xp = namespace(load_case.at.load)
     soil, at, gear = load_case.soil, load_case.at, load_case.gear
@@ -78,16 +70,12 @@ def _solve_by_secant(load_case: LoadCase, estimate: SinkageEstimate | None) -> t
     initial = xp.log(gear.initial_sinkage(soil, at))
     initial = xp.where(initial < largest - INITIAL_MARGIN, initial, largest - INITIAL_MARGIN)
     power = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
-    if estimate is not None:
-        known = xp.isfinite(estimate.log_sinkage) & (estimate.slope > 0)
-        initial = xp.where(known, xp.minimum(estimate.log_sinkage, largest), initial)
-        power = xp.where(known, estimate.slope, power)
     smallest = largest + math.log(SMALLEST_FRACTION)
     force, balanced, slope = _root_between(load_case, smallest, largest, initial, power)
-    return force, balanced & ~_earlier_equilibrium_possible(load_case, force, slope)
+    return force, balanced & ~earlier_equilibrium_possible(load_case, force, slope)
 
 
-def _earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array) -> Array:
+def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array) -> Array:
     """Rows that may carry the load at a smaller sinkage already, judged by coarse evaluations.
 
     The shear under a driving wheel lifts it everywhere in front of the axle, and the load carried
@@ -212,14 +200,20 @@ def _log_load_ratio(load_case: LoadCase) -> Callable[[Array], Array]:
 def merge_rows(force: Force, keep: Array, others: Force) -> Force:
     """`force` where `keep`, and the rows of `others`, in order, elsewhere."""
     xp = namespace(force.load)
-    size = keep.shape[0]
-    position = xp.where(
-        keep,
-        xp.arange(size, device=keep.device),
-        size - 1 + xp.cumulative_sum(xp.astype(~keep, xp.int64)),
-    )
+    position = merged_position(keep)
     merged = {}
     for field in fields(Force):
         both = xp.concat([getattr(force, field.name), getattr(others, field.name)], axis=0)
         merged[field.name] = xp.take(both, position, axis=0)
     return Force(**merged)
+
+
+def merged_position(keep: Array) -> Array:
+    """Where each merged row is, in all rows followed by the rows that are not kept."""
+    xp = namespace(keep)
+    size = keep.shape[0]
+    return xp.where(
+        keep,
+        xp.arange(size, device=keep.device),
+        size - 1 + xp.cumulative_sum(xp.astype(~keep, xp.int64)),
+    )

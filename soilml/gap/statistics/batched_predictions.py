@@ -17,9 +17,8 @@ from soilml.gap.statistics.joined_cases import CaseSets, join_key, joined_load_c
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
-from soilml.physics.model import in_chunks
-from soilml.physics.nearby_equilibrium import readings_near
-from soilml.physics.sinkage_search import SinkageEstimate
+from soilml.physics.model import in_chunks_near
+from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 if TYPE_CHECKING:
     from soilml.gap.statistics.coordinates import FitCoordinate
@@ -37,7 +36,7 @@ class PredictionRequest:
     """The readings that a case predicts at sets of coordinates, x (sets, p).
 
     `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
-    see `soilml.physics.nearby_equilibrium`.
+    see `soilml.physics.nearby_equilibrium.SinkageEstimate`.
     """
 
     case: Case
@@ -98,7 +97,8 @@ def _answered(
     """Answers to all requests, those that can be joined together; else one by one."""
     groups: dict[object, list[int]] = {}
     for i, request in enumerate(requests):
-        key = join_key(request.case_sets(request.x)), request.estimate is None
+        near = None if request.estimate is None else request.estimate.nearest
+        key = join_key(request.case_sets(request.x)), near
         groups.setdefault(key, []).append(i)
     answers: dict[int, T | InputError] = {}
     for group in groups.values():
@@ -116,10 +116,7 @@ def _predict_joined(requests: Sequence[PredictionRequest]) -> list[Floats]:
     parts = [request.case_sets(request.x) for request in requests]
     load_case = joined_load_case(parts)
     with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-        if requests[0].estimate is None:
-            force = in_chunks(load_case, sensor_readings)
-        else:
-            force = readings_near(load_case, _joined_estimate(requests))
+        force = in_chunks_near(load_case, sensor_readings, _joined_estimate(requests))
     predictions, start = [], 0
     for request, part in zip(requests, parts, strict=True):
         size = part.sets * part.points
@@ -136,8 +133,9 @@ def _linearise_joined(requests: Sequence[PredictionRequest]) -> list[Linearisati
         base.append(start + np.tile(np.arange(part.points), part.sets))
         start += part.sets * part.points
         parts.append(part)
-    estimate = _joined_estimate(requests) if requests[0].estimate is not None else None
-    response = linear_response(joined_load_case(parts), np.concatenate(base), estimate)
+    response = linear_response(
+        joined_load_case(parts), np.concatenate(base), _joined_estimate(requests)
+    )
     linearisations, start = [], 0
     for request, part, step in zip(requests, parts, steps, strict=True):
         rows = slice(start, start + part.sets * part.points)
@@ -175,11 +173,15 @@ def _difference_steps(request: PredictionRequest) -> Floats:
     return np.where(request.x[0] + DIFFERENCE_STEP <= upper, DIFFERENCE_STEP, -DIFFERENCE_STEP)
 
 
-def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate:
+def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate | None:
+    """The estimates of all requests, or None where they have none."""
     estimates = [request.estimate for request in requests if request.estimate is not None]
+    if not estimates:
+        return None
     return SinkageEstimate(
         np.concatenate([np.ravel(estimate.log_sinkage) for estimate in estimates]),
         np.concatenate([np.ravel(estimate.slope) for estimate in estimates]),
+        estimates[0].nearest,
     )
 
 

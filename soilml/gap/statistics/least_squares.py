@@ -19,7 +19,7 @@ from soilml.gap.statistics.batched_predictions import (
     predict_many,
 )
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
-from soilml.physics.sinkage_search import SinkageEstimate
+from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 Floats = NDArray[np.float64]
 
@@ -241,7 +241,7 @@ def _descent(request: FitRequest) -> _Descent:
         if trials is None:
             converged = True
             break
-        sinkage = last.model.sinkage_at(trials - last.x)
+        sinkage = replace(last.model.sinkage_at(trials - last.x), nearest=True)
         predictions = yield _Question(asked(trials, sinkage), linearise=False)
         trial_objectives = objectives(whitened_residual(predictions), trials)
         best = int(np.argmin(trial_objectives))

@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.batched_predictions import PredictionRequest, predict_many
+from soilml.gap.statistics.batched_predictions import (
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
 from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
 from soilml.identification.levels import covariate_levels
 from soilml.physics.effects.base import Effect
@@ -67,7 +71,11 @@ def effect_signatures(
 
     An effect that the case has already is changed from its present size, which may be wrong.
     """
-    requests = [PredictionRequest(case, [], np.zeros((1, 0)), readings)]
+    (base,) = linearise_many([PredictionRequest(case, [], np.zeros((1, 0)), readings)])
+    if isinstance(base, InputError):
+        raise base
+    sinkage = base.sinkage_at(np.zeros((1, 0)))
+    requests = []
     reasons: dict[str, str] = {}
     changes: dict[str, tuple[EffectCoordinate, float, float]] = {}
     for name, effect in effects.items():
@@ -83,16 +91,15 @@ def effect_signatures(
             reasons[name] = str(error)
             continue
         changes[name] = size, at, step
-        requests.append(PredictionRequest(changed, [size], np.asarray([[at + step]]), readings))
-    base, *moved = predict_many(requests)
-    if isinstance(base, InputError):
-        raise base
+        x = np.asarray([[at + step]])
+        requests.append(PredictionRequest(changed, [size], x, readings, sinkage))
     signatures = []
-    for (name, (size, at, step)), prediction in zip(changes.items(), moved, strict=True):
+    predictions = predict_many(requests)
+    for (name, (size, at, step)), prediction in zip(changes.items(), predictions, strict=True):
         if isinstance(prediction, InputError):
             reasons[name] = str(prediction)
             continue
-        column = (prediction[0] - base[0]) / step
+        column = (prediction[0] - base.prediction) / step
         if not np.isfinite(column).all():
             reasons[name] = "with it, the model has no equilibrium in some row"
         elif not np.any(np.abs(column) > MIN_CHANGE * readings.std):

@@ -24,7 +24,7 @@ from soilml.gap.statistics.least_squares import FitRequest, descend_together
 from soilml.gap.statistics.signatures import with_effect
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
-from soilml.physics.sinkage_search import SinkageEstimate
+from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 WHEEL_EFFECTS = [
     name
@@ -118,13 +118,14 @@ def test_sinkage_is_predicted_to_first_order(problem, braking):
     assert np.abs(error).max() < 1e-2 * moved
 
 
+@pytest.mark.parametrize("nearest", [False, True])
 @pytest.mark.parametrize("distance", [0.0, 1e-3, 0.1, 3.0, np.nan])
 @pytest.mark.parametrize("name", ["slip-sinkage", "load-transfer", "stress-shift"])
-def test_trials_near_an_equilibrium_reach_it(problem, name, distance):
+def test_trials_near_an_equilibrium_reach_it(problem, name, distance, nearest):
     case, coordinates, x = with_coordinates(problem, name)
     request = PredictionRequest(case, coordinates, x[None, :], problem.readings)
     (at,), (searched,) = linearise_many([request]), predict_many([request])
-    estimate = SinkageEstimate(at.log_sinkage[None, :] + distance, at.slope[None, :])
+    estimate = SinkageEstimate(at.log_sinkage[None, :] + distance, at.slope[None, :], nearest)
     (near,) = predict_many([replace(request, estimate=estimate)])
     np.testing.assert_allclose(near, searched, rtol=1e-6)
 
