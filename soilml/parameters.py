@@ -10,7 +10,7 @@ sits in a tree of dataclasses, tuples of named parts, and plain mappings.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, TypeVar, get_type_hints
@@ -49,13 +49,18 @@ def _declared(cls: type) -> dict[str, Parameter]:
     return parameters
 
 
+@cache
+def _part_fields(cls: type) -> tuple[str, ...]:
+    """Names of the fields of a dataclass that are no parameters."""
+    own = declared(cls)
+    return tuple(field.name for field in fields(cls) if field.name not in own)
+
+
 def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
     """(path name, key, part) of the parts of `tree` that may hold parameters."""
     if is_dataclass(tree) and not isinstance(tree, type):
-        own = declared(type(tree))
-        for field in fields(tree):
-            if field.name not in own:
-                yield field.name, field.name, getattr(tree, field.name)
+        for name in _part_fields(type(tree)):
+            yield name, name, getattr(tree, name)
     elif isinstance(tree, tuple):
         for index, part in enumerate(tree):
             if hasattr(part, "name"):
@@ -77,6 +82,20 @@ def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
 def values(tree: Any) -> dict[str, Real]:
     """Every parameter's value, by dotted path."""
     return {path: value for path, (_, value) in located(tree).items()}
+
+
+def mapped(tree: T, change: Callable[[Any], Real]) -> T:
+    """The same tree with every parameter's value replaced by what `change` makes of it."""
+    changed: dict[str | int, Any] = {}
+    if is_dataclass(tree) and not isinstance(tree, type):
+        for name in declared(type(tree)):
+            if (value := getattr(tree, name)) is not None:
+                changed[name] = change(value)
+    for _, key, part in _parts(tree):
+        if isinstance(part, tuple) or is_dataclass(part):
+            changed[key] = mapped(part, change)
+    whole: T = _with_fields(tree, changed)
+    return whole
 
 
 def with_values(tree: T, new: Mapping[str, Real]) -> T:
@@ -102,6 +121,11 @@ def _rebuilt(tree: Any, new: Mapping[str, Real]) -> Any:
         }
         if inner:
             changed[key] = _rebuilt(part, inner)
+    return _with_fields(tree, changed)
+
+
+def _with_fields(tree: Any, changed: Mapping[str | int, Any]) -> Any:
+    """A dataclass with some fields replaced, or a tuple with some elements."""
     if isinstance(tree, tuple):
         return tuple(changed.get(index, part) for index, part in enumerate(tree))
     return replace(tree, **{str(key): value for key, value in changed.items()})

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from soilml.arrays import Array
-from soilml.parameters import values, with_values
+from soilml.parameters import mapped
 from soilml.physics.gears.base import Gear
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
@@ -27,6 +27,4 @@ class LoadCase:
 
 def rows(load_case: LoadCase, index: Array) -> LoadCase:
     """The rows `index` of a load case; a parameter shared by all rows stays as it is."""
-    parameters: dict[str, Any] = dict(values(load_case))
-    taken = {path: v[index] for path, v in parameters.items() if getattr(v, "ndim", 0) > 0}
-    return with_values(load_case, taken)
+    return mapped(load_case, lambda v: v[index] if getattr(v, "ndim", 0) > 0 else v)
