@@ -58,8 +58,10 @@ def forces(theta1, row, theta2=0.0):
     """(W, DP, T) at an entry angle, relative accuracy about 1e-10."""
     r, b = row["radius"], row["width"]
     theta_m = (row["a0"] + row["a1"] * row["slip"]) * theta1
-    layer = row["shear_modulus"] / r  # the shear curve bends within this angle
-    turns = turning_points(theta1, theta2, row["slip"], row.get("braking", "displacement-sign"))
+    law = row.get("braking", "displacement-sign")
+    # the shear curve bends within this angle
+    layer = row["shear_modulus"] / (r * max(1.0, travel_ratio(row["slip"], law)))
+    turns = turning_points(theta1, theta2, row["slip"], law)
     ends = {theta2, theta1, theta_m, *turns}
     for x in (theta1, *turns):
         for width in (0.1, 1.0, 5.0, 30.0):

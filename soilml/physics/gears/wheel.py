@@ -23,6 +23,10 @@ from soilml.physics.operating_point import Operating
 #: quadrature.
 DRIVING_NODES = 16
 BRAKING_NODES = 24
+#: A nearly locked wheel mobilises the shear strength close to its entry. Where the travel ratio is
+#: more than twice this number, a part of the contact ends at this number over the ratio, as a
+#: fraction of the way to the maximum stress: errors at slips below -0.9 fall from 3e-5 to 4e-6.
+MOBILISED_WITHIN = 5.0
 #: Enough for the load to a few per cent.
 COARSE_NODES = 5
 
@@ -130,12 +134,16 @@ def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:
 
     Between exit and entry they are the maximum stress and the reversal of shear displacement; a
     second reversal is added if any row has one, where the rim reaches far behind the axle. Rows
-    without a reversal take an angle that divides the longer part, or the lowest, in halves.
+    without a reversal take an angle that divides the longer part, or the lowest, in halves, or one
+    close to the entry where the wheel is nearly locked. `slip` is that of the shear displacement.
     """
     xp = namespace(rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
     reversal, exists = reversals(rim.entry, rim.exit, slip)
     halfway = xp.where(front > rear, rim.peak + 0.5 * front, rim.exit + 0.5 * rear)
+    ratio = 1.0 - slip
+    near_entry = rim.entry - front * (MOBILISED_WITHIN / ratio)
+    halfway = xp.where(ratio > 2.0 * MOBILISED_WITHIN, near_entry, halfway)
     inner = [rim.peak, xp.where(exists[0, :], reversal[0, :], halfway)]
     if bool(xp.any(exists[1, :])):
         below = 0.5 * (rim.exit + xp.minimum(*inner))

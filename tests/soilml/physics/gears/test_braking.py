@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import input_box, solved
-from reference import forces, travel_ratio
+from reference import equilibrium, forces, travel_ratio
 
 from soilml import EFFECTS, ExitAngle, LinearWheel, Model, Operating, Status, Wheel, soil
 from soilml.errors import InputError
@@ -163,6 +163,20 @@ def test_each_law_agrees_with_adaptive_quadrature(case, law):
     assert carried == pytest.approx(load, rel=1e-7)
     assert force.torque == pytest.approx(torque, rel=1e-7, abs=1e-7 * load * radius)
     assert force.drawbar_pull == pytest.approx(pull, rel=1e-7, abs=1e-7 * load)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slip", [-0.93, -0.99, -0.999])
+def test_a_nearly_locked_wheel_agrees_with_adaptive_quadrature(slip):
+    box = input_box(128, seed=13) | {"slip": np.full(128, slip)}
+    force = solved(box)
+    rows = np.flatnonzero(force.status == 0)[::8]
+    assert len(rows) > 8
+    for i in rows:
+        row = {name: values[i] for name, values in box.items()}
+        _, pull, torque = equilibrium(row, near=force.entry_angle[i])
+        assert force.torque[i] == pytest.approx(torque, rel=2e-6)
+        assert force.drawbar_pull[i] == pytest.approx(pull, rel=2e-6)
 
 
 @GEARS
