@@ -15,6 +15,7 @@ from soilml.physics.operating_point import Operating
 from soilml.row_status import Status
 from soilml.traction.messages import MeasuredRange, prediction_warnings
 from soilml.traction.pull_and_slope import Traction, predict_traction
+from soilml.traction.pull_discrepancy import PullDiscrepancy
 from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]
@@ -53,17 +54,27 @@ def predictions_by_load(
     slip: Floats,
     measured: MeasuredRange,
     covariates: Mapping[str, float] | None = None,
+    discrepancy: PullDiscrepancy | None = None,
 ) -> list[LoadPrediction]:
     """Pull and slope under each load (N) at the slips (m,), by draws and by draws of the prior.
 
-    Raises `InputError` for a load that more than half of the draws do not carry at any sinkage.
+    `discrepancy` holds draws of the error of the pull at the same loads and slips. Raises
+    `InputError` for a load that more than half of the draws do not carry at any sinkage.
     """
     predictions = []
-    for load in loads:
+    for i, load in enumerate(loads):
         _check_carried(case, draws, load, slip, covariates)
-        after, before = (predict_traction(case, d, load, slip, covariates) for d in (draws, prior))
+        errors: tuple[Floats | None, Floats | None] = (None, None)
+        if discrepancy is not None:
+            errors = discrepancy.posterior[:, i], discrepancy.prior[:, i]
+        after, before = (
+            predict_traction(case, d, load, slip, covariates, error)
+            for d, error in zip((draws, prior), errors, strict=True)
+        )
         bare = LoadPrediction(after, before, ())
-        texts = prediction_warnings(after, bare.remaining_fraction, measured)
+        texts = prediction_warnings(
+            after, bare.remaining_fraction, measured, error_included=discrepancy is not None
+        )
         predictions.append(LoadPrediction(after, before, tuple(texts)))
     return predictions
 

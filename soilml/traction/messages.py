@@ -17,11 +17,8 @@ Floats = NDArray[np.float64]
 SLIP_MARGIN, LOAD_FACTOR = 0.1, 1.25
 #: Slope, rad (45 degrees), beyond which vehicles overturn.
 OVERTURNING_SLOPE = 0.7854
-#: What the bands do not include.
-LIMITATIONS = (
-    "bands include the uncertainty of the soil and the noise, not errors of the model; all wheels "
-    "equal, no load transfer, no side slope"
-)
+#: What no band includes.
+_NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"
 
 
 @dataclass(frozen=True)
@@ -38,12 +35,34 @@ class MeasuredRange:
         return MeasuredRange(*ends)
 
 
+def limitations(pull_error: float | None) -> str:
+    """What the bands include; `pull_error` is the declared error of the pull, N, if there is one.
+
+    >>> print(limitations(0.4))
+    bands include the uncertainty of the soil, the noise and errors of the model (drawbar pull 0.4 N
+    before any reading); all wheels equal, no load transfer, no side slope
+    """
+    if pull_error is None:
+        included = "the uncertainty of the soil and the noise, not errors of the model"
+    else:
+        error = f"drawbar pull {pull_error:.3g} N before any reading"
+        included = f"the uncertainty of the soil, the noise and errors of the model ({error})"
+    return f"bands include {included}; {_NOT_INCLUDED}"
+
+
 def prediction_warnings(
-    prediction: Traction, remaining_fraction: tuple[float, float], measured: MeasuredRange
+    prediction: Traction,
+    remaining_fraction: tuple[float, float],
+    measured: MeasuredRange,
+    *,
+    error_included: bool = False,
 ) -> Iterator[str]:
-    """Warnings about a prediction; `remaining_fraction` as in `LoadPrediction`."""
+    """Warnings about a prediction; `remaining_fraction` as in `LoadPrediction`.
+
+    `error_included` is whether the draws include a declared error of the pull.
+    """
     yield from _identifiability(remaining_fraction)
-    yield from _extrapolation(prediction, measured)
+    yield from _extrapolation(prediction, measured, error_included)
     failed, load = prediction.failed_fraction, prediction.load
     if failed > 0.0:
         yield f"{failed:.0%} of the soils and slips do not carry {load:.4g} N and are excluded"
@@ -68,8 +87,11 @@ def _identifiability(remaining_fraction: tuple[float, float]) -> Iterator[str]:
             yield f"the {name} is weakly identified: {width}"
 
 
-def _extrapolation(prediction: Traction, measured: MeasuredRange) -> Iterator[str]:
-    note = "extrapolated by the model, whose error is not in the band"
+def _extrapolation(
+    prediction: Traction, measured: MeasuredRange, error_included: bool
+) -> Iterator[str]:
+    error = "may be larger here than [discrepancy] says" if error_included else "is not in the band"
+    note = f"extrapolated by the model, whose error {error}"
     low, high = measured.slip
     if prediction.slip[-1] > high + SLIP_MARGIN:
         yield f"no slip above {high:.2g} was measured: {note}"

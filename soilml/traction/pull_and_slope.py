@@ -84,6 +84,7 @@ def predict_traction(
     load: float,
     slip: Floats,
     covariates: Mapping[str, float] | None = None,
+    pull_error: Floats | None = None,
 ) -> Traction:
     r"""Pull and slope for n draws of the soil at m slips under a load.
 
@@ -108,6 +109,10 @@ def predict_traction(
         Slips (m,).
     covariates
         Speed, pass number and slip angle, where an effect needs them.
+    pull_error
+        Error of the model for each draw and slip, N (n, m), which is added to the pull. On a slope
+        it is taken as on level ground: the logarithm of the load changes there by less than a
+        usual correlation length.
 
     References
     ----------
@@ -117,11 +122,12 @@ def predict_traction(
     case = replace(case, model=Model(case.model.gear, tuple(own)))
     count = len(draws.values)
     rows, columns = (grid.ravel() for grid in np.indices((count, len(slip))))
+    error = np.zeros(rows.size) if pull_error is None else pull_error.ravel()
 
     def drawbar_pull(index: NDArray[np.int64], normal_load: Floats) -> Floats:
         soils = draws.of(case, rows[index])
         at = Operating(slip=slip[columns[index]], load=normal_load, **dict(covariates or {}))
-        return np.asarray(soils.model(soils.soil, at).drawbar_pull)
+        return np.asarray(soils.model(soils.soil, at).drawbar_pull + error[index])
 
     level = drawbar_pull(np.arange(rows.size), np.full(rows.size, load))
     carried = np.flatnonzero(np.isfinite(level))

@@ -19,9 +19,10 @@ from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 from soilml.traction.by_load import LoadPrediction, measured_loads, predictions_by_load, slip_grid
-from soilml.traction.messages import LIMITATIONS, MeasuredRange
+from soilml.traction.messages import MeasuredRange, limitations
 from soilml.traction.onboard_draws import onboard_draws
 from soilml.traction.pull_and_slope import EXCLUDED_KINDS
+from soilml.traction.pull_discrepancy import draw_pull_discrepancy
 from soilml.traction.soil_draws import posterior_draws, prior_draws
 
 Floats = NDArray[np.float64]
@@ -93,11 +94,12 @@ def pull_report(
         As `identify` with the posterior method.
     """
     warnings: list[str] = []
+    noise_scale = None
     if estimator is None:
         unknown = select_free(case, free)
         data = read_observations(case, table)
         posterior = posterior_draws(case, data, unknown)
-        draws = posterior.draws
+        draws, noise_scale = posterior.draws, posterior.samples.noise_scale
         warnings += data.notes
         if [c.name for c in data.channels] == ["torque"]:
             warnings.append(
@@ -123,19 +125,20 @@ def pull_report(
         for field in COVARIATES
         if (values := getattr(at, field)) is not None
     }
+    loads = measured_loads(table["load_N"]) if loads is None else loads
+    slip = slip_grid(slip_limit, measured_range)
+    error = draw_pull_discrepancy(case, table, draws, loads, slip, noise_scale=noise_scale)
     predictions = predictions_by_load(
-        case,
-        draws,
-        prior_draws(unknown),
-        measured_loads(table["load_N"]) if loads is None else loads,
-        slip_grid(slip_limit, measured_range),
-        measured_range,
-        covariates,
+        case, draws, prior_draws(unknown), loads, slip, measured_range, covariates, error
     )
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)
     known = np.isfinite(pull)
     measured_pull = table["slip"][known], table["load_N"][known], pull[known]
     return PullReport(
-        len(table), measured_range, predictions, measured_pull, (*warnings, LIMITATIONS)
+        len(table),
+        measured_range,
+        predictions,
+        measured_pull,
+        (*warnings, limitations(None if error is None else error.amplitude)),
     )

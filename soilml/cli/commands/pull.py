@@ -55,7 +55,8 @@ assumed to come from one soil, unless --by run asks for a result for each run.
 Loads are those of the rows, unless --load names others. Slips reach 0.6, the
 highest measured slip, or --slip-limit. On a slope, a wheel carries the
 component of its load normal to the slope and pulls the component along it. The
-bands include neither errors of the model nor load transfer nor side slopes.
+bands include errors of the model where [discrepancy] states that of the pull,
+but neither load transfer nor side slopes.
 
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. A value with a warning that it is not known is no more accurate
