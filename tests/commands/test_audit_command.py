@@ -112,6 +112,25 @@ def test_speed_that_is_varied_makes_rate_testable(usual, tmp_path):
     assert counts == sorted(counts, reverse=True)
 
 
+def test_another_speed_is_predicted_by_what_depends_on_it(usual):
+    runs = {run["kind"]: run for run in usual["runs_to_add"]}
+    texts = [run["text"] for run in usual["runs_to_add"]]
+    assert len(set(texts)) == len(texts)
+    assert all("cost" not in run for run in usual["runs_to_add"])
+    assert "rate" in runs["other speed"]["gained"]
+    assert "multipass" not in runs["other speed"]["gained"]
+    assert "multipass" in runs["second pass"]["gained"]
+
+
+def test_runs_to_add_are_ranked_by_what_they_gain_per_cost(usual, tmp_path):
+    costs = ["--cost", "other-speed=100", "--cost", "second pass=0.01"]
+    found = audited(tmp_path, None, MODEL, *costs)
+    assert found["effects"] == usual["effects"]
+    gains = [len(run["gained"]) / run["cost"] for run in found["runs_to_add"]]
+    assert gains == sorted(gains, reverse=True)
+    assert {run["kind"]: run["cost"] for run in found["runs_to_add"]}["other speed"] == 100.0
+
+
 def test_no_reading_is_looked_at_and_people_are_told_what_could_be_named(usual, tmp_path, capsys):
     lines = design().splitlines()
     text = "\n".join([lines[0] + ",torque_Nm", *(line + ",99" for line in lines[1:])]) + "\n"

@@ -27,8 +27,8 @@ Floats = NDArray[np.float64]
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
 MAX_DISCRIMINATION = 10.0
-#: Sigma below which a run or check does not discriminate at all, and is not proposed.
-MIN_DISCRIMINATION = 0.1
+#: Sigma below which a run or check is not proposed: six such runs together decide nothing.
+MIN_DISCRIMINATION = 0.5
 #: Largest difference, in sigma of a reading, of two predictions that count as equal.
 SAME_PREDICTION = 0.1
 #: Explanations that are compared.

@@ -138,11 +138,11 @@ def _middle_load(readings: StackedReadings) -> float:
 
 
 def _usual(readings: StackedReadings) -> dict[str, Any]:
-    """The covariates of a plain run, those that the rows have."""
-    usual = {k: v for k, v in USUAL_COVARIATES.items() if getattr(readings.at, k) is not None}
-    if "speed" in usual:
-        usual["speed"] = float(np.median(np.abs(np.asarray(readings.at.speed))))
-    return usual
+    """The covariates of a plain run as most rows were driven, forward and on the first pass."""
+    known = {k: np.asarray(getattr(readings.at, k)) for k in USUAL_COVARIATES}
+    known = {k: v for k, v in known.items() if v.dtype != object}  # None: not recorded
+    typical = {"speed": lambda v: np.median(np.abs(v)), "pass_number": np.min}
+    return {k: float(typical.get(k, np.median)(v)) for k, v in known.items()}
 
 
 def _selected(at: Operating, kept: NDArray[np.bool_]) -> Operating:
