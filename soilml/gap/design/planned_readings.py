@@ -16,6 +16,8 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
+Floats = NDArray[np.float64]
+
 #: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on.
 USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 
@@ -89,26 +91,25 @@ def expected_readings(
 def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedReadings:
     """The readings of two sets of rows together; covariates that one of them lacks are usual."""
     sizes = len(first.run), len(second.run)
-    columns = {}
-    for name in ("slip", "load", *USUAL_COVARIATES):
+
+    def rows(name: str) -> Floats:
         values = [getattr(part.at, name) for part in (first, second)]
-        if all(value is None for value in values):
-            continue
-        known = [USUAL_COVARIATES.get(name) if value is None else value for value in values]
-        columns[name] = np.concatenate(
-            [np.broadcast_to(v, (n,)) for v, n in zip(known, sizes, strict=True)]
-        )
+        known = [USUAL_COVARIATES[name] if value is None else value for value in values]
+        return np.concatenate([np.broadcast_to(v, n) for v, n in zip(known, sizes, strict=True)])
+
+    given = {
+        k for k in USUAL_COVARIATES for part in (first, second) if getattr(part.at, k) is not None
+    }
     return replace(
         first,
-        at=Operating(**columns),
+        at=Operating(slip=rows("slip"), load=rows("load"), **{name: rows(name) for name in given}),
         run=np.concatenate([first.run, second.run + len(first.runs)]),
         runs=(*first.runs, *second.runs),
         order=np.concatenate([first.order, second.order]),
         row=np.concatenate([first.row, second.row + sizes[0]]),
-        **{
-            name: np.concatenate([getattr(first, name), getattr(second, name)])
-            for name in ("channel", "reading", "std")
-        },
+        channel=np.concatenate([first.channel, second.channel]),
+        reading=np.concatenate([first.reading, second.reading]),
+        std=np.concatenate([first.std, second.std]),
     )
 
 

@@ -139,10 +139,16 @@ def _middle_load(readings: StackedReadings) -> float:
 
 def _usual(readings: StackedReadings) -> dict[str, Any]:
     """The covariates of a plain run as most rows were driven, forward and on the first pass."""
-    known = {k: np.asarray(getattr(readings.at, k)) for k in USUAL_COVARIATES}
-    known = {k: v for k, v in known.items() if v.dtype != object}  # None: not recorded
-    typical = {"speed": lambda v: np.median(np.abs(v)), "pass_number": np.min}
-    return {k: float(typical.get(k, np.median)(v)) for k, v in known.items()}
+    usual = {}
+    for field in USUAL_COVARIATES:
+        value = getattr(readings.at, field)
+        if value is None:
+            continue
+        if field == "pass_number":
+            usual[field] = float(np.min(value))
+        else:
+            usual[field] = float(np.median(np.abs(value) if field == "speed" else value))
+    return usual
 
 
 def _selected(at: Operating, kept: NDArray[np.bool_]) -> Operating:
