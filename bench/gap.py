@@ -1,4 +1,11 @@
-"""Measure the gap workflow on hidden effects, and write its part of BENCHMARKS.md."""
+"""Measure the gap workflow on hidden effects, and write its part of BENCHMARKS.md.
+
+python bench/gap.py --every 20                 a quick look at the sealed sets
+python bench/gap.py --seed 1 --keep dev.json   sets to tune on; the records are kept
+python bench/gap.py --table dev.json           the pages of records that were kept
+
+Set OMP_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1: the analyses themselves run side by side.
+"""
 
 from __future__ import annotations
 
@@ -12,37 +19,72 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
-from benchmarks_file import FILE, MARK
+import gap_reliability
+from benchmarks_file import FILE, MARK, ROOT
 from gap_case import judged
+from gap_records import Judged, from_json
 
-from datagen.blind_sets.factorial_plan import plan_matrix
+from datagen.blind_sets.factorial_plan import Plan, benchmark_plans, plan_matrix
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
+#: Records are kept after so many sets, so that a run that is ended leaves those it has.
+KEEP_EVERY = 20
+
 
 def run() -> None:
-    """Draw, analyse, judge, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=0, help="0 is the benchmark's own")
-    parser.add_argument("--few", action="store_true", help="a quick look, nothing is written")
-    parser.add_argument("--every", type=int, default=1, help="take each n-th plan")
-    parser.add_argument("--keep", metavar="FILE.json", help="write what was judged")
-    args = parser.parse_args()
-    plans = plan_matrix(not args.few, args.seed)[:: args.every]
-    jobs = list(enumerate(plans))
-    sets = []
-    with ProcessPoolExecutor(os.cpu_count()) as pool, progress_bar("analysing", len(jobs)) as done:
-        for found in pool.map(judged, jobs, chunksize=4):
-            sets.append(found)
-            done(len(sets))
-    if args.keep:
-        save_text(args.keep, json.dumps(sets))
-    alone = [judged(job)["seconds"] for job in jobs[:: max(1, len(jobs) // 40)]]
-    text = gap_pages.text(sets, alone)
+    """Draw, analyse, judge, print; and write where that is asked for."""
+    args = _arguments()
+    if args.table:
+        sets = from_json(json.loads(Path(args.table).read_text()))
+    else:
+        sets = _judge(_plans(args), args.jobs, args.keep)
+    text = gap_pages.text(sets)
     print(text)
-    if not args.few and args.every == 1 and args.seed == 0:
+    if args.write:
+        gap_reliability.save_picture(sets, ROOT / gap_pages.PICTURE)
         before = FILE.read_text().partition(MARK)[0].rstrip() + "\n" if FILE.exists() else ""
         save_text(FILE, before + MARK + "\n" + text)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seed", type=int, default=0, help="0 is the benchmark's own")
+    parser.add_argument(
+        "--factorial", action="store_true", help="the 1593 sets without discrepancy instead"
+    )
+    parser.add_argument("--every", type=int, default=1, metavar="K", help="take each K-th plan")
+    parser.add_argument("--tier", help="only sets of this tier")
+    parser.add_argument("--design", help="only sets of this design")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="analyses at a time")
+    parser.add_argument("--keep", metavar="FILE.json", help="write the record of every set")
+    parser.add_argument("--table", metavar="FILE.json", help="print the pages of kept records")
+    parser.add_argument("--write", action="store_true", help="write BENCHMARKS.md and its picture")
+    return parser.parse_args()
+
+
+def _plans(args: argparse.Namespace) -> list[Plan]:
+    plans = plan_matrix(True, args.seed) if args.factorial else benchmark_plans(args.seed)
+    return [
+        plan
+        for plan in plans[:: args.every]
+        if args.tier in (None, plan.tier) and args.design in (None, plan.design)
+    ]
+
+
+def _judge(plans: list[Plan], processes: int, keep: str | None) -> list[Judged]:
+    """The records of all plans, in their order."""
+    jobs = list(enumerate(plans))
+    sets: list[Judged] = []
+    with ProcessPoolExecutor(processes) as pool, progress_bar("analysing", len(jobs)) as done:
+        for record in pool.map(judged, jobs):
+            sets.append(record)
+            done(len(sets))
+            if keep and (len(sets) % KEEP_EVERY == 0 or len(sets) == len(jobs)):
+                save_text(keep, json.dumps(sets))
+    return sets
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
 
 
 def _said(report: GapReport) -> dict[str, Any]:
-    """What the report states; what its version does not state yet is empty."""
+    """What the report states."""
     return {
         "status": report.status,
         "sentence": report.sentence,

@@ -150,7 +150,9 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         "missing": list(missing),
         "covariates": sorted(COVARIATE_COLUMNS[name] for name in runs.varied),
         "runs_true": _by_channel(true[0]),
-        "runs_steady": _by_channel(_channels(_rows(runs, soil), active)),
+        "runs_steady": _by_channel(
+            _channels(_rows(runs, soil), active) if plan.scattered else simulated[0][0]
+        ),
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),

@@ -1,0 +1,114 @@
+"""Reliability of stated probabilities: how often what was said with probability p is true."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from gap_records import Judged, interval
+
+#: Statements in a bin.
+BIN = 50
+#: Edges of the wide bins; neighbours are joined until each has `BIN` statements.
+WIDE_EDGES = (0.0, 0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.98, 1.0)
+#: Simulations of an analyst whose probabilities are exact.
+SIMULATIONS = 400
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Statements of similar probability: their mean, how often they were true, their number."""
+
+    stated: float
+    frequency: float
+    count: int
+
+    @property
+    def deviation(self) -> float:
+        """Distance between what was stated and what happened."""
+        return abs(self.stated - self.frequency)
+
+
+def statements(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) stated probabilities, ascending, and (n,) whether the effect was hidden in that set."""
+    pairs = [
+        (p, name in s["truth"]) for s in sets for name, p in s.get("probabilities", {}).items()
+    ]
+    stated = np.asarray([p for p, _ in pairs], dtype=np.float64)
+    order = np.argsort(stated, kind="stable")
+    return stated[order], np.asarray([true for _, true in pairs], dtype=bool)[order]
+
+
+def equal_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
+    """Bins of `BIN` neighbouring statements, the last one of more."""
+    count = len(stated) // BIN
+    if count == 0:
+        return []
+    cuts = [*range(BIN, count * BIN, BIN)]
+    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
+
+
+def wide_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
+    """Bins between `WIDE_EDGES`, joined with the next until each has `BIN` statements."""
+    inner = np.searchsorted(stated, WIDE_EDGES[1:-1], side="right")
+    cuts, last = [], 0
+    for cut in inner:
+        if cut - last >= BIN and len(stated) - cut >= BIN:
+            cuts.append(int(cut))
+            last = int(cut)
+    if len(stated) < BIN:
+        return []
+    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
+
+
+def largest(bins: Sequence[Bin]) -> float:
+    """The largest deviation of any bin; NaN without bins."""
+    return max((b.deviation for b in bins), default=float("nan"))
+
+
+def chance(bins: Sequence[Bin]) -> tuple[float, float]:
+    """Median and 95 % quantile of the largest deviation if all probabilities were exact."""
+    if not bins:
+        return float("nan"), float("nan")
+    generator = np.random.default_rng(0)
+    stated = np.asarray([b.stated for b in bins])
+    count = np.asarray([b.count for b in bins])
+    drawn = generator.binomial(count, stated, (SIMULATIONS, len(bins))) / count
+    worst = np.abs(drawn - stated).max(axis=1)
+    return float(np.median(worst)), float(np.quantile(worst, 0.95))
+
+
+def save_picture(sets: Sequence[Judged], file: Path) -> None:
+    """Frequency over stated probability, with 95 % intervals of the wide bins."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    stated, true = statements(sets)
+    small, wide = equal_bins(stated, true), wide_bins(stated, true)
+    figure, axes = plt.subplots(figsize=(5.0, 4.6), layout="constrained")
+    axes.plot([0, 1], [0, 1], color="0.6", lw=1.0, zorder=0)
+    axes.scatter(
+        [b.stated for b in small], [b.frequency for b in small], s=10, color="0.7", label="50 each"
+    )
+    x, y = np.asarray([[b.stated, b.frequency] for b in wide]).T
+    low, high = np.asarray([interval(round(b.frequency * b.count), b.count) for b in wide]).T
+    span = [np.maximum(y - low, 0.0), np.maximum(high - y, 0.0)]
+    axes.errorbar(x, y, span, fmt="o", ms=5, color="C0", label="wide bins, 95 % interval")
+    axes.set(
+        xlabel="stated probability of an effect",
+        ylabel="share in which it was hidden",
+        xlim=(-0.02, 1.02),
+        ylim=(-0.02, 1.02),
+    )
+    axes.legend(frameon=False, loc="upper left")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(file, format="png", dpi=110, metadata={"Software": "soilml"})
+    plt.close(figure)
+
+
+def _bin(stated: np.ndarray, true: np.ndarray) -> Bin:
+    return Bin(float(stated.mean()), float(true.mean()), len(stated))

@@ -1,0 +1,174 @@
+"""The benchmark of the gap workflow: how records are judged, and what the runs of a set show."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datagen.blind_sets import Plan, draw_blind_set
+from soilml.config.case import read_case
+from soilml.io.table import Table
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+
+import gap_pages
+import gap_records
+import gap_reliability
+import gap_table
+from gap_separation import separation
+
+
+def record(**changed):
+    """A set in which slip-sinkage was hidden and named."""
+    return {
+        "tier": "A",
+        "design": "sweep",
+        "discrepancy": 0.0,
+        "truth": ("slip-sinkage",),
+        "catalogued": True,
+        "rows": 64,
+        "signal": 20.0,
+        "snr": 10.0,
+        "status": "named",
+        "cause_set": [("slip-sinkage",)],
+        "suspects": [],
+        "probabilities": {"slip-sinkage": 0.99, "grousers": 0.01},
+        "seconds": 0.5,
+        "soil": {"cohesion": {"before": 500.0, "after": 810.0, "std": 10.0, "true": 800.0}},
+        "region": {"soil": 10.0, "named": 2.0, "Gaussian process": 5.0},
+    } | changed
+
+
+def null(**changed):
+    """A set in which nothing was hidden and nothing was found."""
+    empty = {"tier": "N0", "truth": (), "catalogued": False, "signal": 0.0, "snr": 0.0}
+    empty |= {"status": "no-gap", "cause_set": [], "probabilities": {"grousers": 0.01}}
+    return record(**(empty | changed))
+
+
+def figure(sets, start):
+    """The one figure whose name starts so."""
+    (found,) = [f for f in gap_table.figures(sets) if f.name.startswith(start)]
+    return found
+
+
+def test_the_right_cause_counts_where_the_runs_can_name_it():
+    sets = [record() for _ in range(19)]
+    sets += [record(snr=1.0, cause_set=[("grousers",)]) for _ in range(5)]  # too weak to count
+    sets += [record(design="one-load", cause_set=[]) for _ in range(5)]  # judged by suspects
+    name = "right cause in the cause set, SNR >= 3, discrepancy 0%"
+    assert figure(sets, name).met and "19/19" in figure(sets, name).measured
+    sets += [record(status="unknown", cause_set=[]), record(status="unknown", cause_set=[])]
+    assert not figure(sets, name).met and "19/21" in figure(sets, name).measured
+    assert figure(sets, "`unknown`").measured.endswith("2/26")
+    assert not figure(sets, "`unknown`").met and figure(sets, "`no-gap`").met
+    assert figure(sets, name.replace("0%", "1%")).met is None
+
+
+def test_unique_is_one_explanation_that_is_stated():
+    assert gap_records.unique(record(status="partly-named"))
+    assert gap_records.unique(record(status="form-open"))
+    assert not gap_records.unique(record(status="class"))
+    assert not gap_records.unique(record(cause_set=[("slip-sinkage",), ("grousers",)]))
+    assert not gap_records.unique(record(status="suspected"))
+    assert not gap_records.unique({"status": "crash"})
+
+
+def test_names_where_nothing_was_hidden_are_false():
+    named = {"status": "named", "cause_set": [("grousers",)]}
+    sets = [null() for _ in range(30)] + [null(tier="D", discrepancy=0.02, **named)]
+    sets += [null(design="unequal-soils"), null(tier="N1", **named)]
+    sets += [null(tier="C", truth=("crust",), status="unknown"), null(tier="C", **named)]
+    assert figure(sets, "falsely unique: null").measured.endswith("0/30")
+    assert figure(sets, "falsely unique: null").met
+    assert figure(sets, "falsely unique: scatter").measured.endswith("1/2")
+    assert figure(sets, "falsely unique: discrepancy alone").measured.endswith("1/1")
+    assert figure(sets, "falsely unique: cause outside").measured.endswith("1/2")
+    assert not figure(sets, "falsely unique: cause outside").met
+    assert figure(sets, "right when unique, all tiers").measured.endswith("0/3")
+
+
+def test_one_load_is_judged_by_its_suspects():
+    order = [("grousers",), ("torque-gain",), ("slip-sinkage",), ("slope",)]
+    one = record(design="one-load", status="suspected", cause_set=[], suspects=order)
+    sets = [one, one | {"suspects": order[2:]}, one | {"suspects": order[3:]}]
+    assert figure(sets, "one load, SNR >= 3: truth first").measured.endswith("1/3")
+    third = figure(sets, "one load, SNR >= 3: truth in the first three")
+    assert third.measured.endswith("2/3") and not third.met
+    assert gap_records.suspected(record(design="one-run"), 1)  # a claimed name counts as first
+
+
+def test_exact_probabilities_deviate_by_chance_alone_and_wrong_ones_by_more():
+    generator = np.random.default_rng(0)
+    p = generator.random(4000) ** 2
+    stated = np.sort(p)
+    true = generator.random(4000) < stated
+    small, wide = gap_reliability.equal_bins(stated, true), gap_reliability.wide_bins(stated, true)
+    assert {b.count for b in small} == {50} and len(small) == 80
+    assert sum(b.count for b in wide) == 4000 and min(b.count for b in wide) >= 50
+    assert gap_reliability.largest(wide) < 0.05
+    usual, seldom = gap_reliability.chance(small)
+    assert 0.05 < usual < seldom and gap_reliability.largest(small) < 1.2 * seldom
+    sure = gap_reliability.wide_bins(stated, generator.random(4000) < stated**2)
+    assert gap_reliability.largest(sure) > 0.15
+
+
+def test_statements_are_those_of_every_effect_that_was_tested():
+    stated, true = gap_reliability.statements([record(), null(), {"status": "crash"}])
+    np.testing.assert_array_equal(stated, [0.01, 0.01, 0.99])
+    np.testing.assert_array_equal(true, [False, False, True])
+    assert gap_reliability.equal_bins(stated, true) == []
+    assert figure([record()], "stated probabilities, largest deviation, bins").met is None
+
+
+def test_region_soil_and_time_are_compared_with_their_gates():
+    sets = [record(), record(status="partly-named"), record(region={"soil": 1.0, "named": 9.0})]
+    assert figure(sets, "held-out region").measured == "0.200"
+    assert figure(sets, "the same over that of a Gaussian process").measured == "0.400"
+    assert figure(sets, "the same over that of a Gaussian process").met
+    off = {"cohesion": {"before": 500.0, "after": 830.0, "std": 10.0, "true": 800.0}}
+    sets = [record(discrepancy=0.02) for _ in range(9)] + [record(discrepancy=0.02, soil=off)]
+    held = figure(sets, "90 % interval of c holds the truth, discrepancy 2%")
+    assert held.met and held.measured.endswith("9/10")
+    slow = [record(seconds=0.8), record(seconds=0.9), record(seconds=12.0)]
+    assert not figure(slow, "seconds of one core, 49 to 72 rows").met
+    assert figure(slow[:2], "seconds of one core, 49 to 72 rows").met
+
+
+def test_pages_are_written_from_few_records_and_from_kept_ones(tmp_path):
+    sets = [record(), null(), record(status="crash", cause_set=[], seconds=9.0)]
+    page = gap_pages.text(sets)
+    assert "| falsely unique: null |" in page and "nan" not in page.split("### Held-out")[0]
+    kept = [{k: list(v) if isinstance(v, tuple) else v for k, v in s.items()} for s in sets]
+    assert gap_pages.text(gap_records.from_json(kept)) == page
+    many = [record(probabilities={"slip-sinkage": p}) for p in np.linspace(0.0, 1.0, 120)]
+    assert "reliability" in gap_pages.text(many)
+    gap_reliability.save_picture(many, tmp_path / "reliability.png")
+    assert (tmp_path / "reliability.png").stat().st_size > 1000
+
+
+def separated(**changed):
+    """What the runs of a plan show of its cause."""
+    values = {"tier": "A", "cause": "slip-sinkage", "size": 1.0, "noise": 0.01, "runs": 8}
+    values |= {"soil_family": "dry-sand", "free": 3, "seed": 7}
+    drawn = draw_blind_set(Plan(**(values | changed)))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "model.toml"
+        file.write_text(drawn.model)
+        case = read_case(file)
+    return separation(case, Table(dict(drawn.columns)), drawn.truth)
+
+
+@pytest.mark.slow
+def test_separation_falls_with_noise_discrepancy_and_fewer_channels():
+    plain = separated()
+    assert plain.snr > 10.0 and plain.signal > plain.snr
+    assert separated(noise=0.02).snr == pytest.approx(plain.snr / 2.0, rel=0.3)
+    steps = [separated(discrepancy=d).snr for d in (0.01, 0.02, 0.04)]
+    assert plain.snr > steps[0] > steps[1] > steps[2] > 0.0
+    assert separated(tier="S", cause="torque-gain").snr < 1.0  # just like grousers
+    assert separated(tier="N0", cause="", size=0.0).signal == 0.0
+    assert separated(design="unequal-soils").signal < plain.signal
+    assert separated(tier="M", cause="slip-sinkage+bulldozing").snr <= plain.signal
