@@ -30,7 +30,7 @@ GAP_LEVEL = 0.03
 LACK_OF_FIT_LEVEL = 0.001
 #: Effects are fitted in full if their predicted gain is within this margin of the largest, and so
 #: many of the largest in any case; the prediction is linear and can be wrong by that much.
-GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
+GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 8, 12
 #: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
 MIN_NET_GAIN = -2.0
 #: Objective above that of the best candidate up to which shapes are estimated and sets extended.

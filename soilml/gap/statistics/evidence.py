@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
 #: Prior probability that a channel has no discrepancy at all.
 NO_DISCREPANCY = 0.5
+#: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and the
+#: scale of its amplitude, in usual ones: 20 % of a channel's range.
+UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0
 #: Sweeps over the channels; the amplitudes of different channels depend little on each other.
 SWEEPS = 2
 
@@ -202,13 +205,15 @@ def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float, float]:
 def _amplitude_masses() -> Floats:
     """Prior probability of each of `AMPLITUDES`.
 
-    With probability `NO_DISCREPANCY` a channel has none; otherwise its amplitude has the
-    half-Cauchy distribution with a scale of one usual amplitude, whose heavy tail allows for causes
-    that the catalogue lacks (Gelman, Bayesian Analysis 1(3), 2006).
+    With probability `NO_DISCREPANCY` a channel has none. Otherwise its amplitude is exponentially
+    distributed with a mean of one usual amplitude, or, with probability `UNKNOWN_CAUSE`, that of a
+    cause which the catalogue lacks: half-Cauchy with the scale `UNKNOWN_SCALE`, whose heavy tail
+    does not reward effects that explain a part of it (Gelman, Bayesian Analysis 1(3), 2006).
     """
     positive = AMPLITUDES[1:]
     edges = np.concatenate([[0.0], np.sqrt(positive[1:] * positive[:-1]), [np.inf]])
-    cumulative = 2.0 / np.pi * np.arctan(edges)
+    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
+    cumulative = (1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown
     return np.concatenate([[NO_DISCREPANCY], (1.0 - NO_DISCREPANCY) * np.diff(cumulative)])
 
 
