@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from conftest import input_box, solved
 from reference import equilibrium, forces, travel_ratio
 
@@ -45,6 +46,16 @@ def test_nothing_jumps_at_zero_slip_over_the_whole_box(gear):
         assert braking.status.tolist() == at_zero.status.tolist()
         assert largest_step(braking, at_zero, box) < 1e-7 + 2e3 * abs(slip)
     assert largest_step(at_slip(-1e-9, printed(gear)), at_zero, box) > 0.1
+
+
+@GEARS
+def test_slopes_over_slip_are_the_same_on_both_sides_of_zero(gear):
+    slip = torch.tensor([-1e-7, 1e-7], dtype=torch.float64, requires_grad=True)
+    force = Model(gear(radius=0.15, width=0.12))(SAND, Operating(slip=slip, load=60.0))
+    for channel in CHANNELS:
+        (slope,) = torch.autograd.grad(getattr(force, channel).sum(), slip, retain_graph=True)
+        assert abs(float(slope[0])) > 1e-4
+        assert float(slope[0]) == pytest.approx(float(slope[1]), rel=1e-4)
 
 
 @GEARS
