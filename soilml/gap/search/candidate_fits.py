@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import InputError
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
-from soilml.gap.search.problem import FitProblem, StartedFit
+from soilml.gap.search.problem import FitProblem, StartedFit, fit_many
 from soilml.gap.statistics.coordinates import EffectCoordinate, shape_coordinates
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
@@ -30,6 +31,8 @@ class CandidateFit:
     names: tuple[str, ...]
     catalogue_law: MarginalFit
     free_law: MarginalFit
+    #: where the catalogue's law explains most under noise alone, as another start of the free law
+    noise_only: GapFit | None = None
 
     @property
     def shape_supported(self) -> bool:
@@ -71,46 +74,67 @@ class CandidateFit:
 def fit_candidates(
     problem: FitProblem,
     requests: Sequence[tuple[tuple[str, ...], Mapping[str, float], Floats]],
+    soil: Mapping[str, float] | None = None,
 ) -> list[CandidateFit]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
     A request has the names of the effects, start coordinates by path, and the amplitudes of the
-    discrepancy by channel to start with. Sets that the model refuses are left out.
+    discrepancy by channel to start with. With `soil`, start coordinates of the soil, each set is
+    also fitted under noise alone first, and from there beside a discrepancy: beside a large one, a
+    fit can stay where the effect is not needed. Sets that the model refuses are left out.
     """
-    started = [
-        (
-            StartedFit(
-                problem.with_effects(names),
-                [*problem.soil, *problem.size_coordinates(names)],
-                start,
-            ),
-            amplitude,
-        )
-        for names, start, amplitude in requests
-    ]
-    marginal = fit_marginal(problem, started)
+    starts = [_started(problem, names, start) for names, start, _ in requests]
+    found = fit_marginal(problem, [(s, a) for s, (_, _, a) in zip(starts, requests, strict=True)])
+    alone: list[GapFit | None] = [None] * len(requests)
+    if soil is not None:
+        from_soil = [_started(problem, names, soil) for names, _, _ in requests]
+        fits = fit_many(problem, from_soil)
+        alone = [None if isinstance(fit, InputError) else fit for fit in fits]
+        none = np.zeros(len(problem.readings.channels))
+        again = [
+            (replace(s, start=fit.start_values() if fit else s.start), none)
+            for s, fit in zip(from_soil, alone, strict=True)
+        ]
+        found = [_better(a, b) for a, b in zip(found, fit_marginal(problem, again), strict=True)]
     return [
-        CandidateFit(names, fit, fit)
-        for (names, _, _), fit in zip(requests, marginal, strict=True)
+        CandidateFit(names, fit, fit, plain)
+        for (names, _, _), fit, plain in zip(requests, found, alone, strict=True)
         if fit is not None
     ]
+
+
+def _started(problem: FitProblem, names: tuple[str, ...], start: Mapping[str, float]) -> StartedFit:
+    coordinates = [*problem.soil, *problem.size_coordinates(names)]
+    return StartedFit(problem.with_effects(names), coordinates, start)
+
+
+def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFit | None:
+    """The fit of larger evidence."""
+    if first is None or second is None:
+        return first or second
+    return first if first.evidence.value <= second.evidence.value else second
 
 
 def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The candidates with the shape coefficients of their effects estimated as well."""
     started, index = [], []
+    none = np.zeros(len(problem.readings.channels))
     for i, candidate in enumerate(candidates):
-        fit = candidate.catalogue_law.fit
-        if shapes := problem.shape_coordinates(candidate.names):
+        shapes = problem.shape_coordinates(candidate.names)
+        first = [(candidate.catalogue_law.fit, candidate.amplitude)]
+        if candidate.noise_only is not None:
+            first.append((candidate.noise_only, none))
+        for fit, amplitude in first if shapes else []:
             coordinates = [*fit.coordinates, *shapes]
-            started.append(
-                (StartedFit(fit.case, coordinates, fit.start_values()), candidate.amplitude)
-            )
+            started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))
             index.append(i)
-    fitted = list(candidates)
+    free: dict[int, MarginalFit | None] = {}
     for i, marginal in zip(index, fit_marginal(problem, started), strict=True):
-        if marginal is not None:
-            fitted[i] = replace(candidates[i], free_law=marginal)
+        free[i] = _better(free.get(i), marginal)
+    fitted = list(candidates)
+    for i, best in free.items():
+        if best is not None:
+            fitted[i] = replace(candidates[i], free_law=best)
     return fitted
 
 

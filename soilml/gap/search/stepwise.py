@@ -41,6 +41,11 @@ MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
 #: Upper bound of the improvement by free shapes, in linearised gains; the full fit can exceed the
 #: linearised gain because the size changes with the shape.
 SHAPE_GAIN_FACTOR = 3.0
+#: Decrease of the sum of squares under noise alone from which the free law of an effect is tried.
+NOTABLE_GAIN = 20.0
+#: Distance from the middle of the priors at which a second fit starts, relative to the optimum of
+#: the soil alone.
+INWARD = 0.8
 #: Decrease of the objective by an extension below which no larger set is tried.
 MIN_IMPROVEMENT = 1.0
 
@@ -111,12 +116,12 @@ def search(
     none = _soil_alone(problem, soil, starts)
     gains = _predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
-    level = _fit_level(problem, none, {(n,): none for n in _select_by_gain(gains)}, starts)
+    level = _fit_level(problem, soil, none, {(n,): none for n in _select_by_gain(gains)}, starts)
     fitted |= {c.names: c for c in level}
     for _ in range(MAX_EFFECTS - 1):
         lowest = min(c.objective for c in fitted.values())
         extensions = _extensions(problem, level, fitted, lowest)
-        level = _fit_level(problem, none, extensions, starts)
+        level = _fit_level(problem, soil, none, extensions, starts)
         fitted |= {c.names: c for c in level}
         if not level or min(c.objective for c in level) > lowest - MIN_IMPROVEMENT:
             break
@@ -185,17 +190,22 @@ def predicted_gains(
 
 def _fit_level(
     problem: FitProblem,
+    soil: GapFit,
     none: CandidateFit,
     sets: Mapping[tuple[str, ...], CandidateFit],
     starts: Starts,
 ) -> list[CandidateFit]:
-    """Fit sets of effects, each from the candidate that it extends, with free shapes in reach."""
+    """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
+
+    Single effects start from the soil beside a discrepancy and from that under noise alone.
+    """
     requests = []
     for names, base in sets.items():
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, none.amplitude)
         requests.append((names, base.catalogue_law.fit.start_values(), smaller))
-    fitted = fit_candidates(problem, requests)
+    single = all(len(names) == 1 for names in sets)
+    fitted = fit_candidates(problem, requests, _off_bounds(soil) if single else None)
     if not fitted:
         return []
     lowest = min(none.objective, *(c.objective for c in fitted))
@@ -204,9 +214,20 @@ def _fit_level(
         for c in fitted
         if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
         or c.objective < lowest + WITHIN_REACH
+        or (c.noise_only is not None and c.noise_only.objective < soil.objective - NOTABLE_GAIN)
     ]
     shaped = {c.names: c for c in fit_shapes(problem, promising)}
     return [shaped.get(c.names, c) for c in fitted]
+
+
+def _off_bounds(soil: GapFit) -> dict[str, float]:
+    """The soil of a fit, nearer to the middle of its priors.
+
+    Where an effect is missing, soil parameters are often at a bound, from which the fit with the
+    effect would not move.
+    """
+    start = soil.start_values()
+    return {path: 0.5 + INWARD * (x - 0.5) for path, x in start.items()}
 
 
 def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> ResidualTest:

@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
 #: Prior probability that a channel has no discrepancy at all.
 NO_DISCREPANCY = 0.5
-#: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and the
-#: scale of its amplitude, in usual ones: 20 % of a channel's range.
+#: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and
+#: the scale of its amplitude, in usual ones: 20 % of a range.
 UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0
 #: Sweeps over the channels; the amplitudes of different channels depend little on each other.
 SWEEPS = 2
