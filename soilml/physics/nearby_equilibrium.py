@@ -18,7 +18,7 @@ from soilml.physics.sinkage_search import (
 from soilml.row_status import Status
 
 #: Evaluations after which a row is solved by the ordinary search instead.
-MAX_EVALUATIONS = 4
+MAX_EVALUATIONS = 6
 #: A row is solved where the logarithm of the load carried over the load is below the first figure,
 #: and its product with that of the evaluation before below the second: the error of the
 #: interpolation between the two is of the order of the product.
@@ -26,7 +26,7 @@ MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-9
 #: A change of that logarithm below this is mostly rounding and gives no slope.
 MIN_CHANGE = 1e-9
 #: The estimate may be off by this much in log sinkage at most; larger steps leave its vicinity.
-MAX_STEP = 1.0
+MAX_STEP = 2.0
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,10 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     effects = _joined_effects([part.case for part in parts])
     parameters = [_with_effects(part.case, effects).parameters() for part in parts]
     whole = _with_effects(parts[0].case, effects)
+    sets = np.asarray([part.sets for part in parts])
+    points = np.asarray([part.points for part in parts])
+    set_ends = np.cumsum(sets)
+    set_of_row = np.repeat(np.arange(set_ends[-1]), np.repeat(points, sets))
     values: dict[str, Any] = {}
     for path, (_, first) in whole.parameters().items():
         own = [
@@ -70,12 +74,10 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
             for part, known in zip(parts, parameters, strict=True)
         ]
         if any(np.ndim(value) or value != first for value in own):
-            values[path] = np.concatenate(
-                [
-                    np.repeat(np.broadcast_to(value, part.sets), part.points)
-                    for value, part in zip(own, parts, strict=True)
-                ]
-            )
+            by_set = np.empty(set_ends[-1])
+            for value, part, end in zip(own, parts, set_ends, strict=True):
+                by_set[end - part.sets : end] = value
+            values[path] = by_set[set_of_row]
     whole = whole.with_values(values)
     at = _joined_operating(parts)
     check(at)
@@ -110,9 +112,9 @@ def _joined_operating(parts: Sequence[CaseSets]) -> Operating:
     known: dict[str, Floats] = {}
     for field in fields(Operating):
         if getattr(parts[0].at, field.name) is not None:
-            columns = [
-                np.tile(np.broadcast_to(getattr(part.at, field.name), part.points), part.sets)
-                for part in parts
-            ]
+            columns: list[Floats] = []
+            for part in parts:
+                column = getattr(part.at, field.name)
+                columns += [np.broadcast_to(column, part.points)] * part.sets
             known[field.name] = np.concatenate(columns)
     return Operating(**known)
