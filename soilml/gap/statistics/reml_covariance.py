@@ -83,22 +83,24 @@ def run_effect_columns(case: Case, readings: StackedReadings) -> Floats:
 
     The columns are those of friction angle and of the bearing moduli, which scale together.
     """
-    bounds = declared(Soil)["friction_angle"]
-    phi, unit = float(case.soil.friction_angle), RUN_EFFECT_UNITS["friction_angle"]
-    angle = SoilCoordinate(
-        "friction_angle",
-        "rad",
-        (bounds.lower - phi) / unit,
-        (bounds.upper - phi) / unit,
-        Prior(phi, phi + unit),
-    )
-    by_angle = linearise(case, [angle], np.zeros(1), readings)[1][:, 0]
-    step, sides = 1e-4, []  # central difference in the logarithm of the moduli
-    for sign in (1.0, -1.0):
-        moduli = {k: float(getattr(case.soil, k)) * (1.0 + sign * step) for k in ("kc", "kphi")}
-        sides.append(linearise(case.with_values(moduli), [], np.zeros(0), readings)[0])
-    by_bearing = (sides[0] - sides[1]) / (2.0 * step) * RUN_EFFECT_UNITS["bearing"]
+    phi = float(case.soil.friction_angle)
+    moduli = {name: float(getattr(case.soil, name)) for name in ("kc", "kphi")}
+    coordinates = [_unit_coordinate("friction_angle", phi, RUN_EFFECT_UNITS["friction_angle"])]
+    coordinates += [
+        _unit_coordinate(name, value, RUN_EFFECT_UNITS["bearing"] * value)
+        for name, value in moduli.items()
+        if value != 0.0
+    ]
+    jacobian = linearise(case, coordinates, np.zeros(len(coordinates)), readings)[1]
+    by_angle, by_bearing = jacobian[:, 0], jacobian[:, 1:].sum(axis=1)
     return np.asarray(np.nan_to_num(np.stack([by_angle, by_bearing], axis=1)))
+
+
+def _unit_coordinate(name: str, value: float, unit: float) -> SoilCoordinate:
+    """The coordinate of a soil parameter: its distance from a value, in a unit."""
+    bounds = declared(Soil)[name]
+    lower, upper = sorted(((bounds.lower - value) / unit, (bounds.upper - value) / unit))
+    return SoilCoordinate(name, bounds.unit, lower, upper, Prior(value, value + unit))
 
 
 def assemble_covariance(
