@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.reml_covariance import (
+    RUN_EFFECT_UNITS,
+    VarianceComponents,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.quantities import QUANTITIES, column
 
 Floats = NDArray[np.float64]
@@ -76,8 +83,9 @@ def repeat_disagreement(
     readings : StackedReadings
         m readings.
     covariance : array (m, m), optional
-        V, of the readings: declared noise and usual scatter from run to run. The declared noise
-        alone by default. Scaled-up noise would hide a disagreement.
+        V, of the readings: declared noise and usual scatter from run to run, as from
+        `usual_covariance`. The declared noise alone by default. Noise that was scaled up to fit
+        the residuals would hide a disagreement.
     expected : array (m,), optional
         Predictions, whose small differences within the tolerance of a repeat are subtracted.
 
@@ -116,6 +124,18 @@ def repeat_disagreement(
             )
         )
     return sorted(found, key=lambda found: (found.p_value, -found.scatter_ratio))
+
+
+def usual_covariance(case: Case, readings: StackedReadings) -> Floats:
+    """Covariance (m, m) of the declared noise and the usual scatter of the soil between runs."""
+    usual = VarianceComponents(
+        np.ones(len(readings.channels)),
+        RUN_EFFECT_UNITS["friction_angle"],
+        RUN_EFFECT_UNITS["bearing"],
+        0.0,
+        1.0,
+    )
+    return assemble_covariance(readings, run_effect_columns(case, readings), usual).matrix
 
 
 def overstated_noise(readings: StackedReadings) -> dict[str, float]:

@@ -167,6 +167,16 @@ def test_the_right_model_leaves_the_noise_and_the_soil_alone_more(dug, named):
     assert region.description == "load_N >= 140, predicted from the rest"
 
 
+@pytest.mark.parametrize("scatter, region", [(0.08, "slip >= "), (0.0, "load_N >= 90,")])
+def test_the_held_out_region_lies_between_levels(scatter, region):
+    case = case_of()
+    one_level = 20.0 * (1.0 + np.random.default_rng(5).uniform(-scatter, scatter, 6))
+    loads = tuple(one_level) if scatter else (40.0, 41.0, 60.0, 61.0, 90.0, 91.0)
+    problem = fit_problem(case, driven(case, noise=0.0, slips=6, loads=loads))
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    assert held_out_region(problem, soil, soil).description.startswith(region)
+
+
 def test_rows_that_took_no_part_are_predicted_as_well(dug, named):
     problem, soil = dug
     other = fit_problem(

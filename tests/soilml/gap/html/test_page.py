@@ -257,6 +257,13 @@ def test_the_page_contains_the_figures_of_the_report():
         assert figure in text, figure
 
 
+def test_costs_of_runs_are_shown_where_they_are_given():
+    costly = (NextRun("reverse", "the same slips in reverse", 7.25, (), cost=12.0),)
+    plain, priced = (page(r, "m", "r") for r in (report(), report(next_runs=costly)))
+    assert "per cost" in priced and ">cost</th>" in priced and ">12.0<" in priced
+    assert "per cost" not in plain and ">cost</th>" not in plain
+
+
 def test_an_unchanged_gap_is_shown_once():
     same = GapReduction(0.84, 0.84, {"torque_Nm": (0.84, 0.84)}, 9, "all rows fitted")
     whole = report("no-gap", gap={"train": same}, effects=(), cause_set=())
