@@ -80,15 +80,14 @@ def run_options(
         lighter,
     ]
     if highest <= HIGHEST_SLIP - 0.1:
-        most = min(HIGHEST_SLIP, highest + 0.3)
-        high = drivable_slips(0.2, most)
-        options.append(run("higher slip", f"slips up to {high.max():g}", high, middle))
+        high = drivable_slips(0.2, highest + 0.3)
+        options.append(run("higher slip", "slips up to {highest:g}", high, middle))
     low = drivable_slips(0.01, 0.12)
     options.append(run("low slip", "slips close to zero", low, middle))
     if float(slips.min()) >= 0.0:
         options.append(run("braking", "a braked wheel", drivable_slips(-0.4, -0.05), middle))
     speed = readings.at.speed
-    pace = USUAL_COVARIATES["speed"] if speed is None else float(np.median(np.abs(speed)))
+    pace = _usual(readings).get("speed", 0.0) or USUAL_COVARIATES["speed"]
     if speed is None or float(np.min(speed)) >= 0.0:
         options.append(run("reverse", "the same slips in reverse", usual, middle, speed=-pace))
     if _unvaried(speed):
@@ -107,12 +106,14 @@ def run_options(
         carried = carried_rows(option.changed(case), option.at)
         if carried.sum() >= FEWEST_ROWS:
             plain = None if option.plain is None else _selected(option.plain, carried)
-            yield replace(option, at=_selected(option.at, carried), plain=plain)
+            at = _selected(option.at, carried)
+            text = option.text.format(highest=np.max(at.slip))
+            yield replace(option, text=text, at=at, plain=plain)
 
 
 def drivable_slips(low: float, high: float) -> Floats:
     """At most `ROWS_PER_RUN` slips between two, in steps that a rig can set."""
-    high = min(high, HIGHEST_SLIP)
+    low, high = max(low, -HIGHEST_SLIP), min(high, HIGHEST_SLIP)
     for step in SLIP_STEPS:
         first, last = round(low / step), round(high / step)
         if last - first + 1 >= ROWS_PER_RUN:
@@ -144,10 +145,10 @@ def _usual(readings: StackedReadings) -> dict[str, Any]:
         value = getattr(readings.at, field)
         if value is None:
             continue
+        typical = np.median(np.abs(value) if field == "speed" else value)
         if field == "pass_number":
-            usual[field] = float(np.min(value))
-        else:
-            usual[field] = float(np.median(np.abs(value) if field == "speed" else value))
+            typical = np.min(value)
+        usual[field] = float(f"{typical:.2g}")  # what a rig can be set to
     return usual
 
 
