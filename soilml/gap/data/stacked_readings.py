@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,21 +55,21 @@ class StackedReadings:
         """Load of each reading, (m,), N."""
         return np.asarray(self.at.load)[self.row]
 
-    @property
+    @cached_property
     def slip_levels(self) -> Levels:
         """Levels of slip; `index` (m,) is that of each reading."""
         row, which = np.unique(self.row, return_inverse=True)
         levels = slip_levels(np.asarray(self.at.slip)[row], self.run[row], self.slip_std)
         return replace(levels, index=levels.index[which])
 
-    @property
+    @cached_property
     def load_levels(self) -> Levels:
         """Levels of the logarithm of the load; `index` (m,) is that of each reading."""
         row, which = np.unique(self.row, return_inverse=True)
         levels = load_levels(np.asarray(self.at.load)[row], self.run[row], self.load_std)
         return replace(levels, index=levels.index[which])
 
-    @property
+    @cached_property
     def driven_alike(self) -> Integers:
         """Groups of readings (m,) whose rows are repeats of each other, of all channels."""
         return rows_driven_alike(self.at, self.run, self.slip_std, self.load_std)[self.row]
