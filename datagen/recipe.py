@@ -158,6 +158,8 @@ def parse_recipe(text: str, where: str) -> Recipe:
 
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
     case = take_case(settings, effects)
+    if case.discrepancy:
+        settings.fail("[discrepancy]: generated rows have no model error; remove this table")
     if not case.prior:
         settings.fail("no parameter varies: give ranges in [soil.prior]")
     operating = settings.table("operating")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,17 +11,23 @@ from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import OPTIONAL_READINGS
 from soilml.quantities import CHANNELS, column
 
+if TYPE_CHECKING:
+    from soilml.config.case import Case
+
 
 def row_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
     """Inputs for the estimates of single rows, (rows,) by name."""
     return {name: table[column(name)] for name in estimator.inputs}
 
 
-def joint_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
+def joint_readings(
+    estimator: Estimator, table: Table, case: Case | None = None, *, together: bool = True
+) -> dict[str, Any]:
     """Inputs for the pooled estimate of all rows of one soil, (rows,) by name.
 
     In addition to the required readings: sinkage and drawbar pull where the table has them and
     their noise is known, and columns of standard deviations, which replace the noise of the file.
+    The discrepancy of a case is included in them, for rows of which all are estimated `together`.
     """
     readings = row_readings(estimator, table)
     if estimator.sets is None:
@@ -35,6 +41,11 @@ def joint_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
             readings[f"{name}_std"] = _fill_blank_std(
                 table[spread], estimator, name, readings[name]
             )
+    if case is not None and case.discrepancy:
+        from soilml.identification.trained_estimator import std_with_discrepancy
+
+        noise = estimator.sets.noise
+        readings |= std_with_discrepancy(case.discrepancy, readings, noise, together=together)
     return readings
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +15,16 @@ from soilml.onboard.estimator import Estimator
 from soilml.optional_imports import need
 from soilml.quantities import QUANTITIES
 
+if TYPE_CHECKING:
+    from soilml.config.case import Case
+
 _HINT = "select rows with --where, or train a model for this wheel"
 
 
 def apply_case_option(
     args: argparse.Namespace, estimator: Estimator
-) -> tuple[Estimator, list[str]]:
-    """The estimator for the wheel and soil of `--case`, and notes on what it does not follow.
+) -> tuple[Estimator, Case | None, list[str]]:
+    """The estimator for the wheel and soil of `--case`, the case, and notes on what it ignores.
 
     Raises `InputError` where a file for wheels of any size has no case, or another file has one.
     """
@@ -31,14 +35,22 @@ def apply_case_option(
             "[soil], [soil.prior] and [noise]"
         )
     if args.case is None:
-        return estimator, []
+        return estimator, None, []
     if not any_wheel:
         raise InputError(f"{args.model} is for one wheel only; omit --case")
     need("array_api_compat", "estimate --case")
     from soilml.config.case import read_case
     from soilml.identification.trained_estimator import condition_on_case
 
-    return condition_on_case(estimator, read_case(args.case))
+    case = read_case(args.case)
+    conditioned, notes = condition_on_case(estimator, case)
+    if case.discrepancy:
+        notes.append(
+            f"[discrepancy] of {', '.join(case.discrepancy)} is included as independent errors of "
+            "the rows, enlarged by the rows that are alike: intervals are wider than those of "
+            "soilml identify"
+        )
+    return conditioned, case, notes
 
 
 def check_table_wheel(estimator: Estimator, table: Table) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import range_with_zero
 from soilml.errors import InputError
 from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.identification.observations import LEAST_RELATIVE_STD
@@ -40,15 +41,21 @@ class PredictedReadings:
 def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> PredictedReadings:
     """Predictions of all channels whose noise the case declares; `at` holds arrays (m,).
 
-    Noise of slip and load is propagated as in the posterior, at the sample nearest to the mean.
-    Raises `InputError` where no noise is declared.
+    Noise of slip and load is propagated as in the posterior, at the sample nearest to the mean. A
+    model discrepancy is added as an error that is independent of those of other rows. Raises
+    `InputError` where no noise is declared.
     """
     channels = tuple(name for name in CHANNELS if column(name) in case.noise)
     if not channels:
         raise InputError("the value of a measurement depends on its noise: declare it in [noise]")
     predicted = predict_channels(case, samples.free, samples.u, at)
     y = np.stack([predicted[name].T for name in channels])
-    sensor = np.stack([case.noise[column(n)].std(v) for n, v in zip(channels, y, strict=True)])
+    sensor = np.stack(
+        [
+            np.hypot(case.noise[column(n)].std(v), _model_error(case, n, v))
+            for n, v in zip(channels, y, strict=True)
+        ]
+    )
     from_inputs = _input_noise(case, samples, at)
     inputs = np.stack([from_inputs[name][0] for name in channels])
     std = samples.noise_scale * np.hypot(sensor, inputs[..., None])
@@ -56,6 +63,15 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
     largest = np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
     least = LEAST_RELATIVE_STD * largest + 1e-12
     return PredictedReadings(at, channels, y, np.fmax(std, least), failure < MOST_FAILURE)
+
+
+def _model_error(case: Case, name: str, y: Floats) -> float:
+    """Standard deviation of a channel's discrepancy; its range is that of typical readings."""
+    own = case.discrepancy.get(column(name))
+    if own is None:
+        return 0.0
+    carried = np.isfinite(y).any(axis=1)
+    return own.amplitude(range_with_zero(np.nanmedian(y[carried], axis=1)))
 
 
 def _input_noise(case: Case, samples: ParameterSamples, at: Operating) -> dict[str, Floats]:

@@ -58,9 +58,11 @@ def included_discrepancy(case: Case, data: Observations) -> list[str]:
     return [f"errors of the model are included in std: {', '.join(texts)}"] if texts else []
 
 
-def ignored_discrepancy(case: Case, what: str) -> list[str]:
+def ignored_discrepancy(
+    case: Case, what: str, consequence: str = "its intervals are too narrow"
+) -> list[str]:
     """A sentence that `what` ignores [discrepancy]; none for a case without one."""
     names = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
     if not names:
         return []
-    return [f"{what} ignores the [discrepancy] of {', '.join(names)}: its intervals are too narrow"]
+    return [f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"]

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
+from soilml.numerics.smooth_process import independent_bound, slip_load_points
 from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, column
+
+Floats = NDArray[np.float64]
 
 #: Fixed coefficients of the angle of maximum stress in such a file.
 FIXED_ANGLE = {"a0": 0.4, "a1": 0.15}
@@ -73,6 +81,54 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
         **upper_bounds,
     )
     return conditioned, warnings + _prior_differences(conditioned, case)
+
+
+def std_with_discrepancy(
+    discrepancy: Mapping[str, Discrepancy],
+    readings: Mapping[str, Floats],
+    noise: Mapping[str, tuple[float, float]],
+    *,
+    together: bool,
+) -> dict[str, Floats]:
+    r"""Standard deviations (rows,) by input name, of channels with a discrepancy, with it included.
+
+    .. math:: \sigma_i'^2 = \sigma_i^2 + a^2 \sum_j \rho_{ij}
+
+    A model file takes the errors of the rows as independent, those of the model are alike in
+    neighbouring rows. With the sum of the correlations the independent errors are no smaller in any
+    combination of the rows, so that the estimate of rows that are taken `together` is wider than
+    with the process itself, never narrower. For rows estimated one by one the sum is 1.
+
+    Parameters
+    ----------
+    discrepancy
+        By column name, as in `Case`.
+    readings
+        Inputs of the model file by name, (rows,): slip, load, channels and their `<name>_std`.
+    noise
+        Constant part and share of the noise by name, where there is no `<name>_std`.
+    """
+    changed = {}
+    for name in CHANNELS:
+        own = discrepancy.get(column(name))
+        if own is None or name not in readings:
+            continue
+        reading = np.asarray(readings[name])
+        amplitude = own.amplitude(range_with_zero(reading))
+        constant, share = noise.get(name, (0.0, 0.0))
+        std = readings.get(f"{name}_std", np.hypot(constant, share * np.abs(reading)))
+        alike = np.ones(len(reading))
+        measured = np.isfinite(reading)
+        if together:
+            points = slip_load_points(
+                readings["slip"][measured],
+                readings["load"][measured],
+                own.slip_length,
+                own.log_load_length,
+            )
+            alike[measured] = independent_bound(points)
+        changed[f"{name}_std"] = np.hypot(std, amplitude * np.sqrt(alike))
+    return changed
 
 
 def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:

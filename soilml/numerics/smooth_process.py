@@ -14,6 +14,8 @@ MOST_CENTRES = 100
 #: Eigenvalues below this fraction of the largest are dropped: all together they hold a few
 #: thousandths of the process's standard deviation.
 LEAST_EIGENVALUE = 1e-6
+#: Points whose correlations with all others are computed at once, which bounds memory.
+BLOCK = 1000
 #: Decimals, in correlation lengths, to which points count as the same.
 SAME_POINT_DECIMALS = 6
 
@@ -88,3 +90,25 @@ def _spread_centres(points: Floats) -> Floats:
         distance = np.minimum(distance, to_last)
         taken.append(int(np.argmax(distance)))
     return np.asarray(centres[taken])
+
+
+def independent_bound(points: Floats) -> Floats:
+    """Variances (n,) of independent errors that are no smaller than a process of unit amplitude.
+
+    They are the row sums of its correlations: the difference between a diagonal matrix of them and
+    the correlations, which are positive, is diagonally dominant, so that it is positive
+    semi-definite. No linear combination of the process at the points (n, d) has a larger variance
+    than that of the independent errors. A point far from all others has 1; one of m close together
+    has about m.
+
+    References
+    ----------
+    Golub and Van Loan, Matrix Computations, section 4.1.1 (diagonal dominance).
+    """
+    return np.concatenate(
+        [
+            _squared_exponential(points[i : i + BLOCK], points).sum(axis=1)
+            for i in range(0, len(points), BLOCK)
+        ]
+        or [np.zeros(0)]
+    )

@@ -12,7 +12,9 @@ from soilml.identification.compatibility import (
     recipe_case,
     value_differences,
 )
+from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
@@ -47,7 +49,13 @@ def onboard_draws(
     if not complete.any():
         names = ", ".join(column(name) for name in estimator.inputs)
         raise FitError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
-    estimate = estimator.run(**{name: values[complete] for name, values in inputs.items()})
+    readings = {name: values[complete] for name, values in inputs.items()}
+    if estimator.sets is None:
+        warnings += ignored_discrepancy(case, estimator.path)
+    elif case.discrepancy:
+        noise = estimator.sets.noise
+        readings |= std_with_discrepancy(case.discrepancy, readings, noise, together=True)
+    estimate = estimator.run(**readings)
     if not estimate.in_range:
         warnings.append(
             f"the rows are outside the training domain of {estimator.path}: it returns the prior"

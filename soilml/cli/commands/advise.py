@@ -63,8 +63,8 @@ widths are those after all rows up to it. --all lists every candidate instead.
 Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --loads, loads from half to twice
 the measured ones are tried. A point is excluded where a twentieth or more of
-the posterior samples does not carry the wheel. Model errors are not
-considered.
+the posterior samples does not carry the wheel. Model errors are considered where
+[discrepancy] declares them.
 """
 
 
@@ -144,6 +144,11 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
     notes = [] if at is None else [*next_row_messages(advice), *data.notes]
+    if case.discrepancy:
+        notes.append(
+            "the [discrepancy] of a next row counts as independent of that of other rows: "
+            "repetitions are overrated"
+        )
     if advice.excluded_points:
         notes.append(
             f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "

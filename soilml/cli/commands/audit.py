@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from soilml.cli.options import (
 )
 from soilml.cli.output import json_text
 from soilml.config.case import read_case
+from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import output_files, save_text
 from soilml.io.read_table import read_table
 from soilml.io.text_tables import format_table
@@ -80,6 +82,8 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     print(_text(found))
+    for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
+        print(line, file=sys.stderr)
     return 0
 
 

@@ -6,7 +6,7 @@ import argparse
 import sys
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
 from soilml.onboard.multi_sensor import ACROSS_FILES, PRIOR_ONCE, fuse_estimates
 from soilml.optional_imports import need
 from soilml.quantities import column
+
+if TYPE_CHECKING:
+    from soilml.config.case import Case
 
 HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
@@ -100,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
-    estimators[0], case_notes = apply_case_option(args, estimators[0])
+    estimators[0], case, case_notes = apply_case_option(args, estimators[0])
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
@@ -113,9 +116,9 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, notes = _row_estimates(estimators, table, usable, args.rule or PRIOR_ONCE)
+        columns, notes = _row_estimates(estimators, table, usable, args.rule or PRIOR_ONCE, case)
     else:
-        columns, notes = _group_estimates(estimators[0], table, usable[0], args.by)
+        columns, notes = _group_estimates(estimators[0], table, usable[0], args.by, case)
     write_columns(columns, args.out)
     notes = case_notes + notes
     notes += _excluded(table, ~complete, "lack a reading")
@@ -167,10 +170,14 @@ def _complete(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
 
 
 def _row_estimates(
-    estimators: list[Estimator], table: Table, usable: list[NDArray[np.bool_]], rule: str
+    estimators: list[Estimator],
+    table: Table,
+    usable: list[NDArray[np.bool_]],
+    rule: str,
+    case: Case | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns with a line for every row, blank where no model has all its readings, and notes."""
-    estimates = [_all_rows(*parts, table) for parts in zip(estimators, usable, strict=True)]
+    estimates = [_all_rows(*parts, table, case) for parts in zip(estimators, usable, strict=True)]
     answered = np.any(usable, axis=0)
     inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
     columns: dict[str, Any] = {"run": table["run"]}
@@ -203,12 +210,17 @@ def _row_estimates(
     return columns, notes
 
 
-def _all_rows(estimator: Estimator, usable: NDArray[np.bool_], table: Table) -> Estimate:
+def _all_rows(
+    estimator: Estimator, usable: NDArray[np.bool_], table: Table, case: Case | None
+) -> Estimate:
     """An estimate for every row; one that is not usable counts as out of range."""
     result = estimator.prior_estimate(len(table))
     if usable.any():
         alone = estimator.sets is not None and estimator.sets.sets_only
-        readings = (joint_readings if alone else row_readings)(estimator, table.rows(usable))
+        rows = table.rows(usable)
+        readings = row_readings(estimator, rows)
+        if alone:
+            readings = joint_readings(estimator, rows, case, together=False)
         estimate = estimator(**readings)
         for key in ("mean", "std", "covariance", "low", "high", "in_range"):
             getattr(result, key)[usable] = getattr(estimate, key)
@@ -216,12 +228,12 @@ def _all_rows(estimator: Estimator, usable: NDArray[np.bool_], table: Table) -> 
 
 
 def _group_estimates(
-    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str
+    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str, case: Case | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns with a line for every value of a column, from all its usable rows, and notes."""
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
-    readings = [joint_readings(estimator, rows) for _, rows in groups]
+    readings = [joint_readings(estimator, rows, case) for _, rows in groups]
     estimates = [estimator.run(**inputs) for inputs in readings]
     in_range = [int(estimator.rows_in_range(**inputs).sum()) for inputs in readings]
     estimate = Estimate.stack(estimates, (len(estimates),))

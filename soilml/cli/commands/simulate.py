@@ -18,6 +18,7 @@ from soilml.cli.options import (
 from soilml.cli.output import write_columns
 from soilml.config.case import read_case
 from soilml.errors import InputError
+from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import output_files
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.row_status import Status
@@ -106,6 +107,8 @@ def run(args: argparse.Namespace) -> int:
         },
         args.out,
     )
+    for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
+        print(line, file=sys.stderr)
     if failed:
         print(
             f"{failed} of {slip.size} rows have no equilibrium: see the column status",

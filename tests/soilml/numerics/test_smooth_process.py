@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.smooth_process import MOST_CENTRES, process_columns, slip_load_points
+from soilml.numerics.smooth_process import (
+    MOST_CENTRES,
+    independent_bound,
+    process_columns,
+    slip_load_points,
+)
 
 
 def covariance(points, amplitude):
@@ -39,3 +44,11 @@ def test_many_points_are_represented_by_few():
 
 def test_no_points_have_no_columns():
     assert process_columns(np.zeros((0, 2))).shape == (0, 0)
+
+
+def test_independent_errors_are_no_smaller_than_the_process_in_any_combination():
+    points = np.random.default_rng(4).uniform(0.0, 3.0, (30, 2))
+    difference = np.diag(independent_bound(points)) - covariance(points, np.ones(30))
+    assert np.linalg.eigvalsh(difference).min() > -1e-9
+    assert independent_bound(np.asarray([[0.0], [9.0]])) == pytest.approx(1.0)
+    assert independent_bound(np.zeros((5, 1))) == pytest.approx(5.0)
