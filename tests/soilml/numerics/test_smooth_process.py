@@ -39,7 +39,7 @@ def test_many_points_are_represented_by_few():
     points = slip_load_points(rng.uniform(0, 0.8, 400), rng.uniform(20, 80, 400), 0.3, 0.6)
     columns = process_columns(points)
     assert columns.shape[1] <= MOST_CENTRES
-    assert columns @ columns.T == pytest.approx(covariance(points, np.ones(400)), abs=1e-3)
+    assert np.abs(columns @ columns.T - covariance(points, np.ones(400))).max() < 1e-3
 
 
 def test_no_points_have_no_columns():

@@ -1,0 +1,83 @@
+"""[discrepancy] in every command that reads a model file: included, refused, or said to be left."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import MODEL, RECIPE
+
+from soilml import Operating, read_case
+from soilml.cli import main
+
+DISCREPANCY = '[discrepancy]\ntorque_Nm = "3 %"\ndrawbar_pull_N = 1.5\n'
+ANY_WHEEL = str(Path(__file__).parents[2] / "exported" / "any_wheel.onnx")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A model file without discrepancy and one with it, and nine rows on a soil of the prior."""
+    (tmp_path / "plain.toml").write_text(MODEL)
+    (tmp_path / "model.toml").write_text(MODEL + DISCREPANCY)
+    case = read_case(tmp_path / "plain.toml")
+    true = case.with_values({"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012})
+    slip, load = np.tile([0.1, 0.3, 0.5], 3), np.repeat([40.0, 70.0, 110.0], 3)
+    torque = true.model(true.soil, Operating(slip=slip, load=load)).torque
+    rows = "".join(f"a,{s},{w},{t}\n" for s, w, t in zip(slip, load, torque, strict=True))
+    (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\n" + rows)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def spoken(capsys, *command):
+    assert main(list(command)) == 0
+    return capsys.readouterr()
+
+
+def table(captured):
+    return list(csv.DictReader(io.StringIO(captured.out)))
+
+
+def test_estimates_of_a_model_file_for_many_wheels_are_wider(folder, capsys):
+    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
+    plain = spoken(capsys, *command, "plain.toml")
+    wide = spoken(capsys, *command, "model.toml")
+    assert "[discrepancy] of torque_Nm, drawbar_pull_N is included" in wide.err
+    assert "discrepancy" not in plain.err
+    for key in ("cohesion_Pa_std", "friction_angle_rad_std", "shear_modulus_m_std"):
+        assert float(table(wide)[0][key]) > 1.1 * float(table(plain)[0][key])
+
+
+def test_simulated_rows_have_no_error_of_the_model_and_it_is_said(folder, capsys):
+    said = spoken(capsys, "simulate", "model.toml", "--slip", "0.1,0.3", "--load", "60").err
+    assert "simulate ignores the [discrepancy] of torque_Nm, drawbar_pull_N" in said
+
+
+def test_a_recipe_with_a_discrepancy_is_refused(folder, capsys):
+    (folder / "recipe.toml").write_text(RECIPE.format(rows=8, seed=1) + DISCREPANCY)
+    assert main(["generate", "recipe.toml", "rows.parquet"]) == 2
+    assert "[discrepancy]: generated rows have no model error" in capsys.readouterr().err
+    assert not (folder / "rows.parquet").exists()
+
+
+@pytest.mark.slow
+def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
+    command = ("--load", "60", "--slip-limit", "0.4")
+    plain = spoken(capsys, "pull", "plain.toml", "runs.csv", *command)
+    wide = spoken(capsys, "pull", "model.toml", "runs.csv", *command)
+    assert "not errors of the model" in plain.err
+    assert "errors of the model (drawbar pull 1.5 N before any reading)" in wide.err
+    for before, after in zip(table(plain), table(wide), strict=True):
+        width, wider = (
+            float(row["drawbar_pull_N_p95"]) - float(row["drawbar_pull_N_p05"])
+            for row in (before, after)
+        )
+        # the error alone is a band of 2 * 1.645 * 1.5 N = 4.9 N; 400 draws tell it within 15 %
+        assert wider > max(width, 0.85 * 4.9)
+
+
+@pytest.mark.slow
+def test_advice_says_how_the_error_of_a_next_row_is_counted(folder, capsys):
+    said = spoken(capsys, "advise", "model.toml", "runs.csv", "--slips", "0.1,0.5", "--loads", "60")
+    assert "the [discrepancy] of a next row counts as independent" in said.err
