@@ -62,8 +62,10 @@ def squared_residuals_and_log_determinant(
     Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. A.9 and A.10 (the
     lemmas of matrix inversion and of determinants).
     """
+    if (std == std[0]).all():  # one factorisation for all sets
+        std = std[:1]
     scaled = residual / std
-    log_determinant = np.log(std).sum(axis=1)
+    log_determinant = np.broadcast_to(np.log(std).sum(axis=1), len(residual))
     if columns.shape[1] == 0:
         return (scaled**2).sum(axis=1), log_determinant
     basis = columns / std[..., None]

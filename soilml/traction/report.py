@@ -106,9 +106,10 @@ def pull_report(
                 "torque alone hardly reveals errors of the model: measure pull or sinkage too"
             )
         if posterior.samples.noise_inflated:
+            allowed = f"{EXCESS_RESIDUALS}{' and discrepancy' if case.discrepancy else ''}"
             warnings.append(
-                f"residuals are {posterior.samples.noise_scale:.1f} {EXCESS_RESIDUALS}: the model "
-                "lacks an effect or the noise is understated; bands are widened and may be biased"
+                f"residuals are {posterior.samples.noise_scale:.1f} {allowed}: the model lacks an "
+                "effect or the noise is understated; bands are widened and may be biased"
             )
     else:
         check_wheel_size(case, table)

@@ -21,11 +21,12 @@ def test_without_columns_values_are_divided_by_their_noise():
     assert Whitener.of(STD[0], np.zeros((12, 0)))(RESIDUAL) == pytest.approx(RESIDUAL / STD[0])
 
 
+@pytest.mark.parametrize("std", [STD, np.tile(STD[0], (4, 1))])
 @pytest.mark.parametrize("columns", [COLUMNS, COLUMNS[:, :0]])
-def test_likelihood_is_that_of_the_full_covariance(columns):
-    squared, half_log = squared_residuals_and_log_determinant(RESIDUAL, STD, columns)
+def test_likelihood_is_that_of_the_full_covariance(columns, std):
+    squared, half_log = squared_residuals_and_log_determinant(RESIDUAL, std, columns)
     for i in range(4):
-        covariance = np.diag(STD[i] ** 2) + columns @ columns.T
+        covariance = np.diag(std[i] ** 2) + columns @ columns.T
         assert squared[i] == pytest.approx(RESIDUAL[i] @ np.linalg.solve(covariance, RESIDUAL[i]))
         assert half_log[i] == pytest.approx(0.5 * np.linalg.slogdet(covariance)[1])
 
