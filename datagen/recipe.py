@@ -160,6 +160,8 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
     case = take_case(settings, effects)
     if case.discrepancy:
         settings.fail("[discrepancy]: generated rows have no model error; remove this table")
+    if case.gears:
+        settings.fail("a recipe has one gear, in [gear]; [gears.NAME] is for measured rows")
     if not case.prior:
         settings.fail("no parameter varies: give ranges in [soil.prior]")
     operating = settings.table("operating")

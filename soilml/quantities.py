@@ -74,6 +74,7 @@ _ALL = (
     Quantity("angle", "theta", "rad", "place on the rim, from straight down, positive forward"),
     Quantity("normal", "sigma_s", "Pa", "normal stress that a sensor on the rim reads"),
     Quantity("wheel", "", "-", "which wheel of a rover: front or rear"),
+    Quantity("gear", "", "-", "which gear was driven: NAME of [gears.NAME] in the model file"),
 )
 
 #: Every quantity by name.

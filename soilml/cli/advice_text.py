@@ -50,8 +50,11 @@ def advice_after_fit(
 ) -> Advice | None:
     """Advice after the posterior method gave `fit`; None where none is possible.
 
-    That is the case where [noise] declares no channel, or no candidate is known to be feasible.
+    That is the case where [noise] declares no channel, where no candidate is known to be feasible,
+    and where several gears were driven.
     """
+    if case.gears:
+        return None
     try:
         data = read_observations(case, table)
         samples = samples_of_rows(case, data, select_free(case, free), QUICK_SAMPLES)

@@ -48,6 +48,13 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
     return {**EFFECTS, **load_effects(args.effects)}
 
 
+def add_gear_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--gear`."""
+    parser.add_argument(
+        "--gear", metavar="NAME", help="which of the gears [gears.NAME], where MODEL.toml has some"
+    )
+
+
 def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--ignore-extra`."""
     parser.add_argument(

@@ -39,10 +39,10 @@ def apply_case_option(
     if not any_wheel:
         raise InputError(f"{args.model} is for one wheel only; omit --case")
     need("array_api_compat", "estimate --case")
-    from soilml.config.case import read_case
+    from soilml.config.case import read_case_of_one_gear
     from soilml.identification.trained_estimator import condition_on_case
 
-    case = read_case(args.case)
+    case = read_case_of_one_gear(args.case, gear=args.gear)
     conditioned, notes = condition_on_case(estimator, case)
     if case.discrepancy:
         notes.append(

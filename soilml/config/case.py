@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from soilml.config.measurement_noise import Noise, take_noise
 from soilml.config.model_discrepancy import Discrepancy, take_discrepancy
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import (
+    UNNAMED_GEAR,
+    take_effects,
+    take_gear,
+    take_gears,
+    take_instance,
+    take_priors,
+)
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared, located, with_values
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.physics.gears import GEARS
 from soilml.physics.model import Model
 from soilml.physics.soils import Soil, soil
 from soilml.quantities import COLUMNS
@@ -37,6 +43,10 @@ class Case:
         Noise of the sensors by column name: `torque_Nm`, `slip`.
     discrepancy
         Smooth error of the model by column name: `torque_Nm`, `drawbar_pull_N`, `sinkage_m`.
+    gears
+        Where several gears were driven: each by its name in the column `gear` of a table, with the
+        effects of its own; `model` has the effects that all share, on the first gear. A gear's own
+        effect replaces a shared one of the same name. Empty where there is one gear.
     """
 
     model: Model
@@ -44,12 +54,19 @@ class Case:
     prior: dict[str, Prior] = field(default_factory=dict)
     noise: dict[str, Noise] = field(default_factory=dict)
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
+    gears: dict[str, Model] = field(default_factory=dict)
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
-        """Every parameter by path, with its declaration and its value."""
+        """Every parameter by path, with its declaration and its value.
+
+        Parameters of one of several gears are `gears.lugged.radius` and `grousers@lugged.height`.
+        """
         own = located(self.soil)
         for path, entry in located(self.model).items():
-            own[path.removeprefix("effects.")] = entry
+            if not (self.gears and path.startswith("gear.")):
+                own[path.removeprefix("effects.")] = entry
+        for name, model in self.gears.items():
+            own |= {_path_of_gear(name, path): entry for path, entry in located(model).items()}
         return own
 
     def with_values(self, new: dict[str, Any]) -> Case:
@@ -60,16 +77,54 @@ class Case:
                 f"no parameter {unknown[0]!r}; this model has: {', '.join(self.parameters())}"
             )
         soils = located(self.soil)
+        gears, of_gears = {}, set()
+        for name, own in self.gears.items():
+            paths = {path: _path_of_gear(name, path) for path in located(own)}
+            gears[name] = with_values(own, {p: new[o] for p, o in paths.items() if o in new})
+            of_gears |= set(paths.values())
         model = {
             path if path.startswith("gear.") else f"effects.{path}": value
             for path, value in new.items()
-            if path not in soils
+            if path not in soils and path not in of_gears
         }
         return replace(
             self,
             model=with_values(self.model, model),
             soil=with_values(self.soil, {p: v for p, v in new.items() if p in soils}),
+            gears=gears,
         )
+
+    def of_gear(self, name: str) -> Case:
+        """The case of one of several gears: its dimensions, its effects and the shared ones."""
+        own = self.gears[name]
+        replaced = {effect.name for effect in own.effects}
+        shared = [effect for effect in self.model.effects if effect.name not in replaced]
+        case = replace(self, model=Model(own.gear, (*shared, *own.effects)), prior={}, gears={})
+        paths = self.paths_of_gear(name)
+        prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
+        return replace(case, prior=prior)
+
+    def paths_of_gear(self, name: str) -> dict[str, str]:
+        """Paths of the parameters that act on one of several gears: here, and in `of_gear`."""
+        own = self.gears[name]
+        replaced = {effect.name for effect in own.effects}
+        paths = {path: path for path in located(self.soil)}
+        for path in located(Model(own.gear, self.model.effects)):
+            public = path.removeprefix("effects.")
+            if path.startswith("effects.") and public.partition(".")[0] not in replaced:
+                paths[public] = public
+        for path in located(own):
+            paths[_path_of_gear(name, path)] = path.removeprefix("effects.")
+        return paths
+
+
+def _path_of_gear(name: str, path: str) -> str:
+    """Path in the case of a parameter of one of several gears, from that in the gear's model."""
+    kind, _, rest = path.partition(".")
+    if kind == "effects":
+        effect, _, parameter = rest.partition(".")
+        return f"{effect}@{name}.{parameter}"
+    return path if name == UNNAMED_GEAR else f"gears.{name}.{rest}"
 
 
 def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
@@ -78,7 +133,8 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
     Parameters
     ----------
     path
-        The file: tables [gear], [soil] with [soil.prior], [[effect]], [noise] and [discrepancy].
+        The file: tables [gear] or several [gears.NAME], [soil] with [soil.prior], [[effect]],
+        [noise] and [discrepancy].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
 
@@ -120,27 +176,52 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
     return case
 
 
+def read_case_of_one_gear(
+    path: str | os.PathLike[str],
+    effects: Mapping[str, type[Effect]] = EFFECTS,
+    gear: str | None = None,
+) -> Case:
+    """Read the case of one gear; `gear` names it where the file has several.
+
+    Raises
+    ------
+    InputError
+        As `read_case` does, and where the file has several gears and none of this name.
+    """
+    case = read_case(path, effects)
+    if not case.gears and gear is None:
+        return case
+    known = ", ".join(case.gears)
+    if not case.gears:
+        raise InputError(f"{path} has one gear, in [gear]; omit --gear")
+    if gear is None:
+        raise InputError(f"{path} has several gears: {known}; choose one with --gear")
+    if gear not in case.gears:
+        raise InputError(f"{path} has no gear {gear!r}; there are: {known}")
+    return case.of_gear(gear)
+
+
 def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
     """The case in the tables that `read_case` reads; others are left unread."""
-    gear_settings = settings.table("gear")
-    gear_type = gear_settings.text("type")
-    if gear_type not in GEARS:
-        gear_settings.fail(f"type is {gear_type!r}; there are: {', '.join(GEARS)}")
-    gear = _instance(GEARS[gear_type], gear_settings)
-    gear_settings.finish()
+    gears: dict[str, Model] = {}
+    gear_priors: dict[str, Prior] = {}
+    if "gears" in settings:
+        gears, gear_priors = take_gears(settings, effects)
+        if not gears:
+            settings.fail("[gears] is empty; write each gear as [gears.NAME]")
+        model = Model(next(iter(gears.values())).gear)
+    else:
+        model = Model(take_gear(settings.table("gear")))
     own_soil, prior = _take_soil(settings.table("soil"))
-    model = Model(gear)
-    for entry in settings.tables("effect"):
-        name = entry.text("name")
-        if name not in effects:
-            entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
-        priors = entry.table("prior")
-        try:
-            model = model + _instance(effects[name], entry)
-        except InputError as error:
-            entry.fail(str(error).removeprefix(f"{entry.where}: "))
-        entry.finish()
-        prior |= {f"{name}.{k}": v for k, v in _take_priors(priors, effects[name]).items()}
+    model, effect_priors = take_effects(settings.tables("effect"), effects, model)
+    for name, other in gears.items():
+        for effect in model.effects:
+            if not effect.applies_to(other.gear):
+                settings.fail(
+                    f"the effect {effect.name} does not apply to the gear {name!r}; write it for "
+                    "the others, as [[gears.NAME.effect]]"
+                )
+    prior |= effect_priors | gear_priors
     noise = {}
     noise_settings = settings.table("noise")
     noise_settings.permit(COLUMNS)
@@ -149,23 +230,7 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
     discrepancy = take_discrepancy(settings.table("discrepancy"))
-    return Case(model, own_soil, prior, noise, discrepancy)
-
-
-def _instance(cls: type, settings: Settings) -> Any:
-    """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
-    values = {
-        f.name: (settings.text if isinstance(f.default, str) else settings.number)(f.name)
-        for f in fields(cls)
-        if f.name in settings or f.default is MISSING
-    }
-    settings.permit(f.name for f in fields(cls))
-    try:
-        made = cls(**values)
-    except InputError as error:
-        settings.fail(str(error))
-    check(made, f"{settings.where}: ")
-    return made
+    return Case(model, own_soil, prior, noise, discrepancy, gears)
 
 
 def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
@@ -181,22 +246,6 @@ def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
         made = with_values(base, values)
         check(made, f"{settings.where}: ")
     else:
-        made = _instance(Soil, settings)
+        made = take_instance(Soil, settings)
     settings.finish()
-    return made, _take_priors(priors, Soil)
-
-
-def _take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
-    priors = {}
-    settings.permit(declared(cls))
-    for key, parameter in declared(cls).items():
-        if key in settings:
-            prior = take_prior(settings, key)
-            if not parameter.lower <= prior.lower < prior.upper <= parameter.upper:
-                settings.fail(
-                    f"{key} is [{prior.lower:g}, {prior.upper:g}]; it must lie between "
-                    f"{parameter.lower:g} and {parameter.upper:g} {parameter.unit}"
-                )
-            priors[key] = prior
-    settings.finish()
-    return priors
+    return made, take_priors(priors, Soil)

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import discrepancy_as_settings
+from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.parameters import declared
+from soilml.physics.effects import Effect
+from soilml.physics.gears.base import Gear
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.soils import Soil
 
@@ -19,14 +22,14 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     `comments` becomes a comment at the top.
     """
     lines = [f"# {line}" for line in comments]
-    lines += ["[gear]", f'type = "{case.model.gear.name}"']
-    lines += [
-        f"{k} = {_number(getattr(case.model.gear, k))}" for k in declared(type(case.model.gear))
-    ]
-    braking = getattr(case.model.gear, "braking", RigidWheel.braking)
-    if braking != RigidWheel.braking:
-        lines.append(f'braking = "{braking}"')
-    lines += ["", "[soil]"]
+    if not case.gears:
+        lines += ["[gear]", *_gear_lines(case.model.gear), ""]
+    for name, model in case.gears.items():
+        key = name if name == UNNAMED_GEAR else f"gears.{name}"
+        lines += [f"[{key}]", *_gear_lines(model.gear), ""]
+        for effect in model.effects:
+            lines += [*_effect_lines(case, effect, f"{key}.effect", f"{effect.name}@{name}"), ""]
+    lines += ["[soil]"]
     lines += [f"{k} = {_number(getattr(case.soil, k))}" for k in declared(Soil)]
     soil_prior = {path: prior for path, prior in case.prior.items() if "." not in path}
     if soil_prior:
@@ -40,17 +43,30 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         settings = discrepancy_as_settings(case.discrepancy)
         lines += [f"{key} = {_setting(value)}" for key, value in settings.items()]
     for effect in case.model.effects:
-        lines += ["", "[[effect]]", f'name = "{effect.name}"']
-        default = type(effect)()
-        for key in declared(type(effect)):
-            if float(getattr(effect, key)) != float(getattr(default, key)):
-                lines.append(f"{key} = {_number(getattr(effect, key))}")
-        priors = {p: v for p, v in case.prior.items() if p.startswith(f"{effect.name}.")}
-        if priors:
-            lines.append("[effect.prior]")
-            for path, prior in priors.items():
-                lines.append(f"{path.rpartition('.')[2]} = {_setting(prior.as_setting())}")
+        lines += ["", *_effect_lines(case, effect, "effect", effect.name)]
     return "\n".join(lines) + "\n"
+
+
+def _gear_lines(gear: Gear) -> list[str]:
+    """Type and dimensions of a gear."""
+    dimensions = [f"{k} = {_number(getattr(gear, k))}" for k in declared(type(gear))]
+    braking = getattr(gear, "braking", RigidWheel.braking)
+    law = [f'braking = "{braking}"'] if braking != RigidWheel.braking else []
+    return [f'type = "{gear.name}"', *dimensions, *law]
+
+
+def _effect_lines(case: Case, effect: Effect, table: str, path: str) -> list[str]:
+    """An effect with its priors, which are those below `path`."""
+    lines, default = [f"[[{table}]]", f'name = "{effect.name}"'], type(effect)()
+    for key in declared(type(effect)):
+        if float(getattr(effect, key)) != float(getattr(default, key)):
+            lines.append(f"{key} = {_number(getattr(effect, key))}")
+    priors = {p: v for p, v in case.prior.items() if p.startswith(f"{path}.")}
+    if priors:
+        lines.append(f"[{table}.prior]")
+        for name, prior in priors.items():
+            lines.append(f"{name.rpartition('.')[2]} = {_setting(prior.as_setting())}")
+    return lines
 
 
 def _number(value: object) -> str:

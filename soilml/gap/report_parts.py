@@ -157,7 +157,7 @@ class NextRun:
     kind: str
     text: str
     discrimination: float  # expected, in sigma, between the remaining explanations
-    rows: tuple[dict[str, float], ...]  # operating points and predictions of each explanation
+    rows: tuple[dict[str, float | str], ...]  # operating points and predictions of each explanation
     cost: float | None = None  # where costs are given, in their unit
 
 

@@ -48,10 +48,10 @@ from soilml.gap.search.verdict import (
     signature_similarity,
     soil_estimates,
 )
+from soilml.gap.statistics.candidate_effects import candidate_effects, effect_names
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table
-from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
 
@@ -128,7 +128,7 @@ def gap(
     >>> gap(case, Table(columns)).status
     'no-gap'
     """
-    effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
+    effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
     check_wheel_size(case, table)
     usable = table.answered
@@ -240,7 +240,7 @@ def _build_report(
         report = _with_effects(report, analysis, decision)
     if result.has_gap:
         report = _with_disagreement(report, analysis, none, shown if decision.shown else none, seed)
-    effects_before = [e.name for e in case.model.effects]
+    effects_before = effect_names(case)
     return replace(
         report,
         sentence=verdict_sentence(report, effects_before),
@@ -286,4 +286,4 @@ def _fixed_parameters(case: Case, free: Sequence[FreeParameter]) -> list[str]:
     """Soil and gear parameters that were fixed at the values of the model file."""
     freed = {f.path for f in free}
     soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
-    return [*soil, *(f"gear.{name}" for name in declared(type(case.model.gear)))]
+    return [*soil, *(path for path in case.parameters() if path.startswith(("gear.", "gears.")))]

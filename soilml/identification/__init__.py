@@ -90,6 +90,8 @@ def identify(
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
+    if method in CLOSED_FORM and case.gears:
+        raise InputError(f"the {method} method is for one gear, in [gear]; take nonlinear")
     if method in CLOSED_FORM and not isinstance(case.model.gear, RigidWheel):
         raise InputError(
             f"the {method} method is for rigid wheels, not for a {case.model.gear.name}; take "

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.config.case import Case, take_case
+from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError, TableError
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
@@ -60,10 +61,40 @@ def check_wheel_columns(
 
 
 def check_wheel_size(case: Case, table: Table) -> None:
-    """Raise `TableError` for a table whose wheel columns have another size than the case's gear."""
+    """Raise `TableError` for a table whose gears, or their sizes, are not those of the case."""
+    names = np.unique(table["gear"]) if "gear" in table else np.asarray([""])
+    if case.gears:
+        _check_gear_names(case, table)
+        for name in names:
+            rows = table.rows(table["gear"] == name) if "gear" in table else table
+            check_wheel_size(case.of_gear(name or UNNAMED_GEAR), rows)
+        return
+    if names.size > 1:
+        raise TableError(
+            f"{table.source}: column gear names {', '.join(filter(None, names))}, and the model "
+            "has one gear; write each as [gears.NAME], or select rows with --where gear=NAME"
+        )
     sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}
     hint = "select rows with --where run=NAME, or correct [gear]"
     check_wheel_columns(table, sizes, "the model's wheel has", hint)
+
+
+def _check_gear_names(case: Case, table: Table) -> None:
+    """Raise `TableError` for a row whose gear is not among the several gears of a case."""
+    known = ", ".join(case.gears)
+    if "gear" not in table:
+        if UNNAMED_GEAR not in case.gears:
+            raise TableError(
+                f"{table.source}: column gear is missing; the model file has several gears: {known}"
+            )
+        return
+    named = np.where(table["gear"] == "", UNNAMED_GEAR, table["gear"])
+    if (wrong := ~np.isin(named, list(case.gears))).any():
+        row = int(np.argmax(wrong))
+        given = f"{str(table['gear'][row])!r} given" if table["gear"][row] else "the cell is blank"
+        raise TableError(
+            f"{table.place(row)}, column gear: {given}; the model file has the gears {known}"
+        )
 
 
 def gear_differences(case: Case, other: Case) -> Iterator[str]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.identification.observations import Observations
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.identification.operating_points import gear_numbers
+from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import QUANTITIES, column
 
 Floats = NDArray[np.float64]
@@ -20,9 +21,9 @@ def discrepancy_columns(case: Case, data: Observations) -> tuple[Floats, ...]:
     """For each channel, columns (k_c, q_c) of its discrepancy at its k_c readings.
 
     The product of the columns with their transpose is the covariance. A channel without
-    discrepancy has no columns.
+    discrepancy has no columns. The errors for several gears are independent.
     """
-    parts = []
+    gear, parts = gear_numbers(data.at), []
     for channel in data.channels:
         measured = np.isfinite(channel.reading)
         own = case.discrepancy.get(column(channel.name), Discrepancy())
@@ -33,7 +34,7 @@ def discrepancy_columns(case: Case, data: Observations) -> tuple[Floats, ...]:
         points = slip_load_points(
             data.slip[measured], data.load[measured], own.slip_length, own.log_load_length
         )
-        parts.append(process_columns(points, amplitude))
+        parts.append(independent_process_columns(points, gear[measured], amplitude))
     return tuple(parts)
 
 

@@ -123,12 +123,23 @@ def _notes(case: Case, table: Table) -> list[str]:
     runs = len(np.unique(table["run"])) if "run" in table else 1
     if runs > 1:
         notes.append(f"{runs} runs are fitted as one soil")
+    if case.gears:
+        for name in case.gears:
+            rows = table.rows(operating_points(table).gear == name) if "gear" in table else table
+            notes += _grouser_note(case.of_gear(name), rows, f"the gear {name}")
+    else:
+        notes += _grouser_note(case, table, "the model")
+    return notes
+
+
+def _grouser_note(case: Case, table: Table, owner: str) -> list[str]:
+    """Whether the wheel of a table has grousers that the model lacks."""
     lugs = QUANTITIES["grouser_height"].column
     if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
         height = float(np.nanmax(table[lugs]))
         if not any(effect.name == "grousers" for effect in case.model.effects):
-            notes.append(f"{lugs} is {height:g}, but the model has no effect grousers")
-    return notes
+            return [f"{lugs} is {height:g}, but {owner} has no effect grousers"]
+    return []
 
 
 def declared_std(case: Case, table: Table, key: str) -> Floats:

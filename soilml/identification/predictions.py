@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.observations import Observations
+from soilml.identification.operating_points import rows_by_gear
+from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
@@ -25,6 +28,8 @@ def predict_channels(
     case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
 ) -> dict[str, Floats]:
     """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
+    if case.gears:
+        return _predict_by_gear(case, free, u, at)
     values = {f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)}
     changed = case.with_values(values)
     force = changed.model(changed.soil, at)
@@ -34,6 +39,35 @@ def predict_channels(
         "drawbar_pull": np.broadcast_to(force.drawbar_pull, shape),
         "sinkage": np.broadcast_to(force.sinkage, shape),
     }
+
+
+def forces(case: Case, at: Operating) -> Force:
+    """Forces (n,) of a case at operating points (n,), which several gears may have driven."""
+    if not case.gears:
+        return case.model(case.soil, at)
+    count = np.broadcast(at.slip, at.load).size
+    joined: dict[str, Any] = {
+        f.name: np.zeros(count, np.int64 if f.name == "status" else np.float64)
+        for f in fields(Force)
+    }
+    for part in rows_by_gear(case, at):
+        force = part.case.model(part.case.soil, part.at)
+        for name, values in joined.items():
+            values[part.rows] = getattr(force, name)
+    return Force(**joined)
+
+
+def _predict_by_gear(
+    case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
+) -> dict[str, Floats]:
+    """The same for rows of several gears, with one call of the model for each gear."""
+    total = {name: np.full((len(u), np.shape(at.slip)[0]), np.nan) for name in CHANNELS}
+    for part in rows_by_gear(case, at):
+        kept = [i for i, f in enumerate(free) if f.path in part.paths]
+        own = [replace(free[i], path=part.paths[free[i].path]) for i in kept]
+        for name, values in predict_channels(part.case, own, u[:, kept], part.at).items():
+            total[name][:, part.rows] = values
+    return total
 
 
 def stack_channels(data: Observations, channels: dict[str, Floats]) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 #: Most points that represent the process. Points closer to each other than the correlation lengths
 #: add little: a hundred at slips from -0.5 to 1 and loads within a factor of ten, at the usual
@@ -64,6 +65,29 @@ def process_columns(
     basis = vector[:, kept] / np.sqrt(eigenvalue[kept])
     unit = _squared_exponential(points, centres) @ basis
     return np.asarray(np.reshape(amplitude, (-1, 1)) * unit)
+
+
+def independent_process_columns(
+    points: Floats,
+    group: Integers,
+    amplitude: float = 1.0,
+    least_eigenvalue: float = LEAST_EIGENVALUE,
+) -> Floats:
+    """Columns (n, q) of processes of equal covariance, one for each group of points.
+
+    They are those of `process_columns`; a column is zero at the points of other groups.
+
+    Parameters
+    ----------
+    group : array (n,)
+        Number of the group of each point.
+    """
+    parts = [np.zeros((len(points), 0))]
+    for number in np.unique(group):
+        own = process_columns(points[group == number], amplitude, least_eigenvalue)
+        parts.append(np.zeros((len(points), own.shape[1])))
+        parts[-1][group == number] = own
+    return np.concatenate(parts, axis=1)
 
 
 def slip_load_points(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, final
+from typing import Annotated, Any, final
 
 from soilml.arrays import Real
 from soilml.parameters import Parameter
@@ -42,6 +42,8 @@ class Operating:
     slip_angle: Annotated[
         Real | None, Parameter("rad", -1.6, 1.6, "between wheel plane and travel")
     ] = None
+    #: names of the gears that were driven, (n,); a model, which is of one gear, does not read it
+    gear: Any = None
 
 
 #: Optional fields of `Operating`, and the column of each.

@@ -14,6 +14,7 @@ from soilml.cli.advice_text import mean_covariates
 from soilml.cli.options import (
     InputFile,
     add_effects_option,
+    add_gear_option,
     add_row_options,
     available_effects,
     parse_names,
@@ -21,7 +22,7 @@ from soilml.cli.options import (
     read_rows,
 )
 from soilml.cli.output import write_columns
-from soilml.config.case import read_case
+from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
 from soilml.experiment_design import (
     Advice,
@@ -95,6 +96,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="list every candidate, best first")
     add_effects_option(parser)
+    add_gear_option(parser)
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
     parser.add_argument(
@@ -115,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--count is {args.count}; needed is a whole number from 1 to {MAX_COUNT}")
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
-    case = read_case(args.model, available_effects(args))
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     free = select_free(case, parse_names(args.free))
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()

@@ -89,6 +89,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL.toml",
         help="your wheel, soil, priors and noise, for a model file for wheels of any size",
     )
+    parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="write the estimates to this file")
 

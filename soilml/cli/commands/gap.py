@@ -56,6 +56,9 @@ next_runs.csv (runs to measure next); and model_suspected.toml where causes are
 suspected but not named. The exit status is 0 whatever the result and 2 for bad
 input.
 
+Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
+and name it in the column gear. An effect of one wheel is then grousers@NAME.
+
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
 after calibration, in the unit that `soilml effects` lists. --cost second-pass=3
 gives the cost of a kind of run in next_runs.csv, in any unit; runs are then

@@ -44,7 +44,8 @@ measured) and optionally drawbar_pull_N, sinkage_m and <column>_std. Rows whose
 status is not ok are ignored. A channel is used where its noise is declared, in
 [noise] or by <column>_std. All rows are assumed to come from one soil, unless
 --by run asks for a result for each run. Parameters with a prior are
-identified, unless --free names others.
+identified, unless --free names others. Rows of several wheels name theirs,
+one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   nonlinear  bounded least squares on the full model, from several starts

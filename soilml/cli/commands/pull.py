@@ -13,6 +13,7 @@ import numpy as np
 from soilml.cli.options import (
     InputFile,
     add_effects_option,
+    add_gear_option,
     add_row_options,
     available_effects,
     parse_names,
@@ -20,7 +21,7 @@ from soilml.cli.options import (
     read_rows,
 )
 from soilml.cli.output import is_terminal, write_stdout
-from soilml.config.case import read_case
+from soilml.config.case import read_case_of_one_gear
 from soilml.errors import FitError, InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.read_table import RUNS
@@ -85,6 +86,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="take the soil from the estimate of this model file",
     )
     add_effects_option(parser)
+    add_gear_option(parser)
     parser.add_argument(
         "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
     )
@@ -103,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.traction.report import pull_report
 
     _check(args)
-    case = read_case(args.model, available_effects(args))
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     table = read_rows(args, RUNS)
     options: dict[str, Any] = {
         "loads": None if args.load is None else parse_numbers("--load", args.load).tolist(),

@@ -12,11 +12,12 @@ from soilml.cli.options import (
     MAX_ROWS,
     InputFile,
     add_effects_option,
+    add_gear_option,
     available_effects,
     parse_numbers,
 )
 from soilml.cli.output import write_columns
-from soilml.config.case import read_case
+from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
 from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import output_files
@@ -58,6 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--slip-angle", type=float, metavar="RAD", help="angle between wheel plane and path, in rad"
     )
     add_effects_option(parser)
+    add_gear_option(parser)
     parser.add_argument(
         "--run", dest="label", metavar="NAME", help="add a first column `run` with this name"
     )
@@ -71,7 +73,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
-    case = read_case(args.model, available_effects(args))
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
     if slips.size * loads.size > MAX_ROWS:
         raise InputError(

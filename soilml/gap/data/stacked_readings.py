@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.identification.levels import Levels, load_levels, rows_driven_alike, slip_levels
 from soilml.identification.observations import declared_std
-from soilml.identification.operating_points import operating_points
+from soilml.identification.operating_points import gear_numbers, operating_points
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
@@ -73,6 +73,21 @@ class StackedReadings:
     def driven_alike(self) -> Integers:
         """Groups of readings (m,) whose rows are repeats of each other, of all channels."""
         return rows_driven_alike(self.at, self.run, self.slip_std, self.load_std)[self.row]
+
+    @property
+    def gear(self) -> Integers:
+        """Number of the gear that drove each reading, (m,); 0 where none is named."""
+        return gear_numbers(self.at)[self.row]
+
+    def of_rows(self, rows: Integers, at: Operating) -> tuple[NDArray[np.bool_], StackedReadings]:
+        """The readings of some rows, whose operating points are `at`, and which they are, (m,)."""
+        position = np.full(len(self.run), -1)
+        position[rows] = np.arange(rows.size)
+        selected = position[self.row] >= 0
+        part = self.subset(selected)
+        return selected, replace(
+            part, at=at, run=self.run[rows], order=self.order[rows], row=position[part.row]
+        )
 
     def stack(self, force: dict[str, Floats]) -> Floats:
         """Values of each channel by row, (..., n), as one vector, (..., m)."""

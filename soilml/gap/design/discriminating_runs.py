@@ -17,6 +17,7 @@ from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import covariance_at
 from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.candidate_effects import effect_names
 from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.physics.effects.base import Effect
@@ -88,7 +89,7 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
 
 def _effects_of(fits: Iterable[GapFit]) -> list[str]:
     """The effects of some fits, sorted."""
-    return sorted({effect.name for fit in fits for effect in fit.case.model.effects})
+    return sorted({name for fit in fits for name in effect_names(fit.case)})
 
 
 def _with_gear(fit: GapFit, option: RunOption) -> GapFit:
@@ -160,7 +161,9 @@ def _static_proposals(
             )
             for rival, old in zip(rivals, present, strict=True)
         ]
-        row = {f"{column(k)} if {name}": v[k] for name, v in values.items() for k in names}
+        row: dict[str, float | str] = {
+            f"{column(k)} if {name}": v[k] for name, v in values.items() for k in names
+        }
         proposals.append(NextRun(kind, text, _mean_capped(sigmas), (row,)))
     return proposals
 
@@ -222,7 +225,7 @@ def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, flo
 
 def _rows(
     readings: StackedReadings, fits: Mapping[str, GapFit], option: RunOption
-) -> tuple[dict[str, float], ...]:
+) -> tuple[dict[str, float | str], ...]:
     """Operating points and gear of a run with the prediction of each explanation."""
     rows = len(readings.run)
     columns: dict[str, Floats] = {
@@ -238,4 +241,8 @@ def _rows(
         y = predict_readings(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
         for i, channel in enumerate(readings.channels):
             columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
-    return tuple({key: float(values[r]) for key, values in columns.items()} for r in range(rows))
+    found: list[dict[str, float | str]] = []
+    for r in range(rows):
+        named = {} if readings.at.gear is None else {"gear": str(readings.at.gear[r])}
+        found.append(named | {key: float(values[r]) for key, values in columns.items()})
+    return tuple(found)

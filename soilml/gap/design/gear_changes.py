@@ -50,7 +50,12 @@ class GearChange:
 
 
 def gear_changes(case: Case, effects: Sequence[type[Effect]]) -> Iterator[GearChange]:
-    """The changes of the gear that tell some of these effects apart from others."""
+    """The changes of the gear that tell some of these effects apart from others.
+
+    None where a case has several gears: it is those that are there to drive.
+    """
+    if case.gears:
+        return
     names = {effect.name for effect in effects}
     if names & LUG_EFFECTS:
         yield GearChange(SMOOTH_GEAR, "lugs removed or covered")

@@ -21,6 +21,7 @@ from soilml.gap.design.effect_identifiability import (
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
+from soilml.gap.statistics.candidate_effects import candidate_effects
 from soilml.gap.statistics.coordinates import SoilCoordinate, linearise, soil_coordinate
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
@@ -147,7 +148,7 @@ def audit(
     >>> e.name, e.separating_snr > 3.0, round(e.absorbed, 3)
     ('slip-sinkage', True, 0.121)
     """
-    effects = {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
+    effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
     readings = planned_readings(case, design.rows(design.answered))
     selected = select_free(case, free if free is not None or case.prior else SHEAR)

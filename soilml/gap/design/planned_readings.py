@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, positive_std
+from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.operating_points import operating_points
+from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
@@ -24,8 +27,9 @@ USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 
 def planned_readings(case: Case, design: Table) -> StackedReadings:
     """The readings that a case expects of a design, in the channels with declared noise."""
+    check_wheel_size(case, design)
     at = operating_points(design)
-    force = case.model(case.soil, at)
+    force = forces(case, at)
     if np.any(force.status != 0):
         row = int(np.flatnonzero(force.status)[0])
         raise InputError(f"{design.place(row)}: {Status(int(force.status[row])).reason}")
@@ -64,7 +68,7 @@ def expected_readings(
     row = np.tile(np.arange(rows), channels)
     channel = np.repeat(np.arange(channels), rows)
     at = with_default_covariates(at, case)
-    force = case.model(case.soil, at)
+    force = forces(case, at)
     expected = np.stack([getattr(force, name) for name in like.channels], axis=-1)
     reading = expected[row, channel]
     std = np.empty(row.size)
@@ -100,9 +104,10 @@ def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedR
     given = {
         k for k in USUAL_COVARIATES for part in (first, second) if getattr(part.at, k) is not None
     }
+    at = Operating(slip=rows("slip"), load=rows("load"), **{name: rows(name) for name in given})
     return replace(
         first,
-        at=Operating(slip=rows("slip"), load=rows("load"), **{name: rows(name) for name in given}),
+        at=replace(at, gear=_joined_gears(first, second)),
         run=np.concatenate([first.run, second.run + len(first.runs)]),
         runs=(*first.runs, *second.runs),
         order=np.concatenate([first.order, second.order]),
@@ -113,14 +118,24 @@ def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedR
     )
 
 
+def _joined_gears(first: StackedReadings, second: StackedReadings) -> NDArray[np.str_] | None:
+    """The gears of two sets of rows together; None where both name none."""
+    if first.at.gear is None and second.at.gear is None:
+        return None
+    gears = (UNNAMED_GEAR if part.at.gear is None else part.at.gear for part in (first, second))
+    counts = (len(first.run), len(second.run))
+    return np.concatenate([np.broadcast_to(g, n) for g, n in zip(gears, counts, strict=True)])
+
+
 def carried_rows(case: Case, at: Operating) -> NDArray[np.bool_]:
     """Rows (n,) at which the model finds an equilibrium: the soil carries the load."""
-    status = case.model(case.soil, with_default_covariates(at, case)).status
+    status = forces(case, with_default_covariates(at, case)).status
     return np.broadcast_to(np.asarray(status) == 0, np.shape(at.slip))
 
 
 def with_default_covariates(at: Operating, case: Case) -> Operating:
     """The operating points with default values of covariates that the case's effects need."""
-    needs = {field for effect in case.model.effects for field in effect.about.needs}
+    models = (case.model, *case.gears.values())
+    needs = {field for m in models for effect in m.effects for field in effect.about.needs}
     missing = {f: USUAL_COVARIATES[f] for f in needs if getattr(at, f) is None}
     return replace(at, **missing) if missing else at

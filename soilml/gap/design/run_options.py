@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -102,13 +103,24 @@ def run_options(
     for change in gear_changes(case, effects):
         option = run(change.kind, f"the same slips with {change.text}", usual, middle)
         options.append(replace(option, gear=change))
-    for option in options:
+    for option in _with_each_gear(options, case):
         carried = carried_rows(option.changed(case), option.at)
         if carried.sum() >= FEWEST_ROWS:
             plain = None if option.plain is None else _selected(option.plain, carried)
             at = _selected(option.at, carried)
             text = option.text.format(highest=np.max(at.slip))
             yield replace(option, text=text, at=at, plain=plain)
+
+
+def _with_each_gear(options: Sequence[RunOption], case: Case) -> Iterator[RunOption]:
+    """The runs, each with each gear of a case with several."""
+    if not case.gears:
+        yield from options
+    for option, name in product(options, case.gears):
+        gear = np.full(np.shape(option.at.slip), name)
+        plain = None if option.plain is None else replace(option.plain, gear=gear)
+        text = f"{option.text}, with the gear {name}"
+        yield replace(option, text=text, at=replace(option.at, gear=gear), plain=plain)
 
 
 def drivable_slips(low: float, high: float) -> Floats:

@@ -50,7 +50,8 @@ def model_after(report: GapReport) -> str:
 
 def effect_descriptions(report: GapReport) -> dict[str, str]:
     """One-line descriptions of effects by name, from the model and the catalogue."""
-    cards = {e.name: e.about for e in report.model.model.effects}
+    models = (report.model.model, *report.model.gears.values())
+    cards = {e.name: e.about for model in models for e in model.effects}
     cards |= {name: e.about for name, e in EFFECTS.items() if name not in cards}
     return {name: card.text for name, card in cards.items()}
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.statistics.candidate_effects import with_effect
 from soilml.gap.statistics.coordinates import (
     EffectCoordinate,
     FitCoordinate,
@@ -23,7 +24,7 @@ from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.gap.statistics.evidence import DiscrepancyModel
 from soilml.gap.statistics.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.reml_covariance import Covariance
-from soilml.gap.statistics.signatures import current_size, with_effect
+from soilml.gap.statistics.signatures import current_size
 from soilml.physics.effects.base import Effect
 
 Floats = NDArray[np.float64]
@@ -61,9 +62,13 @@ class FitProblem:
         )
 
     def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
-        """The effects of the catalogue without coordinates in a fit."""
+        """The effects of the catalogue without coordinates in a fit.
+
+        An effect that all gears share and the same effect of one gear exclude each other.
+        """
         fitted = {c.effect for c in fit.coordinates if isinstance(c, EffectCoordinate)}
-        return {name: effect for name, effect in self.effects.items() if name not in fitted}
+        excluded = {other for name in fitted for other in self.effects if _exclude(name, other)}
+        return {name: effect for name, effect in self.effects.items() if name not in excluded}
 
     def with_effects(self, names: Sequence[str]) -> Case:
         """The case with these effects added."""
@@ -169,3 +174,9 @@ def _raised(fit: GapFit | InputError) -> GapFit:
     if isinstance(fit, InputError):
         raise fit
     return fit
+
+
+def _exclude(name: str, other: str) -> bool:
+    """Whether two effects are the same one, or one of them is the other for a single gear."""
+    (base, _, gear), (other_base, _, other_gear) = name.partition("@"), other.partition("@")
+    return name == other or (base == other_base and not (gear and other_gear))

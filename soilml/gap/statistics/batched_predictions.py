@@ -14,6 +14,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.statistics.joined_cases import CaseSets, join_key, joined_load_case
+from soilml.gap.statistics.readings_by_gear import GearReadings, readings_by_gear
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
@@ -45,6 +46,16 @@ class PredictionRequest:
     readings: StackedReadings
     estimate: SinkageEstimate | None = None
 
+    def of_gear(self, part: GearReadings) -> PredictionRequest:
+        """The same for the readings of one of several gears."""
+        estimate = self.estimate
+        if estimate is not None:
+            log_sinkage, slope = estimate.log_sinkage[:, part.rows], estimate.slope[:, part.rows]
+            estimate = replace(estimate, log_sinkage=log_sinkage, slope=slope)
+        return PredictionRequest(
+            part.case, part.coordinates, self.x[:, part.kept], part.readings, estimate
+        )
+
     def case_sets(self, x: Floats) -> CaseSets:
         """The case at coordinates x (sets, p)."""
         values = {c.path: c.value(x[:, i]) for i, c in enumerate(self.coordinates)}
@@ -72,7 +83,7 @@ def predict_many(requests: Sequence[PredictionRequest]) -> list[Floats | InputEr
 
     A request whose values the model refuses has the `InputError` in place of predictions.
     """
-    return _answered(requests, _predict_joined)
+    return _by_gear(requests, lambda own: _answered(own, _predict_joined), _joined_predictions)
 
 
 def linearise_many(requests: Sequence[PredictionRequest]) -> list[Linearisation | InputError]:
@@ -83,11 +94,71 @@ def linearise_many(requests: Sequence[PredictionRequest]) -> list[Linearisation 
     bound. A reading without equilibrium is NaN, and so are its derivatives. An `InputError` is
     returned as by `predict_many`.
     """
+    return _by_gear(requests, _linearise_each, _joined_linearisations)
+
+
+def _linearise_each(requests: Sequence[PredictionRequest]) -> list[Linearisation | InputError]:
     found = _answered(requests, _linearise_joined)
     return [
         one if isinstance(one, InputError) else _with_derivatives(request, one)
         for request, one in zip(requests, found, strict=True)
     ]
+
+
+def _by_gear(
+    requests: Sequence[PredictionRequest],
+    answer: Callable[[Sequence[PredictionRequest]], list[T | InputError]],
+    join: Callable[[PredictionRequest, Sequence[GearReadings], Sequence[T]], T],
+) -> list[T | InputError]:
+    """Answers to all requests; one of several gears is asked for each gear, and joined again."""
+    parts = [
+        list(readings_by_gear(r.case, r.coordinates, r.readings)) if r.case.gears else None
+        for r in requests
+    ]
+    asked: list[PredictionRequest] = []
+    for request, own in zip(requests, parts, strict=True):
+        asked += [request] if own is None else [request.of_gear(part) for part in own]
+    found = iter(answer(asked))
+    answers: list[T | InputError] = []
+    for request, own in zip(requests, parts, strict=True):
+        if own is None:
+            answers.append(next(found))
+            continue
+        each = [next(found) for _ in own]
+        refused = [one for one in each if isinstance(one, InputError)]
+        known = [one for one in each if not isinstance(one, InputError)]
+        answers.append(refused[0] if refused else join(request, own, known))
+    return answers
+
+
+def _joined_predictions(
+    request: PredictionRequest, parts: Sequence[GearReadings], found: Sequence[Floats]
+) -> Floats:
+    y = np.full((len(request.x), len(request.readings)), np.nan)
+    for part, own in zip(parts, found, strict=True):
+        y[:, part.selected] = own
+    return y
+
+
+def _joined_linearisations(
+    request: PredictionRequest, parts: Sequence[GearReadings], found: Sequence[Linearisation]
+) -> Linearisation:
+    """Linearisations of each gear together: a coordinate changes nothing where it does not act."""
+    m, n, p = len(request.readings), len(request.readings.run), len(request.coordinates)
+    joined = Linearisation(
+        prediction=np.full(m, np.nan),
+        jacobian=np.zeros((m, p)),
+        log_sinkage=np.full(n, np.nan),
+        log_sinkage_rate=np.zeros((p, n)),
+        slope=np.full(n, np.nan),
+    )
+    for part, own in zip(parts, found, strict=True):
+        joined.prediction[part.selected] = own.prediction
+        joined.jacobian[np.ix_(part.selected, part.kept)] = own.jacobian
+        joined.log_sinkage[part.rows] = own.log_sinkage
+        joined.log_sinkage_rate[np.ix_(part.kept, part.rows)] = own.log_sinkage_rate
+        joined.slope[part.rows] = own.slope
+    return joined
 
 
 def _answered(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.identification.operating_points import gear_numbers
+from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -27,7 +28,7 @@ SMALLEST = 1e-300
 
 @dataclass(frozen=True)
 class DiscrepancyProcess:
-    r"""A zero-mean Gaussian process for each channel, in a basis of its eigenfunctions.
+    r"""A zero-mean Gaussian process for each channel and gear, in a basis of its eigenfunctions.
 
     .. math::
         \delta_c(s, W) = \tau_c u_c \sum_k w_k \psi_k(s, \ln W), \quad w_k \sim N(0, 1), \quad
@@ -36,12 +37,12 @@ class DiscrepancyProcess:
     Attributes
     ----------
     columns : array (m, q)
-        The functions u_c psi_k at the readings; each is zero outside its channel.
+        The functions u_c psi_k at the readings; each is zero outside its channel and gear.
     channel : array (q,)
         Channel of each column.
     usual : array (channels,)
         u_c, the standard deviation of a usual discrepancy in the unit of the channel. Amplitudes
-        tau_c are in this unit.
+        tau_c are in this unit; all gears share them.
 
     References
     ----------
@@ -69,7 +70,9 @@ def discrepancy_process(
     slip = np.asarray(readings.at.slip, dtype=np.float64)
     load = np.asarray(readings.at.load, dtype=np.float64)
     points = slip_load_points(slip, load, lengths.slip_length, lengths.log_load_length)
-    functions = process_columns(points, least_eigenvalue=LEAST_EIGENVALUE)
+    functions = independent_process_columns(
+        points, gear_numbers(readings.at), least_eigenvalue=LEAST_EIGENVALUE
+    )
     columns, channel, usual = [], [], []
     for i, name in enumerate(readings.channels):
         in_channel = readings.channel == i

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from graphlib import TopologicalSorter
 from itertools import pairwise
 from typing import Any
@@ -16,7 +16,7 @@ from soilml.parameters import check
 from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
-from soilml.physics.operating_point import Operating
+from soilml.physics.operating_point import COVARIATES, Operating
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def join_key(part: CaseSets) -> Hashable:
     They share gear and known covariates. Effects on stresses act at all points of every contact,
     so that rows without such an effect are kept apart from those that have it.
     """
-    known = tuple(f.name for f in fields(Operating) if getattr(part.at, f.name) is not None)
+    known = tuple(name for name in COVARIATES if getattr(part.at, name) is not None)
     on_stress = frozenset(e.name for e in part.case.model.effects if e.overrides("on_stress"))
     return part.case.model.gear, known, on_stress
 
@@ -110,11 +110,11 @@ def _with_effects(case: Case, effects: Mapping[str, type[Effect]]) -> Case:
 def _joined_operating(parts: Sequence[CaseSets]) -> Operating:
     """The operating points of all rows."""
     known: dict[str, Floats] = {}
-    for field in fields(Operating):
-        if getattr(parts[0].at, field.name) is not None:
+    for name in ("slip", "load", *COVARIATES):
+        if getattr(parts[0].at, name) is not None:
             columns: list[Floats] = []
             for part in parts:
-                column = getattr(part.at, field.name)
+                column = getattr(part.at, name)
                 columns += [np.broadcast_to(column, part.points)] * part.sets
-            known[field.name] = np.concatenate(columns)
+            known[name] = np.concatenate(columns)
     return Operating(**known)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from soilml.gap.statistics.batched_predictions import (
     linearise_many,
     predict_many,
 )
+from soilml.gap.statistics.candidate_effects import gears_differ, with_effect
 from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
 from soilml.identification.levels import covariate_levels
 from soilml.physics.effects.base import Effect
@@ -50,14 +50,6 @@ class Untestable:
     reason: str
 
 
-def with_effect(case: Case, effect: type[Effect]) -> Case:
-    """The case with an effect added at its neutral size, or unchanged if it has the effect."""
-    if any(own.name == effect.name for own in case.model.effects):
-        return case
-    neutral: Any = effect()
-    return replace(case, model=case.model + neutral)
-
-
 def current_size(case: Case, path: str, unit: float) -> float:
     """Coordinate of an effect's size in the case, in reference sizes; 0 where it is absent."""
     parameters = case.parameters()
@@ -79,14 +71,14 @@ def effect_signatures(
     reasons: dict[str, str] = {}
     changes: dict[str, tuple[EffectCoordinate, float, float]] = {}
     for name, effect in effects.items():
-        if reason := _missing_covariate(effect, readings):
+        if reason := _missing_covariate(case, effect, readings):
             reasons[name] = reason
             continue
         size = size_coordinate(effect, None)
-        at = current_size(case, size.path, size.prior.upper)
-        step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
         try:
             changed = with_effect(case, effect)
+            at = current_size(changed, size.path, size.prior.upper)
+            step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
         except InputError as error:
             reasons[name] = str(error)
             continue
@@ -110,9 +102,9 @@ def effect_signatures(
     return signatures, [Untestable(name, reasons[name]) for name in effects if name in reasons]
 
 
-def _missing_covariate(effect: type[Effect], readings: StackedReadings) -> str:
-    """Which covariate these runs lack to test an effect; empty where they have it."""
-    if effect.about.varied:
+def _missing_covariate(case: Case, effect: type[Effect], readings: StackedReadings) -> str:
+    """What these runs lack to test an effect; empty where they have it."""
+    if effect.about.varied and not gears_differ(case, effect.about.varied_dimension):
         return f"needs {effect.about.varied}"
     for field in effect.about.needs:
         value = getattr(readings.at, field)

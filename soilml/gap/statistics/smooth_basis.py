@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
 
 
 def smooth_basis(readings: StackedReadings) -> Floats:
-    """Products of Legendre polynomials of slip and log load for each channel, (m, q).
+    """Products of Legendre polynomials of slip and log load for each channel and gear, (m, q).
 
     Each column is in the unit of its channel's noise. The degree is limited by the number of
     levels of slip and load.
@@ -34,8 +35,8 @@ def smooth_basis(readings: StackedReadings) -> Floats:
         min(LOAD_DEGREE, readings.load_levels.count - 1),
     )
     columns = []
-    for channel in range(len(readings.channels)):
-        in_channel = readings.channel == channel
+    for channel, gear in product(range(len(readings.channels)), np.unique(readings.gear)):
+        in_channel = (readings.channel == channel) & (readings.gear == gear)
         most = int(in_channel.sum()) // READINGS_PER_FUNCTION
         for i, j in _orders(*degrees)[:most]:
             basis = np.polynomial.legendre.Legendre.basis(i)(slip)

@@ -56,8 +56,10 @@ class EffectCard:
     track: bool = False
     #: fields of `Operating` that must be given, and must vary for the effect to be identifiable
     needs: tuple[str, ...] = ()
-    #: what the runs of one model cannot vary, so that a search for missing effects cannot test it
+    #: what the runs of one gear cannot vary, so that a search for missing effects cannot test it
     varied: str = ""
+    #: the dimension of the gear whose variation between several gears is what `varied` asks for
+    varied_dimension: str = ""
     #: for sensors and rigs: standard deviation of the fault that remains in a checked setup, in the
     #: unit of the effect's size; None where it is unknown
     calibration: float | None = None

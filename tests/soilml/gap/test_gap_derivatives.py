@@ -13,6 +13,7 @@ from soilml.gap.statistics.batched_predictions import (
     linearise_many,
     predict_many,
 )
+from soilml.gap.statistics.candidate_effects import with_effect
 from soilml.gap.statistics.coordinates import (
     linearise,
     predict_readings,
@@ -21,7 +22,6 @@ from soilml.gap.statistics.coordinates import (
 )
 from soilml.gap.statistics.joined_cases import CaseSets, joined_load_case
 from soilml.gap.statistics.least_squares import FitRequest, descend_together
-from soilml.gap.statistics.signatures import with_effect
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.nearby_equilibrium import SinkageEstimate

@@ -38,6 +38,7 @@ class SmallWheelStiffness(SlipLoadScaling):
         reference={"exponent": -0.3},
         signs={"sinkage": -1},
         varied="wheels of several diameters: with one it is a change of kc and kphi",
+        varied_dimension="radius",
         isolate="the same runs with a wheel of another diameter; plate tests of the soil",
     )
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
