@@ -29,7 +29,7 @@ from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
-KEEP_EVERY = 20
+KEEP_EVERY = 5
 
 
 def run() -> None:

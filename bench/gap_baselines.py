@@ -116,10 +116,17 @@ def remainders(
     from sklearn.preprocessing import PolynomialFeatures
 
     def features(rows: Table) -> np.ndarray:
-        return np.column_stack([rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4])
+        columns = [rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4]
+        if "gear" in rows:
+            columns.append(np.unique(rows["gear"], return_inverse=True)[1])
+        return np.column_stack(columns)
+
+    width = features(table).shape[1]
 
     def process() -> GaussianProcessRegressor:
-        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0, 1.0], (0.2, 20.0)) + WhiteKernel(1.0)
+        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * width, (0.2, 20.0)) + WhiteKernel(
+            1.0
+        )
         return GaussianProcessRegressor(kernel, random_state=0)
 
     makers = {"Gaussian process": process}

@@ -15,7 +15,7 @@ from soilml.gap.statistics.signatures import effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.numerics.subspaces import project_out
-from soilml.physics.effects import EFFECTS
+from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import column
 
 #: Correlation lengths of the discrepancy that is counted as noise, in slip and log load: the
@@ -36,6 +36,15 @@ class Separation:
     rival: str
 
 
+def testable_effects(case: Case) -> dict[str, type[Effect]]:
+    """The effects of the catalogue that suit the gears of a case, by name."""
+    if getattr(case, "gears", {}):
+        from soilml.gap.statistics.candidate_effects import candidate_effects
+
+        return candidate_effects(case, EFFECTS)
+    return {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
+
+
 def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
     """The separation of a set's causes at their true sizes and on the true soil."""
     causes = {cause["name"]: cause for cause in truth["causes"]}
@@ -43,7 +52,7 @@ def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
         return Separation(0.0, 0.0, "")
     true_case = case.with_values(truth["soil"])
     readings = stack_readings(true_case, table)
-    effects = {n: e for n, e in EFFECTS.items() if e.applies_to(case.model.gear)}
+    effects = testable_effects(case)
     columns = {s.name: s.column for s in effect_signatures(true_case, readings, effects)[0]}
     own = _own_signatures(causes, columns, truth, readings)
     free = select_free(case, None)

@@ -1,5 +1,6 @@
 """The benchmark of the gap workflow: how records are judged, and what the runs of a set show."""
 
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -13,10 +14,12 @@ from soilml.io.table import Table
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
+import gap_case
 import gap_pages
 import gap_records
 import gap_reliability
 import gap_table
+from gap_case import judged
 from gap_separation import separation
 
 
@@ -172,3 +175,26 @@ def test_separation_falls_with_noise_discrepancy_and_fewer_channels():
     assert separated(tier="N0", cause="", size=0.0).signal == 0.0
     assert separated(design="unequal-soils").signal < plain.signal
     assert separated(tier="M", cause="slip-sinkage+bulldozing").snr <= plain.signal
+
+
+@pytest.mark.slow
+def test_a_set_is_analysed_and_compared_with_its_truth():
+    plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 7, discrepancy=0.01)
+    found = judged((1, plan))
+    assert found["truth"] == ("slip-sinkage",) and found["catalogued"] and found["rows"] == 64
+    assert found["snr"] > 3.0 and found["seconds"] > 0.0 and found["status"] != "crash"
+    assert set(found["soil"]) == {"cohesion", "friction_angle", "shear_modulus"}
+    assert found["region"]["soil"] > found["region"]["named"] > 0.0 or not found["cause_set"]
+    (kept,) = gap_records.from_json(json.loads(json.dumps([found])))
+    assert kept["truth"] == found["truth"] and kept["cause_set"] == found["cause_set"]
+
+
+def test_a_crash_is_recorded(monkeypatch):
+    def fails(*_, **__):
+        raise ZeroDivisionError("on purpose")
+
+    monkeypatch.setattr(gap_case, "gap", fails)
+    found = judged((0, Plan("N0", "", 0.0, 0.02, 4, "dry-sand", 3, 7)))
+    assert found["status"] == "crash" and "on purpose" in found["sentence"]
+    assert figure([found], "analysis ended by an error").measured.endswith("1/1")
+    assert "crash" in gap_pages.text([found])

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from datagen.blind_sets.catalogue import active_mechanisms
 from datagen.blind_sets.factorial_plan import Plan
-from datagen.blind_sets.mechanism import ActiveMechanisms
+from datagen.blind_sets.mechanism import ActiveMechanisms, Mechanism
 from datagen.blind_sets.noise_processes import (
     AUTOCORRELATION,
     CHANNELS,
     DECLARED_OVER_TRUE,
     Sensor,
+    draw_missing,
     sensors,
     simulate_readings,
 )
@@ -28,22 +29,27 @@ from datagen.blind_sets.run_schedules import (
     design_schedule,
     heavier_schedule,
     slip_range,
+    with_both_gears,
 )
-from datagen.blind_sets.smooth_discrepancy import draw_discrepancy
+from datagen.blind_sets.smooth_discrepancy import draw_discrepancies
 from datagen.blind_sets.soil_families import (
     FAMILIES,
     FREE_PARAMETERS,
     PRIOR,
     RADIUS,
     WIDTH,
+    Wheels,
+    draw_wheels,
     nominal_soil,
 )
 from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
 
 #: Run-to-run scatter, one standard deviation: rad of phi, fraction of the modulus.
 SCATTER_PHI, SCATTER_K = np.deg2rad(0.5), 0.05
-#: Probability that one channel was not measured rather than two, where channels are missing.
-ONE_MISSING = 2.0 / 3.0
+#: Names of the wheels where there are two; mechanisms that only the second has then, because they
+#: belong to its rim.
+GEARS = ("wheel_a", "wheel_b")
+MECHANISMS_OF_ONE_GEAR = ("grousers",)
 #: Smallest sinkage with the discrepancy, over that without: a wheel on soil sinks.
 LEAST_SINKAGE = 0.3
 #: Soils tried before a plan is given up.
@@ -57,11 +63,11 @@ class BlindSet:
     """Measured runs, a held-out region, the analyst's model, and the truth.
 
     `columns` and `region` are columns by name, each (rows,): run, slip, load_N, torque_Nm,
-    drawbar_pull_N, sinkage_m, and the covariates that vary. `region` is 1.3 to 1.6 times heavier
-    than the heaviest run. Channels that were not measured are NaN. `model` is the text of a model
-    file without the hidden mechanism. In `truth`, `runs_true` and `region_true` are the readings
-    without noise; `runs_steady` and `runs_without` are without scatter and discrepancy as well, and
-    `runs_without` and `region_without` without the mechanism.
+    drawbar_pull_N, sinkage_m, the covariates that vary, and gear where there are two. `region` is
+    1.3 to 1.6 times heavier than the heaviest run. Channels that were not measured are NaN. `model`
+    is the text of a model file without the hidden mechanism. In `truth`, `runs_true` and
+    `region_true` are the readings without noise; `runs_steady` and `runs_without` are without
+    scatter and discrepancy as well, `runs_without` and `region_without` without the mechanism.
     """
 
     columns: Columns
@@ -107,23 +113,30 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         runs = design_schedule(plan.design, plan.runs, needs, generator)
         region = heavier_schedule(runs, generator, slip_range(plan.design))
         soil = FAMILIES[plan.soil_family].soil(generator)
-        simulated = [_simulate(d, soil, plan.scatter, active, generator) for d in (runs, region)]
-        steady = _channels(_rows(region, soil), active)
-        bare = [_channels(_rows(d, soil), ()) for d in (runs, region)]
+        wheels: Wheels = ((RADIUS, WIDTH),)
+        if plan.design == "two-gears":
+            alike = any(m.name in MECHANISMS_OF_ONE_GEAR for m, _ in active)
+            wheels, region = draw_wheels(alike, extras), with_both_gears(region)
+        simulated = [
+            _simulate(d, soil, wheels, plan.scatter, active, generator) for d in (runs, region)
+        ]
+        steady = _channels(_rows(region, soil, wheels), region, active)
+        bare = [_channels(_rows(d, soil, wheels), d, ()) for d in (runs, region)]
         if not all(
             np.isfinite(v).all() for p in (*(s for s, _ in simulated), steady, *bare) for v in p
         ):
             continue
-        extra = _discrepancies(plan, (runs, region), simulated[0][0], extras)
+        extra = draw_discrepancies(plan.discrepancy, (runs, region), simulated[0][0], extras)
         true = [_sum(s, e) for (s, _), e in zip(simulated, extra, strict=True)]
         steady = _sum(steady, extra[1])
-        if all(_sinks(t, s) for t, (s, _) in zip(true, simulated, strict=True)):
+        sinkages = [(t[2], s[2]) for t, (s, _) in zip(true, simulated, strict=True)]
+        if all(np.all(one >= LEAST_SINKAGE * other) for one, other in sinkages):
             break
     else:
         raise RuntimeError(f"no soil of the family carries all rows: {plan}")
     declared = sensors(plan.noise)
     nominal = nominal_soil(soil, plan.free, generator)
-    missing = _missing_channels(plan.design, extras)
+    missing = draw_missing(extras) if plan.design == "missing-channels" else ()
     tables = [
         _measure(d, t, declared, plan.tier, missing, generator)
         for d, t in zip((runs, region), true, strict=True)
@@ -131,7 +144,11 @@ def draw_blind_set(plan: Plan) -> BlindSet:
     truth = {
         "plan": asdict(plan),
         "causes": [
-            {"name": c.name, "form": c.form, "parameters": {c.size: {"value": v, "unit": c.unit}}}
+            {
+                "name": _stated_name(c, plan.design),
+                "form": c.form,
+                "parameters": {c.size: {"value": v, "unit": c.unit}},
+            }
             for c, v in active
         ],
         "soil": soil,
@@ -151,13 +168,15 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         "covariates": sorted(COVARIATE_COLUMNS[name] for name in runs.varied),
         "runs_true": _by_channel(true[0]),
         "runs_steady": _by_channel(
-            _channels(_rows(runs, soil), active) if plan.scattered else simulated[0][0]
+            _channels(_rows(runs, soil, wheels), runs, active)
+            if plan.scattered
+            else simulated[0][0]
         ),
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),
     }
-    return BlindSet(tables[0], tables[1], _model(nominal, plan.free, declared), truth)
+    return BlindSet(tables[0], tables[1], _model(nominal, plan.free, wheels, declared), truth)
 
 
 def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
@@ -176,17 +195,24 @@ def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
     (truth_folder / "truth.json").write_text(json.dumps(blind_set.truth, indent=1) + "\n")
 
 
-def _rows(schedule: RunSchedule, soil: dict[str, float]) -> WheelState:
+def _stated_name(mechanism: Mechanism, design: str) -> str:
+    """Name of a cause: that of the mechanism, with its gear where only one of two has it."""
+    of_one = design == "two-gears" and mechanism.name in MECHANISMS_OF_ONE_GEAR
+    return f"{mechanism.name}@{GEARS[1]}" if of_one else mechanism.name
+
+
+def _rows(schedule: RunSchedule, soil: dict[str, float], wheels: Wheels) -> WheelState:
     """States of all rows on one soil."""
     size = schedule.slip.size
-    fixed = {"radius": RADIUS, "width": WIDTH, **soil}
-    full = {name: np.full(size, value) for name, value in fixed.items()}
+    full = {name: np.full(size, value) for name, value in soil.items()}
+    full["radius"], full["width"] = np.array(wheels)[schedule.gear].T
     return WheelState(slip=schedule.slip, load=schedule.load, **schedule.covariates, **full)
 
 
 def _simulate(
     schedule: RunSchedule,
     soil: dict[str, float],
+    wheels: Wheels,
     scatter: float,
     active: ActiveMechanisms,
     generator: np.random.Generator,
@@ -195,18 +221,27 @@ def _simulate(
     runs = int(schedule.run.max()) + 1
     phi = SCATTER_PHI * generator.standard_normal(runs) * scatter
     k = np.exp(SCATTER_K * generator.standard_normal(runs) * scatter)
-    rows = _rows(schedule, soil)
+    rows = _rows(schedule, soil, wheels)
     values = {**vars(rows)}
     values["friction_angle"] = rows.friction_angle + phi[schedule.run]
     values["kc"], values["kphi"] = rows.kc * k[schedule.run], rows.kphi * k[schedule.run]
-    channels = _channels(WheelState(**values), active)
+    channels = _channels(WheelState(**values), schedule, active)
     return channels, {"friction_angle_offset_rad": phi.tolist(), "modulus_factor": k.tolist()}
 
 
-def _channels(rows: WheelState, active: ActiveMechanisms) -> list[Floats]:
-    """Torque (N m), drawbar pull (N) and sinkage (m), in the order of the channels."""
+def _channels(rows: WheelState, schedule: RunSchedule, active: ActiveMechanisms) -> list[Floats]:
+    """Torque (N m), drawbar pull (N) and sinkage (m), in the order of the channels.
+
+    A mechanism of one gear does not act on the rows of the other.
+    """
     reaction: SoilReaction = solve_equilibrium(rows, active)
-    return [reaction.torque, reaction.pull, reaction.sinkage]
+    channels = [reaction.torque, reaction.pull, reaction.sinkage]
+    shared = tuple((m, size) for m, size in active if m.name not in MECHANISMS_OF_ONE_GEAR)
+    if len(shared) == len(active) or not schedule.gear.any():
+        return channels
+    without = solve_equilibrium(rows, shared)
+    pairs = zip(channels, (without.torque, without.pull, without.sinkage), strict=True)
+    return [np.where(schedule.gear > 0, one, other) for one, other in pairs]
 
 
 def _measure(
@@ -218,6 +253,8 @@ def _measure(
     generator: np.random.Generator,
 ) -> Columns:
     columns: Columns = {"run": schedule.names, "slip": schedule.slip, "load_N": schedule.load}
+    if schedule.gear.any():
+        columns["gear"] = np.array(GEARS)[schedule.gear]
     for name, values in zip(CHANNELS, true, strict=True):
         columns[name] = simulate_readings(values, declared[name], schedule.run, tier, generator)
     for name in missing:
@@ -227,44 +264,21 @@ def _measure(
     return columns
 
 
-def _discrepancies(
-    plan: Plan,
-    schedules: tuple[RunSchedule, RunSchedule],
-    true: list[Floats],
-    generator: np.random.Generator,
-) -> tuple[list[Floats], list[Floats]]:
-    """The smooth discrepancy of every channel in the runs and in the region."""
-    if plan.discrepancy == 0.0:
-        none = [[np.zeros(d.slip.size) for _ in CHANNELS] for d in schedules]
-        return none[0], none[1]
-    pairs = [draw_discrepancy(plan.discrepancy, schedules, t, generator) for t in true]
-    return [runs for runs, _ in pairs], [region for _, region in pairs]
-
-
 def _sum(channels: list[Floats], more: list[Floats]) -> list[Floats]:
     return [one + other for one, other in zip(channels, more, strict=True)]
-
-
-def _sinks(true: list[Floats], simulated: list[Floats]) -> bool:
-    """Whether the wheel sinks in every row, the discrepancy included."""
-    return bool(np.all(true[2] >= LEAST_SINKAGE * simulated[2]))
-
-
-def _missing_channels(design: str, generator: np.random.Generator) -> tuple[str, ...]:
-    """Columns that were not measured."""
-    if design != "missing-channels":
-        return ()
-    count = 1 if generator.random() < ONE_MISSING else 2
-    return tuple(str(name) for name in generator.permutation(CHANNELS)[:count])
 
 
 def _by_channel(channels: list[Floats]) -> dict[str, list[float]]:
     return {name: values.tolist() for name, values in zip(CHANNELS, channels, strict=True)}
 
 
-def _model(soil: dict[str, float], free: int, declared: dict[str, Sensor]) -> str:
-    """The text of a model file: wheel, soil, priors of the free parameters, and noise."""
-    lines = ["[gear]", 'type = "wheel"', f"radius = {RADIUS}", f"width = {WIDTH}", "", "[soil]"]
+def _model(soil: dict[str, float], free: int, wheels: Wheels, declared: dict[str, Sensor]) -> str:
+    """The text of a model file: wheel or wheels, soil, priors of the free parameters, noise."""
+    lines = []
+    for i, (radius, width) in enumerate(wheels):
+        section = "gear" if len(wheels) == 1 else f"gears.{GEARS[i]}"
+        lines += [f"[{section}]", 'type = "wheel"', f"radius = {radius}", f"width = {width}", ""]
+    lines += ["[soil]"]
     lines += [f"{name} = {value:.6g}" for name, value in soil.items()]
     lines += ["", "[soil.prior]"]
     lines += [f"{name} = [{PRIOR[name][0]}, {PRIOR[name][1]}]" for name in FREE_PARAMETERS[:free]]

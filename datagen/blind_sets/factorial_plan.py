@@ -68,6 +68,7 @@ DESIGN_COUNTS = {
     "missing-channels": (20, 6),
     "unequal-soils": (20, 10),
     "braking": (16, 6),
+    "two-gears": (16, 4),
 }
 #: Number of runs of designs that prescribe it.
 DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3)}

@@ -19,6 +19,8 @@ AUTOCORRELATION = 0.7
 OUTLIER_FRACTION, OUTLIER_SIGMA = 0.02, 8.0
 #: Declared noise / true noise in tier N4.
 DECLARED_OVER_TRUE = 0.85
+#: Probability that one channel was not measured rather than two, where channels are missing.
+ONE_MISSING = 2.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -69,3 +71,9 @@ def simulate_readings(
     if tier == "N4":
         unit = unit / DECLARED_OVER_TRUE
     return np.asarray(true + std * unit)
+
+
+def draw_missing(generator: np.random.Generator) -> tuple[str, ...]:
+    """One or two channels that were not measured."""
+    count = 1 if generator.random() < ONE_MISSING else 2
+    return tuple(str(name) for name in generator.permutation(CHANNELS)[:count])

@@ -32,6 +32,7 @@ DESIGNS = {
     "missing-channels": "one or two of the three channels were not measured",
     "unequal-soils": "the soil differs from run to run three times as much as usual",
     "braking": "slips from braking to driving",
+    "two-gears": "two wheels of different size, or with and without lugs, at the same points",
 }
 #: Slips of a design that brakes.
 BRAKING_SLIP = (-0.4, 0.6)
@@ -47,12 +48,16 @@ DECOY_PROBABILITY = 0.3
 
 @dataclass(frozen=True)
 class RunSchedule:
-    """Slip, load (N) and covariates of rows, all (rows,); `run` numbers each row's run from 0."""
+    """Slip, load (N) and covariates of rows, all (rows,); `run` numbers each row's run from 0.
+
+    `gear` numbers the wheel of each row from 0.
+    """
 
     run: NDArray[np.int64]
     names: NDArray[np.str_]
     slip: Floats
     load: Floats
+    gear: NDArray[np.int64]
     covariates: dict[str, Floats]
     varied: tuple[str, ...]
 
@@ -63,7 +68,8 @@ def design_schedule(
     """The operating points of a design of `DESIGNS` with a number of runs.
 
     Designs that are not about operating points have those of `sweep`. With repeats, the number of
-    runs is rounded to two loads at least, each driven two or three times.
+    runs is rounded to two loads at least, each driven two or three times. Two gears halve it: each
+    run is driven with both wheels.
     """
     if design in ("one-load", "one-run", "jittered-one-load"):
         level = LOAD[0] * (LOAD[1] / LOAD[0]) ** generator.uniform()
@@ -76,6 +82,9 @@ def design_schedule(
         distinct = max(2, runs // times)
         once = sweep_schedule(distinct, needs, generator, points=POINTS // (distinct * times))
         return _repeated(once, times)
+    if design == "two-gears":
+        once = sweep_schedule(runs // 2, needs, generator, points=POINTS // runs)
+        return with_both_gears(once)
     return sweep_schedule(runs, needs, generator, slip=slip_range(design))
 
 
@@ -144,17 +153,25 @@ def _jittered(schedule: RunSchedule, generator: np.random.Generator) -> RunSched
     return replace(schedule, load=np.round(schedule.load * factor, 2))
 
 
+def with_both_gears(schedule: RunSchedule) -> RunSchedule:
+    """The runs of a schedule with one wheel, then with another."""
+    both = _repeated(schedule, 2)
+    return replace(both, gear=np.arange(2).repeat(schedule.run.size))
+
+
 def _repeated(schedule: RunSchedule, times: int) -> RunSchedule:
-    """The runs of a schedule driven again, one after the other."""
+    """The runs of a schedule driven again, one after the other; they are named after the first."""
     runs = int(schedule.run.max()) + 1
     again = np.arange(times).repeat(schedule.run.size)
     run = np.tile(schedule.run, times) + runs * again
-    names = np.array([f"run_{i + 1:02d}" for i in range(runs * times)])
+    prefix = str(schedule.names[0]).rstrip("0123456789")
+    names = np.array([f"{prefix}{i + 1:02d}" for i in range(runs * times)])
     return RunSchedule(
         run=run,
         names=names[run],
         slip=np.tile(schedule.slip, times),
         load=np.tile(schedule.load, times),
+        gear=np.tile(schedule.gear, times),
         covariates={name: np.tile(v, times) for name, v in schedule.covariates.items()},
         varied=schedule.varied,
     )
@@ -179,6 +196,7 @@ def _schedule(
         names=np.array(names)[run],
         slip=slip,
         load=np.round(load, 2)[run],
+        gear=np.zeros(run.size, dtype=np.int64),
         covariates={
             name: values[name][run] if name in varied else np.full(run.size, constant)
             for name, constant in COVARIATE_DEFAULTS.items()

@@ -23,6 +23,24 @@ ATTEMPTS = 200
 SmoothFunction = Callable[[Floats, Floats], Floats]
 
 
+def draw_discrepancies(
+    rms: float,
+    schedules: tuple[RunSchedule, RunSchedule],
+    true: list[Floats],
+    generator: np.random.Generator,
+) -> tuple[list[Floats], list[Floats]]:
+    """The discrepancies of all channels, independent of each other; zeros for an rms of zero.
+
+    `true` are the noise-free readings of the runs. The other arguments, and the errors, are those
+    of `draw_discrepancy`.
+    """
+    if rms == 0.0:
+        none = [[np.zeros(d.slip.size) for _ in true] for d in schedules]
+        return none[0], none[1]
+    pairs = [draw_discrepancy(rms, schedules, t, generator) for t in true]
+    return [runs for runs, _ in pairs], [region for _, region in pairs]
+
+
 def draw_discrepancy(
     rms: float,
     schedules: tuple[RunSchedule, RunSchedule],

@@ -1,4 +1,4 @@
-"""Three families of soil, and the nominal soil that the analyst receives."""
+"""Wheels, three families of soil, and the nominal soil that the analyst receives."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 RADIUS, WIDTH = 0.15, 0.12  # m, of the wheel
+#: Radius and width of a second wheel, over those of the first.
+SECOND_RADIUS, SECOND_WIDTH = (0.65, 0.95), (0.5, 0.9)
+
+#: Radius and width (m) of each wheel.
+Wheels = tuple[tuple[float, float], ...]
 
 #: Parameters that can be unknown to the analyst: the first three, or all five.
 FREE_PARAMETERS = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
@@ -66,3 +71,11 @@ def nominal_soil(
         value = soil[name] * (1.0 + spread * generator.uniform(-1.0, 1.0))
         result[name] = float(np.clip(value, low + 0.01 * (high - low), high))
     return result
+
+
+def draw_wheels(alike: bool, generator: np.random.Generator) -> Wheels:
+    """Two wheels: of the same size, or the second smaller and narrower."""
+    radius = round(RADIUS * generator.uniform(*SECOND_RADIUS), 3)
+    width = round(WIDTH * generator.uniform(*SECOND_WIDTH), 3)
+    first = (RADIUS, WIDTH)
+    return (first, first if alike else (radius, width))

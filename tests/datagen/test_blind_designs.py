@@ -1,5 +1,6 @@
 """Blind sets with a smooth discrepancy and other designs: as large, and as driven, as they say."""
 
+import tomllib
 from collections import Counter
 from dataclasses import replace
 
@@ -126,6 +127,8 @@ def test_a_design_is_driven_as_it_says(design):
             assert sorted(blank) == sorted(drawn.truth["missing"]) and len(blank) in (1, 2)
             kept = set(CHANNELS) - set(blank)
             assert all(np.isfinite(columns[name]).all() for name in kept)
+        if design == "two-gears":
+            assert Counter(columns["gear"]) == {"wheel_a": 32, "wheel_b": 32}
         if design == "braking":
             assert columns["slip"].min() < -0.2 and columns["slip"].max() > 0.4
             assert drawn.region["slip"].min() < -0.2
@@ -163,7 +166,7 @@ def test_what_was_not_measured_is_blank_and_readable(tmp_path):
 
 def test_the_benchmark_is_spread_over_tiers_discrepancies_and_designs():
     plans = benchmark_plans()
-    assert 600 < len(plans) < 720 and plans == benchmark_plans()
+    assert 600 < len(plans) < 750 and plans == benchmark_plans()
     assert len({plan.seed for plan in plans}) == len(plans)
     assert not {p.seed for p in plans} & {p.seed for p in benchmark_plans(1)}
     assert {plan.design for plan in plans} == set(DESIGNS)
@@ -181,3 +184,28 @@ def test_the_benchmark_is_spread_over_tiers_discrepancies_and_designs():
         if plan.design == "one-run":
             assert plan.runs == 1
             assert not any(m.needs for m in active_mechanisms(plan.tier, plan.cause))
+
+
+def test_two_gears_are_driven_at_the_same_points_on_one_soil():
+    drawn = draw_blind_set(replace(PLAN, design="two-gears"))
+    columns, first = drawn.columns, drawn.columns["gear"] == "wheel_a"
+    assert first.sum() == (~first).sum() == 32 and len(np.unique(columns["run"])) == 8
+    np.testing.assert_array_equal(columns["load_N"][first], columns["load_N"][~first])
+    np.testing.assert_array_equal(columns["slip"][first], columns["slip"][~first])
+    gears = tomllib.loads(drawn.model)["gears"]
+    assert gears["wheel_b"]["radius"] < gears["wheel_a"]["radius"] == RADIUS
+    assert gears["wheel_b"]["width"] < gears["wheel_a"]["width"] == WIDTH
+    true = np.array(drawn.truth["runs_without"]["sinkage_m"])
+    assert (true[~first] > true[first]).all()  # a smaller and narrower wheel sinks deeper
+    assert set(drawn.region["gear"]) == {"wheel_a", "wheel_b"}
+
+
+def test_grousers_are_on_one_of_two_wheels_that_are_alike():
+    drawn = draw_blind_set(replace(PLAN, cause="grousers", design="two-gears"))
+    gears = tomllib.loads(drawn.model)["gears"]
+    assert gears["wheel_a"] == gears["wheel_b"]
+    assert [cause["name"] for cause in drawn.truth["causes"]] == ["grousers@wheel_b"]
+    lugged = drawn.columns["gear"] == "wheel_b"
+    for name in CHANNELS:
+        change = np.array(drawn.truth["runs_true"][name]) - drawn.truth["runs_without"][name]
+        assert not change[~lugged].any() and change[lugged].all()
