@@ -81,14 +81,16 @@ def chance(bins: Sequence[Bin]) -> tuple[float, float]:
 
 
 def save_picture(sets: Sequence[Judged], file: Path) -> None:
-    """Frequency over stated probability, with 95 % intervals of the wide bins."""
+    """Frequency over stated probability, with 95 % intervals; nothing without probabilities."""
+    stated, true = statements(sets)
+    small, wide = equal_bins(stated, true), wide_bins(stated, true)
+    if not wide:
+        return
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    stated, true = statements(sets)
-    small, wide = equal_bins(stated, true), wide_bins(stated, true)
     figure, axes = plt.subplots(figsize=(5.0, 4.6), layout="constrained")
     axes.plot([0, 1], [0, 1], color="0.6", lw=1.0, zorder=0)
     axes.scatter(

@@ -148,6 +148,8 @@ def test_pages_are_written_from_few_records_and_from_kept_ones(tmp_path):
     assert gap_pages.text(gap_records.from_json(kept)) == page
     many = [record(probabilities={"slip-sinkage": p}) for p in np.linspace(0.0, 1.0, 120)]
     assert "reliability" in gap_pages.text(many)
+    gap_reliability.save_picture([null()], tmp_path / "reliability.png")
+    assert not (tmp_path / "reliability.png").exists()
     gap_reliability.save_picture(many, tmp_path / "reliability.png")
     assert (tmp_path / "reliability.png").stat().st_size > 1000
 
