@@ -71,7 +71,6 @@ def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
         assert any("one load only" in reason for reason in found["reasons"])
 
 
-
 def test_the_continuous_law_of_braking_explains_driving_and_braking_far_better(tmp_path, capsys):
     """A smooth wheel, slips -0.7 to 0.9, soil alone: it leaves a third of the misfit."""
     table = Path(DATA) / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"

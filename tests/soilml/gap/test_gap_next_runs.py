@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import case_of, driven, fit_problem
+from gap_sets import candidate, case_of, driven, fit_problem
 
 from soilml.errors import InputError
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.gear_changes import gear_changes
 from soilml.gap.design.run_costs import KINDS, LISTED, check_costs, rank_by_cost
 from soilml.gap.design.run_options import drivable_slips, run_options
-from soilml.gap.results import NextRun
-from soilml.gap.search.candidate_fits import fit_candidate
+from soilml.gap.report_parts import NextRun
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 
@@ -22,7 +21,7 @@ def explained(effect, names, seed=2, **how):
     case = case_of()
     problem = fit_problem(case, driven(case, [effect], seed=seed, **how))
     start = problem.fit_soil([np.full(3, 0.5)]).start_values()
-    return problem, [fit_candidate(problem, [name], start) for name in names]
+    return problem, [candidate(problem, [name], start) for name in names]
 
 
 @pytest.fixture(scope="module")

@@ -174,7 +174,7 @@ def test_the_held_out_region_lies_between_levels(scatter, region):
     loads = tuple(one_level) if scatter else (40.0, 41.0, 60.0, 61.0, 90.0, 91.0)
     problem = fit_problem(case, driven(case, noise=0.0, slips=6, loads=loads))
     soil = problem.fit_soil([np.full(3, 0.5)])
-    assert held_out_region(problem, soil, soil).description.startswith(region)
+    assert held_out_region(problem, alone(soil), alone(soil)).description.startswith(region)
 
 
 def test_rows_that_took_no_part_are_predicted_as_well(dug, named):

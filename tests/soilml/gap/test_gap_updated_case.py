@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven, fit_problem
+from gap_sets import MODEL, candidate, case_of, driven, fit_problem
 
 from soilml.config.write_case import case_as_toml
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.planned_readings import expected_readings
 from soilml.gap.design.run_options import run_options
 from soilml.gap.design.static_checks import SENSOR_CHECKS
-from soilml.gap.search.candidate_fits import fit_candidate
 from soilml.gap.search.updated_case import updated_case
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
@@ -88,14 +87,13 @@ def rivals():
     case = case_of()
     problem = fit_problem(case, driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=2))
     start = problem.fit_soil([np.full(3, 0.5)]).start_values()
-    return problem, [
-        fit_candidate(problem, [name], start) for name in ("slip-sinkage", "torque-gain")
-    ]
+    return problem, [candidate(problem, [name], start) for name in ("slip-sinkage", "torque-gain")]
 
 
 def test_the_updated_case_is_the_fit_with_priors_of_the_added_effects(rivals):
     problem, (one, _) = rivals
-    case = updated_case(one.fit)
+    case = updated_case(one.fit, {"torque_Nm": 0.2})
+    assert case.discrepancy["torque_Nm"].amplitude(7.0) == 0.2
     size = case.prior.pop("slip-sinkage.n1")
     assert size.lower < one.fit.values()["slip-sinkage.n1"] < size.upper
     assert case.prior == problem.case.prior and case.noise == problem.case.noise
