@@ -43,6 +43,8 @@ MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
 SHAPE_GAIN_FACTOR = 3.0
 #: Decrease of the sum of squares under noise alone from which the free law of an effect is tried.
 NOTABLE_GAIN = 20.0
+#: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.
+LARGE_DISCREPANCY = 2.5
 #: Distance from the middle of the priors at which a second fit starts, relative to the optimum of
 #: the soil alone.
 INWARD = 0.8
@@ -197,7 +199,7 @@ def _fit_level(
 ) -> list[CandidateFit]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Single effects start from the soil beside a discrepancy and from that under noise alone.
+    Beside a large discrepancy, single effects also start from the soil under noise alone.
     """
     requests = []
     for names, base in sets.items():
@@ -205,7 +207,8 @@ def _fit_level(
         smaller = np.minimum(base.amplitude, none.amplitude)
         requests.append((names, base.catalogue_law.fit.start_values(), smaller))
     single = all(len(names) == 1 for names in sets)
-    fitted = fit_candidates(problem, requests, _off_bounds(soil) if single else None)
+    hidden = single and float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    fitted = fit_candidates(problem, requests, _off_bounds(soil) if hidden else None)
     if not fitted:
         return []
     lowest = min(none.objective, *(c.objective for c in fitted))
