@@ -67,7 +67,9 @@ class FitProblem:
         An effect that all gears share and the same effect of one gear exclude each other.
         """
         fitted = {c.effect for c in fit.coordinates if isinstance(c, EffectCoordinate)}
-        excluded = {other for name in fitted for other in self.effects if _exclude(name, other)}
+        excluded = {
+            other for name in fitted for other in self.effects if exclude_each_other(name, other)
+        }
         return {name: effect for name, effect in self.effects.items() if name not in excluded}
 
     def with_effects(self, names: Sequence[str]) -> Case:
@@ -176,7 +178,7 @@ def _raised(fit: GapFit | InputError) -> GapFit:
     return fit
 
 
-def _exclude(name: str, other: str) -> bool:
+def exclude_each_other(name: str, other: str) -> bool:
     """Whether two effects are the same one, or one of them is the other for a single gear."""
     (base, _, gear), (other_base, _, other_gear) = name.partition("@"), other.partition("@")
     return name == other or (base == other_base and not (gear and other_gear))
