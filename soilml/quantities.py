@@ -13,6 +13,7 @@ _SUFFIX = {
     "N m": "_Nm",
     "m/s": "_m_s",
     "m/s^2": "_m_s2",
+    "m^2": "_m2",
     "N/m^3": "_N_m3",
     "N/m^(n+1)": "_SI",
     "N/m^(n+2)": "_SI",
@@ -71,9 +72,22 @@ _ALL = (
     Quantity("unit_weight", "gamma", "N/m^3", "weight of the soil per volume"),
     Quantity("slope", "alpha", "rad", "slope of the ground along the travel, positive uphill"),
     Quantity("rim_speed", "r omega", "m/s", "speed of the rim of the wheel about its axle"),
-    Quantity("angle", "theta", "rad", "place on the rim, from straight down, positive forward"),
+    Quantity(
+        "angle", "theta", "rad", "place on the rim, from straight down; rotation of a shear ring"
+    ),
     Quantity("normal", "sigma_s", "Pa", "normal stress that a sensor on the rim reads"),
     Quantity("wheel", "", "-", "which wheel of a rover: front or rear"),
+    Quantity("test", "", "-", "name of the plate or shear test"),
+    Quantity("plate_radius", "", "m", "radius of the round plate that was pressed into the soil"),
+    Quantity("plate_width", "b", "m", "width of the plate, its smaller dimension"),
+    Quantity("plate_length", "", "m", "length of the plate"),
+    Quantity("plate_area", "A", "m^2", "area of the round plate"),
+    Quantity("pressure", "p", "Pa", "mean pressure under the plate"),
+    Quantity("normal_stress", "sigma", "Pa", "normal stress in a shear test"),
+    Quantity("shear_displacement", "j", "m", "displacement in a shear test; blank: steady end"),
+    Quantity("shear_stress", "tau", "Pa", "shear stress in a shear test"),
+    Quantity("inner_radius", "r_i", "m", "inner radius of the shear ring"),
+    Quantity("outer_radius", "r_o", "m", "outer radius of the shear ring"),
     Quantity("gear", "", "-", "which gear was driven: NAME of [gears.NAME] in the model file"),
 )
 

@@ -22,6 +22,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/identification/nonlinear.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/plot.py": {"matplotlib"},
+    "soilml/identification/bevameter/plot.py": {"matplotlib"},
     "soilml/gap/statistics/repeats.py": {"scipy"},
     "soilml/gap/search/disagreements.py": {"scipy"},
     "soilml/gap/html/page.py": {"jinja2"},

@@ -31,6 +31,7 @@ friction angle and shear modulus, each with its uncertainty.
   from data to a model file    soilml train
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
+                               soilml bevameter (plate and shear tests)
   comparison of methods        soilml compare
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
@@ -44,6 +45,7 @@ COMMANDS = {
     "effects": "soilml.cli.commands.effects",
     "simulate": "soilml.cli.commands.simulate",
     "identify": "soilml.cli.commands.identify",
+    "bevameter": "soilml.cli.commands.bevameter",
     "audit": "soilml.cli.commands.audit",
     "gap": "soilml.cli.commands.gap",
     "generate": "datagen.commands.generate",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.effects import Effect
 from soilml.physics.gears.base import Gear
@@ -29,12 +30,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         lines += [f"[{key}]", *_gear_lines(model.gear), ""]
         for effect in model.effects:
             lines += [*_effect_lines(case, effect, f"{key}.effect", f"{effect.name}@{name}"), ""]
-    lines += ["[soil]"]
-    lines += [f"{k} = {_number(getattr(case.soil, k))}" for k in declared(Soil)]
-    soil_prior = {path: prior for path, prior in case.prior.items() if "." not in path}
-    if soil_prior:
-        lines += ["", "[soil.prior]"]
-        lines += [f"{path} = {_setting(p.as_setting())}" for path, p in soil_prior.items()]
+    soil = {name: getattr(case.soil, name) for name in declared(Soil)}
+    lines += _soil_lines(soil, {p: v for p, v in case.prior.items() if "." not in p})
     if case.noise:
         lines += ["", "[noise]"]
         lines += [f"{key} = {_setting(noise.as_setting())}" for key, noise in case.noise.items()]
@@ -45,6 +42,21 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     for effect in case.model.effects:
         lines += ["", *_effect_lines(case, effect, "effect", effect.name)]
     return "\n".join(lines) + "\n"
+
+
+def soil_as_toml(
+    soil: Mapping[str, float], prior: Mapping[str, Prior], comments: Sequence[str] = ()
+) -> str:
+    """The sections [soil] and [soil.prior] of a model file, for some of the soil's parameters."""
+    return "\n".join([f"# {line}" for line in comments] + _soil_lines(soil, prior)) + "\n"
+
+
+def _soil_lines(soil: Mapping[str, float], prior: Mapping[str, Prior]) -> list[str]:
+    lines = ["[soil]", *(f"{name} = {_number(value)}" for name, value in soil.items())]
+    if prior:
+        lines += ["", "[soil.prior]"]
+        lines += [f"{name} = {_setting(p.as_setting())}" for name, p in prior.items()]
+    return lines
 
 
 def _gear_lines(gear: Gear) -> list[str]:

@@ -6,7 +6,7 @@ import csv
 import difflib
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +20,10 @@ from soilml.quantities import COLUMNS
 RUNS = ("run", "slip", "load_N", "torque_Nm")
 #: Columns in which every row must have a value.
 FILLED = ("run", "slip", "load_N")
+#: Lower and upper bound, and what is needed in words.
+Limits = tuple[float, float, str]
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
-_LIMITS = {
+_LIMITS: dict[str, Limits] = {
     "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a fraction and not in percent"),
     "load_N": (0.0, np.inf, "a load above zero, in N"),
     "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
@@ -30,6 +32,12 @@ _LIMITS = {
     "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
     "wheel_radius_m": (0.0, np.inf, "a radius above zero, in m"),
     "wheel_width_m": (0.0, np.inf, "a width above zero, in m"),
+    "plate_radius_m": (0.0, 10.0, "a radius above zero, in m"),
+    "plate_width_m": (0.0, 10.0, "a width above zero, in m"),
+    "plate_length_m": (0.0, 10.0, "a length above zero, in m"),
+    "plate_area_m2": (0.0, 100.0, "an area above zero, in m^2"),
+    "outer_radius_m": (0.0, 10.0, "a radius above zero, in m"),
+    "shear_displacement_m": (-1.0, 10.0, "a displacement in m"),
 }
 
 
@@ -39,6 +47,7 @@ def read_table(
     *,
     filled: Sequence[str] = FILLED,
     ignore_extra: bool = False,
+    limits: Mapping[str, Limits] | None = None,
 ) -> Table:
     """Read a table of measured rows from a CSV or Parquet file.
 
@@ -54,6 +63,8 @@ def read_table(
     ignore_extra
         Ignore columns with unknown names. By default they are an error, because a misspelt column
         would otherwise be ignored without notice.
+    limits
+        Lower and upper bound of columns, and what is needed, in place of those of measured runs.
 
     Returns
     -------
@@ -92,7 +103,7 @@ def read_table(
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
     if len(table) == 0:
         raise TableError(f"{file}: the table has a header but no row")
-    _check_values(table, filled)
+    _check_values(table, filled, _LIMITS | dict(limits or {}))
     return table
 
 
@@ -187,13 +198,13 @@ def _column(file: Path, name: str, cells: list[str], lines: list[int]) -> Column
     return values
 
 
-def _check_values(table: Table, filled: Sequence[str]) -> None:
+def _check_values(table: Table, filled: Sequence[str], limits: Mapping[str, Limits]) -> None:
     for name, values in table.columns.items():
         if name in TEXT:
             bad, needed = values == "", "a name"
             blank = bad
         else:
-            low, high, needed = _LIMITS.get(name, (-np.inf, np.inf, "a number"))
+            low, high, needed = limits.get(name, (-np.inf, np.inf, "a number"))
             if name.endswith("_std"):
                 low, needed = 0.0, "a standard deviation above zero"
             blank = np.isnan(values)

@@ -15,7 +15,7 @@ from soilml.row_status import Status
 Column = NDArray[Any]
 
 #: Columns that hold text; all others hold numbers, NaN where a cell is blank.
-TEXT = ("run", "status", "source", "wheel", "gear")
+TEXT = ("run", "status", "source", "wheel", "gear", "test")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,86 @@
+"""Soil parameters from plate-sinkage and shear tests, without a wheel."""
+
+from __future__ import annotations
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.identification.bevameter.plate_tests import read_plate_tests
+from soilml.identification.bevameter.pressure_sinkage import (
+    PressureSinkageFit,
+    fit_pressure_sinkage,
+)
+from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
+from soilml.identification.bevameter.result import BevameterResult
+from soilml.identification.bevameter.shear_strength import ShearFit, fit_shear_strength
+from soilml.identification.bevameter.shear_tests import read_shear_tests
+from soilml.identification.bevameter.soil_section import (
+    plate_section,
+    shear_section,
+    within_bounds,
+)
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+
+
+def bevameter(
+    plates: Table | None = None, shear: Table | None = None, case: Case | None = None
+) -> BevameterResult:
+    """Soil parameters from plate-sinkage tests, from shear tests, or from both.
+
+    Parameters
+    ----------
+    plates
+        Plate tests; the columns are those of `read_plate_tests`.
+    shear
+        Shear tests; the columns are those of `read_shear_tests`.
+    case
+        Whose gears' widths decide what the plates say of kphi, and whose prior of the cohesion is
+        kept where there is one normal stress.
+
+    Returns
+    -------
+    BevameterResult
+
+    Raises
+    ------
+    InputError
+        Where both tables are missing.
+    TableError
+        For a missing column, or a test without a usable curve.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from soilml.identification.bevameter import bevameter
+    >>> from soilml.io.table import Table
+    >>> z, size = np.tile(np.linspace(0.01, 0.1, 8), 2), np.repeat([0.05, 0.10], 8)
+    >>> plates = Table({
+    ...     "test": np.repeat(["small", "large"], 8),
+    ...     "plate_radius_m": size,
+    ...     "sinkage_m": z,
+    ...     "pressure_Pa": (2000.0 / size + 800e3) * z**0.9,
+    ... })
+    >>> found = bevameter(plates)
+    >>> print(*(f"{name} {value:.4g}" for name, value in found.soil.items()))
+    kc 2000 kphi 8e+05 n 0.9
+    """
+    if plates is None and shear is None:
+        raise InputError("no tests: give plate tests, shear tests, or both")
+    soil: dict[str, float] = {}
+    prior: dict[str, Prior] = {}
+    remarks: list[str] = []
+    plate_fit = shear_fit = None
+    if plates is not None:
+        plate_fit = fit_pressure_sinkage(read_plate_tests(plates))
+        values, priors, notes = plate_section(plate_fit, case)
+        soil, prior = soil | values, prior | priors
+        remarks += [*plate_remarks(plate_fit), *notes]
+    if shear is not None:
+        shear_fit = fit_shear_strength(read_shear_tests(shear))
+        values, priors, notes = shear_section(shear_fit, case)
+        soil, prior = soil | values, prior | priors
+        remarks += [*shear_remarks(shear_fit), *notes]
+    return BevameterResult(plate_fit, shear_fit, within_bounds(soil), prior, tuple(remarks))
+
+
+__all__ = ["BevameterResult", "PressureSinkageFit", "ShearFit", "bevameter"]

@@ -1,0 +1,181 @@
+"""What plate and shear tests cannot tell, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from soilml.identification.bevameter.estimate import is_level
+from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
+from soilml.identification.bevameter.shear_strength import ShearFit
+
+#: Change of the exponent between the shallower and the deeper half of a curve from which the law is
+#: said not to fit: the law's pressure is then wrong by 10 % within a factor of three in depth.
+NOTABLE_BEND = 0.2
+#: Relative residual of a law from which it is said not to fit.
+NOTABLE_MISFIT = 0.1
+#: Ratio of peak to end from which a shear curve is said to have a peak; and mobilised fraction of
+#: the strength at the end below which a curve is said to rise still.
+NOTABLE_PEAK, NOTABLE_RISE = 1.1, 0.9
+#: Ratio of the end of a shear curve to the fitted one from which it is said to rise still.
+NOTABLE_END = 1.05
+#: Variation of the normal stress within a test that is remarked on.
+NOTABLE_VARIATION = 0.05
+#: Ratio of shear strength to normal stress, and pressure (Pa), that suggest a wrong unit.
+ODD_RATIO, ODD_PRESSURE = 6.0, 500.0
+#: Names that a remark lists.
+LISTED = 4
+
+
+def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
+    """Remarks on plate tests."""
+    largest = max(float(test.pressure.max()) for test in fit.tests)
+    if largest < ODD_PRESSURE:
+        yield (
+            f"the largest pressure is {largest:.3g} Pa, which is very little: check that it is in "
+            "Pa, not in kPa"
+        )
+    for size in fit.sizes[:LISTED]:
+        p = fit.pressure_at_depth(size)
+        yield (
+            f"at {fit.depth:.3g} m under {size:.3g} m the pressure is {p.value:.3g} Pa, "
+            f"{p.place_range[0]:.3g} to {p.place_range[1]:.3g} at another place"
+        )
+    depths = [float(test.sinkage[-1]) for test in fit.tests]
+    yield (
+        "n and the moduli trade off, so each range alone is wide; they hold down to "
+        f"{max(depths):.3g} m, the deepest test"
+    )
+    if not fit.several_sizes:
+        yield (
+            f"one plate size ({fit.sizes[0]:.3g} m): kc and kphi cannot be told apart, only "
+            f"k = kc / b + kphi for b = {fit.sizes[0]:.3g} m; for another width it may differ"
+        )
+    elif fit.estimates()["kc"].mean_range[0] < 0.0 < fit.estimates()["kc"].mean_range[1]:
+        sizes = ", ".join(f"{b:.3g}" for b in fit.sizes)
+        yield (
+            f"kc may be below or above zero: plates of {sizes} m differ by no more than repeats "
+            "do; use kc and kphi together, at widths between these"
+        )
+    elif fit.moduli[0] < 0.0:
+        yield (
+            "kc is below zero: larger plates carry more pressure; do not use it for widths below "
+            f"{fit.sizes[0]:.3g} m"
+        )
+    yield from _repeats_of_plates(fit)
+    bends = np.asarray([c.bend for c in fit.curves if np.isfinite(c.bend)])
+    if bends.size and abs(bends.mean()) > NOTABLE_BEND:
+        yield (
+            "the logarithms of pressure and sinkage are not on a straight line: the exponent is "
+            f"{fit.exponent - 0.5 * bends.mean():.2f} in the shallower and "
+            f"{fit.exponent + 0.5 * bends.mean():.2f} in the deeper half, so n depends on the "
+            "depth; its range contains both"
+        )
+    yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
+    omitted = sum(test.omitted for test in fit.tests)
+    if omitted:
+        yield (
+            f"{omitted} samples without pressure, or less deep than an earlier one, are left out"
+        )
+
+
+def _repeats_of_plates(fit: PressureSinkageFit) -> Iterator[str]:
+    size = np.asarray([test.size for test in fit.tests])
+    log_pressure = np.asarray([curve.log_pressure for curve in fit.curves])
+    for level in fit.sizes:
+        near = log_pressure[is_level(size, level)]
+        if near.size > 1:
+            yield (
+                f"{near.size} tests with the plate of {level:.3g} m differ by a factor "
+                f"{math.exp(np.ptp(near)):.2f} in pressure at {fit.depth:.3g} m"
+            )
+    if size.size == len(fit.sizes):
+        yield "no plate test was repeated: a usual scatter of 15 % in pressure is assumed"
+
+
+def shear_remarks(fit: ShearFit) -> Iterator[str]:
+    """Remarks on shear tests."""
+    ratio = max(c.strength / t.normal_stress for t, c in zip(fit.tests, fit.curves, strict=True))
+    if ratio > ODD_RATIO:
+        yield (
+            f"the shear strength is {ratio:.3g} times the normal stress: check that both are in Pa"
+        )
+    if fit.cohesion is None:
+        yield (
+            f"one normal stress ({fit.stresses[0]:.4g} Pa): cohesion and friction angle cannot be "
+            f"told apart, only c + sigma tan(phi) = {fit.strength.value:.4g} Pa there"
+        )
+    elif fit.cohesion.value == 0.0:
+        yield "the failure line meets the axis below zero: cohesion is set to zero"
+    yield from _repeats_of_shear(fit)
+    if fit.halves:
+        (c0, phi0), (c1, phi1) = fit.halves
+        yield (
+            "the failure line is curved: cohesion and friction angle depend on the normal stress, "
+            f"c = {c0:.0f} Pa and phi = {math.degrees(phi0):.1f} deg in the lighter half of the "
+            f"tests, {c1:.0f} Pa and {math.degrees(phi1):.1f} deg in the heavier; the ranges "
+            "contain both"
+        )
+    if fit.modulus_trend:
+        moduli = [curve.modulus for curve in fit.curves]
+        way = "grows" if fit.modulus_trend > 0.0 else "falls"
+        yield (
+            f"K {way} with the normal stress: {1e3 * min(moduli):.2g} to {1e3 * max(moduli):.2g} "
+            "mm in these tests; its range contains them"
+        )
+    yield from _shapes(fit)
+    yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
+    varying = [t.name for t in fit.tests if t.normal_variation > NOTABLE_VARIATION]
+    if varying:
+        yield f"the normal stress varies by more than 5 % within {_list(varying)}; its mean is used"
+
+
+def _repeats_of_shear(fit: ShearFit) -> Iterator[str]:
+    sigma = np.asarray([test.normal_stress for test in fit.tests])
+    strength = np.asarray([curve.strength for curve in fit.curves])
+    for level in fit.stresses:
+        near = strength[is_level(sigma, level)]
+        if near.size > 1:
+            yield (
+                f"{near.size} tests at {level:.4g} Pa differ by a factor "
+                f"{near.max() / near.min():.2f} in strength"
+            )
+    if len(fit.tests) == len(fit.stresses):
+        yield (
+            "no shear test was repeated: the scatter is that of the tests about the line, and a "
+            "usual one of 8 % in strength"
+        )
+
+
+def _shapes(fit: ShearFit) -> Iterator[str]:
+    pairs = list(zip(fit.tests, fit.curves, strict=True))
+    peaked = [(t, c) for t, c in pairs if c.peak > NOTABLE_PEAK * c.end]
+    if peaked:
+        falls = ", ".join(f"{t.name} {c.peak:.4g} to {c.end:.4g} Pa" for t, c in peaked[:LISTED])
+        yield (
+            f"the stress passes a peak and falls to a residual ({falls}); the curve of Janosi and "
+            "Hanamoto has none: its strength lies between. The effect shear-softening describes it"
+        )
+    rising = [
+        t.name
+        for t, c in pairs
+        if c.mobilised < NOTABLE_RISE or c.end > NOTABLE_END * c.mobilised * c.strength
+    ]
+    if rising:
+        yield (
+            f"the stress still rises at the end of {_list(rising)}: strength and K depend on how "
+            "far the test goes"
+        )
+
+
+def _poor_fits(misfits: Sequence[tuple[str, float]]) -> Iterator[str]:
+    poor = [f"{name} ({misfit:.0%})" for name, misfit in misfits if misfit > NOTABLE_MISFIT]
+    if poor:
+        yield f"the law fits poorly, by its relative residual: {_list(poor)}"
+
+
+def _list(names: Sequence[str]) -> str:
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
