@@ -164,7 +164,7 @@ def _misnamed(name: str) -> str:
     """A hint at the intended name of a column; empty where no name is similar."""
     if ";" in name or "\t" in name:
         return "the separator must be a comma"
-    for quantity in COLUMNS.values():
+    for quantity in sorted(COLUMNS.values(), key=lambda q: -len(q.name)):  # normal_stress, normal
         if name == quantity.name:
             return f"the unit is missing, name it {quantity.column}"
         if quantity.unit == "-" or len(quantity.name) <= 2:

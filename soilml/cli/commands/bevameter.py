@@ -54,8 +54,8 @@ model file with this soil; without it, [soil] and [soil.prior] alone.
 #: Bounds of columns that differ from those of measured runs: a plate starts without load.
 LIMITS: dict[str, Limits] = {
     "load_N": (-np.inf, np.inf, "a load in N"),
-    "sinkage_m": (-1.0, 2.0, "a sinkage in m"),
-    "angle_rad": (-6.3, 6.3, "an angle in rad"),
+    "sinkage_m": (-1.0, 2.0, "a sinkage in m, below 2"),
+    "angle_rad": (-6.3, 6.3, "an angle in rad, of less than a turn"),
     "normal_stress_Pa": (0.0, np.inf, "a normal stress above zero, in Pa"),
     "inner_radius_m": (-1e-9, 10.0, "a radius in m"),
 }

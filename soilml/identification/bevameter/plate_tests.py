@@ -105,8 +105,8 @@ def _loading_curve(
     z, p = z[deeper], p[deeper]
     if np.unique(z).size < LEAST_POINTS:
         raise TableError(
-            f"{table.source}: test {name} has {z.size} samples with growing sinkage and a pressure "
-            f"above zero; needed are {LEAST_POINTS} or more"
+            f"{table.source}: test {name} needs {LEAST_POINTS} or more samples with growing "
+            f"sinkage and a pressure above zero; it has {z.size}"
         )
     omitted = sinkage.size - z.size
     if z.size > MOST_POINTS:

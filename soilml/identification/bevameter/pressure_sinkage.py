@@ -37,13 +37,13 @@ SHALLOW = 0.1
 class PlateCurve:
     """The law fitted to one test: logarithm of the pressure (Pa) at the reference depth, exponent.
 
-    `bend` is the exponent of the deeper half of the curve less that of the shallower half, NaN
-    where there are too few points; `misfit` is the root mean square of relative residuals.
+    `halves` are the exponents of the shallower and of the deeper half of the curve, NaN where there
+    are too few points; `misfit` is the root mean square of relative residuals.
     """
 
     log_pressure: float
     exponent: float
-    bend: float
+    halves: tuple[float, float]
     misfit: float
 
 
@@ -144,7 +144,7 @@ def fit_pressure_sinkage(tests: Sequence[PlateTest]) -> PressureSinkageFit:
     exponent = float(exponents.mean())
     residual = np.stack([np.log(pressure / fitted), exponents - exponent], axis=1)
     scatter = pooled_scatter(residual, USUAL_SCATTER, columns.shape[1])
-    mean, place = _draws(line, hat, exponent, scatter, _typical_bend(curves))
+    mean, place = _draws(line, hat, exponent, scatter, _exponent_span(curves, exponent))
     full = np.append(line, np.zeros(2 - line.size))
     return PressureSinkageFit(tuple(tests), curves, depth, sizes, full, exponent, mean, place)
 
@@ -167,13 +167,12 @@ def _fit_curve(test: PlateTest, depth: float) -> PlateCurve:
     low = max(float(test.sinkage[0]), SHALLOW * float(test.sinkage[-1]))
     middle = np.log(np.sqrt(low * test.sinkage[-1]) / depth)
     shallow = (x <= middle) & (test.sinkage >= low)
-    bend = float("nan")
-    if shallow.sum() >= 2 and (x >= middle).sum() >= 2:
-        parts = [
-            _slope(x[part], y[part], np.ones(part.sum()))[0] for part in (shallow, x >= middle)
-        ]
-        bend = parts[1] - parts[0]
-    return PlateCurve(level, exponent, bend, misfit)
+    deep = x >= middle
+    halves = float("nan"), float("nan")
+    if shallow.sum() >= 2 and deep.sum() >= 2:
+        first, second = (_slope(x[h], y[h], np.ones(h.sum()))[0] for h in (shallow, deep))
+        halves = first, second
+    return PlateCurve(level, exponent, halves, misfit)
 
 
 def _slope(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
@@ -182,13 +181,15 @@ def _slope(x: Floats, y: Floats, weight: Floats) -> tuple[float, float]:
     return float(slope), float(level)
 
 
-def _typical_bend(curves: Sequence[PlateCurve]) -> float:
-    bends = [curve.bend for curve in curves if np.isfinite(curve.bend)]
-    return float(np.mean(bends)) if bends else 0.0
+def _exponent_span(curves: Sequence[PlateCurve], exponent: float) -> tuple[float, float]:
+    """Least and largest of the exponent and the mean exponents of the halves of the curves."""
+    halves = np.asarray([c.halves for c in curves if np.isfinite(c.halves).all()])
+    known = [exponent, *(halves.mean(axis=0) if halves.size else ())]
+    return float(min(known)), float(max(known))
 
 
 def _draws(
-    line: Floats, hat: Floats, exponent: float, scatter: Scatter, bend: float
+    line: Floats, hat: Floats, exponent: float, scatter: Scatter, span: tuple[float, float]
 ) -> tuple[Floats, Floats]:
     """Draws (draws, 3) of A, B and n: of the mean, and at another place."""
     p, tests = hat.shape
@@ -203,9 +204,8 @@ def _draws(
         mean[:, 0] = line[0] * np.exp(error[:, 0] / line[0])
     else:
         mean[:, :p] = line + error[:, :p]
-    law = bend * np.linspace(
-        -0.5, 0.5, len(error)
-    )  # uniform, in an order that is not that of error
+    reach = 0.5 * (span[1] - span[0]) / 0.95  # 95 % of a uniform distribution is the span
+    law = np.linspace(-reach, reach, len(error)) + 0.5 * (span[0] + span[1]) - exponent
     mean[:, 2] = exponent + error[:, p] + law
     place = mean.copy()
     place[:, :2] *= np.exp(deviation[:, :1])

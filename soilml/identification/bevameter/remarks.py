@@ -40,7 +40,7 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
     for size in fit.sizes[:LISTED]:
         p = fit.pressure_at_depth(size)
         yield (
-            f"at {fit.depth:.3g} m under {size:.3g} m the pressure is {p.value:.3g} Pa, "
+            f"at {fit.depth:.3g} m the plate of {size:.3g} m has a pressure of {p.value:.3g} Pa, "
             f"{p.place_range[0]:.3g} to {p.place_range[1]:.3g} at another place"
         )
     depths = [float(test.sinkage[-1]) for test in fit.tests]
@@ -65,13 +65,13 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
             f"{fit.sizes[0]:.3g} m"
         )
     yield from _repeats_of_plates(fit)
-    bends = np.asarray([c.bend for c in fit.curves if np.isfinite(c.bend)])
-    if bends.size and abs(bends.mean()) > NOTABLE_BEND:
+    halves = np.asarray([c.halves for c in fit.curves if np.isfinite(c.halves).all()])
+    if halves.size and abs(np.diff(halves.mean(axis=0))[0]) > NOTABLE_BEND:
+        shallow, deep = halves.mean(axis=0)
         yield (
             "the logarithms of pressure and sinkage are not on a straight line: the exponent is "
-            f"{fit.exponent - 0.5 * bends.mean():.2f} in the shallower and "
-            f"{fit.exponent + 0.5 * bends.mean():.2f} in the deeper half, so n depends on the "
-            "depth; its range contains both"
+            f"{shallow:.2f} in the shallower and {deep:.2f} in the deeper half, so n depends on "
+            "the depth; its range contains both"
         )
     yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
     omitted = sum(test.omitted for test in fit.tests)

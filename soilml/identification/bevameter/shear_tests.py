@@ -114,8 +114,8 @@ def _test(
     j, stress = j[usable], stress[usable]
     if np.unique(j).size < LEAST_POINTS or not np.any(stress > 0.0):
         raise TableError(
-            f"{table.source}: test {name} has {j.size} samples with a displacement and a shear "
-            f"stress; needed are {LEAST_POINTS} or more, above zero"
+            f"{table.source}: test {name} needs {LEAST_POINTS} or more samples with a displacement "
+            f"and a shear stress above zero; it has {j.size}"
         )
     curve = np.isfinite(j)
     if np.count_nonzero(curve) > MOST_POINTS:

@@ -1,0 +1,102 @@
+"""`soilml bevameter` at the command line."""
+
+import json
+
+import pytest
+from conftest import MODEL
+
+from soilml import read_case
+from soilml.cli import main
+
+PLATES = "test,plate_radius_m,sinkage_m,load_N\n" + "".join(
+    f"{name},{r},{z},{(2e3 / r + 6e5) * z * 3.14159 * r**2}\n"
+    for name, r in (("small", 0.05), ("large", 0.08))
+    for z in (0.0, 0.01, 0.02, 0.03, 0.04)
+)
+SHEAR = "test,normal_stress_Pa,shear_displacement_m,shear_stress_Pa\n" + "".join(
+    f"at_{sigma},{sigma},{j},{(500 + 0.6 * sigma) * share}\n"
+    for sigma in (5000, 10000, 20000)
+    for j, share in ((0.01, 0.632), (0.02, 0.865), (0.05, 0.993), ("", 1.0))
+)
+
+
+@pytest.fixture
+def tables(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plates.csv").write_text(PLATES)
+    (tmp_path / "shear.csv").write_text(SHEAR)
+    (tmp_path / "model.toml").write_text(MODEL)
+    return tmp_path
+
+
+def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(tables, capsys):
+    words = ["bevameter", "shear.csv", "plates.csv", "--model", "model.toml"]
+    assert main([*words, "--out", "soil.toml", "--json", "soil.json", "--picture", "soil.png"]) == 0
+    printed = capsys.readouterr().out
+    assert "95 % at another place" in printed and "! no plate test was repeated" in printed
+    case = read_case("soil.toml")
+    assert case.soil.cohesion == pytest.approx(500.0, rel=0.1)
+    assert case.soil.n == pytest.approx(1.0, rel=0.02)
+    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus", "kphi", "n"}
+    assert case.model.gear.width == 0.12 and "torque_Nm" in case.noise
+    written = json.loads((tables / "soil.json").read_text())
+    assert written["estimates"]["kc"]["unit"] == "N/m^(n+1)"
+    assert [t["test"] for t in written["plate_tests"]] == ["small", "large"]
+    assert (tables / "soil.png").read_bytes()[:4] == b"\x89PNG"
+    assert main(["simulate", "soil.toml", "--slip", "0.1,0.3", "--load", "60"]) == 0
+    runs = capsys.readouterr().out.replace("slip,", "run,slip,", 1).replace("\n0.", "\na,0.")
+    (tables / "runs.csv").write_text(runs)
+    assert main(["identify", "soil.toml", "runs.csv"]) == 0
+
+
+@pytest.mark.parametrize("table", ["plates.csv", "shear.csv"])
+def test_one_table_gives_a_soil_section_and_says_what_is_missing(tables, table, capsys):
+    assert main(["bevameter", table, "--out", "soil.toml", "--picture", "soil.png"]) == 0
+    text = (tables / "soil.toml").read_text()
+    assert "[soil.prior]" in text and "[gear]" not in text
+    missing = "cohesion" if table == "plates.csv" else "kc"
+    assert f"soil.toml lacks {missing}" in capsys.readouterr().err
+
+
+def test_the_same_tables_give_the_same_file(tables):
+    for name in ("one.toml", "two.toml"):
+        assert main(["bevameter", "plates.csv", "shear.csv", "--out", name]) == 0
+    assert (tables / "one.toml").read_text() == (tables / "two.toml").read_text()
+
+
+MISTAKES = {
+    "millimetres": ("sinkage_m", "sinkage_mm", "sinkage is read in m"),
+    "millimetres without saying": (",0.04,", ",40,", "sinkage_m: 40 given"),
+    "radius in millimetres": ("plate_radius_m", "plate_radius_mm", "plate_radius_m"),
+    "no number": (",0.04,", ",nan,", "'nan' is not a number"),
+    "no name": ("large,0.08,0.04", ",0.08,0.04", "column test: the cell is blank"),
+    "unknown column": ("load_N", "force", "'force' is not known"),
+    "no test": ("test,", "probe,", "'probe' is not known"),
+    "negative radius": (",0.05,", ",-0.05,", "a radius above zero"),
+    "two plates in a test": ("large,0.08,0.04", "large,0.06,0.04", "give each plate a test"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_bad_plate_tables_end_with_one_line(tables, old, new, said, capsys):
+    (tables / "plates.csv").write_text(PLATES.replace(old, new))
+    assert main(["bevameter", "plates.csv", "--out", "soil.toml"]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+    assert not (tables / "soil.toml").exists()
+
+
+def test_bad_shear_tables_end_with_one_line(tables, capsys):
+    for old, new, said in (
+        ("normal_stress_Pa", "normal_stress_kPa", "name the column normal_stress_Pa"),
+        ("normal_stress_Pa", "wheel_radius_m", "normal_stress_Pa is missing"),
+        (",10000,", ",-10000,", "a normal stress above zero"),
+    ):
+        (tables / "bad.csv").write_text(SHEAR.replace(old, new))
+        assert main(["bevameter", "bad.csv"]) == 2
+        assert said in capsys.readouterr().err
+    assert main(["bevameter", "shear.csv", "shear.csv"]) == 2
+    assert "both shear tests" in capsys.readouterr().err
+    (tables / "runs.csv").write_text("test,slip\na,0.1\n")
+    assert main(["bevameter", "runs.csv"]) == 2
+    assert "no table of tests" in capsys.readouterr().err
