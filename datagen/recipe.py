@@ -158,8 +158,6 @@ def parse_recipe(text: str, where: str) -> Recipe:
 
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
     case = take_case(settings, effects)
-    if case.discrepancy:
-        settings.fail("[discrepancy]: generated rows have no model error; remove this table")
     if case.gears:
         settings.fail("a recipe has one gear, in [gear]; [gears.NAME] is for measured rows")
     if not case.prior:

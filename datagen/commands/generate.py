@@ -68,10 +68,14 @@ def run(args: argparse.Namespace) -> int:
     from datagen.generate import generate
     from datagen.recipe import read_recipe
     from soilml.cli.progress import progress_bar
+    from soilml.identification.discrepancy import ignored_discrepancy
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
     with progress_bar("simulating", recipe.rows) as progress:
         result = generate(recipe, args.out, progress)
+    consequence = "the rows have no error of the model, nor have intervals of files trained on them"
+    for line in ignored_discrepancy(recipe.case, "generate", consequence):
+        print(line, file=sys.stderr)
     note = f", {result.failed} without equilibrium" if result.failed else ""
     print(f"{result.rows} rows{note} written to {args.out}", file=sys.stderr)
     return 0

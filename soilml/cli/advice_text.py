@@ -40,7 +40,7 @@ MAX_EXACT_ROWS = 4
 #: Rows in the planned sequence of such an advice.
 SEQUENCE_LENGTH = 2
 #: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
-CASE_KEYS = {"gear", "soil", "effect", "noise", "operating", "rows", "seed", "runs"}
+CASE_KEYS = {"gear", "soil", "effect", "noise", "discrepancy", "operating", "rows", "seed", "runs"}
 #: Candidate slips, and loads, in the ranges of a recipe.
 GRID_SIZE = 4
 
