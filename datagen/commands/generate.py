@@ -73,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
     with progress_bar("simulating", recipe.rows) as progress:
         result = generate(recipe, args.out, progress)
-    consequence = "the rows have no error of the model, nor have intervals of files trained on them"
+    consequence = (
+        "errors of the model are neither in the rows nor in the intervals of files trained on them"
+    )
     for line in ignored_discrepancy(recipe.case, "generate", consequence):
         print(line, file=sys.stderr)
     note = f", {result.failed} without equilibrium" if result.failed else ""
