@@ -39,7 +39,7 @@ class Separation:
 def testable_effects(case: Case) -> dict[str, type[Effect]]:
     """The effects of the catalogue that suit the gears of a case, by name."""
     if getattr(case, "gears", {}):
-        from soilml.gap.statistics.candidate_effects import candidate_effects
+        from soilml.gap.data.candidate_effects import candidate_effects
 
         return candidate_effects(case, EFFECTS)
     return {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}

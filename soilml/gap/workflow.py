@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import candidate_effects, effect_names
 from soilml.gap.data.checks import (
     DataCheckResult,
     check_readings,
@@ -48,7 +49,6 @@ from soilml.gap.search.verdict import (
     signature_similarity,
     soil_estimates,
 )
-from soilml.gap.statistics.candidate_effects import candidate_effects, effect_names
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table

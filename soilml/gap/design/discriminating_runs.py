@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import effect_names
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
 from soilml.gap.design.run_options import RunOption, run_options
@@ -17,7 +18,6 @@ from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.cross_validation import covariance_at
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.candidate_effects import effect_names
 from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.physics.effects.base import Effect

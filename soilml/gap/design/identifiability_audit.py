@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import candidate_effects
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.design.effect_identifiability import (
     NAMEABLE_SIGMA,
@@ -21,7 +22,6 @@ from soilml.gap.design.effect_identifiability import (
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.statistics.candidate_effects import candidate_effects
 from soilml.gap.statistics.coordinates import SoilCoordinate, linearise, soil_coordinate
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.candidate_effects import with_effect
 from soilml.gap.statistics.coordinates import (
     EffectCoordinate,
     FitCoordinate,

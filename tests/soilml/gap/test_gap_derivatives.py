@@ -7,13 +7,13 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.search.problem import StartedFit, fit_many
 from soilml.gap.statistics.batched_predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.candidate_effects import with_effect
 from soilml.gap.statistics.coordinates import (
     linearise,
     predict_readings,

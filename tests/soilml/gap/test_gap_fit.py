@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.statistics.candidate_effects import with_effect
+from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.statistics.coordinates import linearise, predict_readings, size_coordinate
 from soilml.gap.statistics.least_squares import levenberg_marquardt
 from soilml.gap.statistics.signatures import effect_signatures

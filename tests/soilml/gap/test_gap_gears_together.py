@@ -10,6 +10,7 @@ from test_gap_several_gears import LUGS, REST, WHEELS, rows
 from soilml import identify
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import InputError
+from soilml.gap.data.candidate_effects import candidate_effects, with_effect
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.design.planned_readings import expected_readings, joined_readings
 from soilml.gap.design.run_options import run_options
@@ -19,7 +20,6 @@ from soilml.gap.statistics.batched_predictions import (
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.candidate_effects import candidate_effects, with_effect
 from soilml.gap.statistics.coordinates import size_coordinate, soil_coordinate
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.identification.discrepancy import discrepancy_columns

@@ -8,8 +8,8 @@ from soilml import Operating, identify
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.gap import gap
+from soilml.gap.data.candidate_effects import candidate_effects, with_effect
 from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.statistics.candidate_effects import candidate_effects, with_effect
 from soilml.gap.statistics.coordinates import (
     linearise,
     predict_readings,
