@@ -24,7 +24,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/experiment_design/plot.py": {"matplotlib"},
     "soilml/identification/bevameter/plot.py": {"matplotlib"},
     "soilml/gap/statistics/repeats.py": {"scipy"},
-    "soilml/gap/search/disagreements.py": {"scipy"},
+    "soilml/gap/verdict/disagreements.py": {"scipy"},
     "soilml/gap/html/page.py": {"jinja2"},
     "soilml/gap/html/svg_image.py": {"matplotlib"},
     "soilml/gap/html/prediction_curves.py": {"matplotlib"},

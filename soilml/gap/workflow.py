@@ -22,16 +22,22 @@ from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_costs import check_costs, rank_by_cost
 from soilml.gap.messages import unsupported_conclusions, verdict_sentence
 from soilml.gap.results import GapReport
-from soilml.gap.search.cross_validation import predict_held_out
-from soilml.gap.search.decision import Decision, decide
-from soilml.gap.search.disagreements import disagreements
 from soilml.gap.search.iteration import Analysis, analyse
 from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.search.remaining_discrepancy import (
+from soilml.gap.verdict.claimed_effects import (
+    discrepancy_map,
+    named_effects,
+    signature_similarity,
+    soil_estimates,
+)
+from soilml.gap.verdict.cross_validation import predict_held_out
+from soilml.gap.verdict.decision import Decision, decide
+from soilml.gap.verdict.disagreements import disagreements
+from soilml.gap.verdict.remaining_discrepancy import (
     discrepancy_amplitudes,
     remaining_discrepancy,
 )
-from soilml.gap.search.report_entries import (
+from soilml.gap.verdict.report_entries import (
     analysis_notes,
     candidate_summaries,
     competing_explanations,
@@ -41,14 +47,8 @@ from soilml.gap.search.report_entries import (
     suspects,
     variance_component_entries,
 )
-from soilml.gap.search.residual_trend import residual_trend
-from soilml.gap.search.updated_case import updated_case
-from soilml.gap.search.verdict import (
-    discrepancy_map,
-    named_effects,
-    signature_similarity,
-    soil_estimates,
-)
+from soilml.gap.verdict.residual_trend import residual_trend
+from soilml.gap.verdict.updated_case import updated_case
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.io.table import Table

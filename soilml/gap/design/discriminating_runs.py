@@ -16,10 +16,10 @@ from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.search.cross_validation import covariance_at
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
 from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.verdict.cross_validation import covariance_at
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column

@@ -12,18 +12,18 @@ from soilml.gap.search.candidate_fits import (
     fit_candidates,
     fit_shapes,
 )
-from soilml.gap.search.cross_validation import (
-    gap_reduction,
-    held_out_region,
-    held_out_runs,
-    predict_held_out,
-)
-from soilml.gap.search.law_difference import law_matters
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import explanations, posterior
 from soilml.gap.search.stepwise import predicted_gains, search
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.signatures import effect_signatures
+from soilml.gap.verdict.cross_validation import (
+    gap_reduction,
+    held_out_region,
+    held_out_runs,
+    predict_held_out,
+)
+from soilml.gap.verdict.law_difference import law_matters
 from soilml.physics.effects import EFFECTS
 
 DIGGING = EFFECTS["slip-sinkage"]

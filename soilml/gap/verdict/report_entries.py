@@ -13,7 +13,6 @@ from soilml.gap.report_parts import (
     Suspect,
 )
 from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.search.cross_validation import gap_reduction, held_out_region, held_out_runs
 from soilml.gap.search.iteration import Analysis
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import REJECTION_THRESHOLD
@@ -21,6 +20,7 @@ from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, pre
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
+from soilml.gap.verdict.cross_validation import gap_reduction, held_out_region, held_out_runs
 from soilml.quantities import column
 
 #: Outliers that a note lists by name.

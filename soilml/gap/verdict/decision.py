@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.search.law_difference import law_matters
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.verdict.law_difference import law_matters
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
 #: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because

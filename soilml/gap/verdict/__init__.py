@@ -1,0 +1,1 @@
+"""The verdict of a gap analysis: status, claimed effects, figures, and what is left."""
