@@ -21,9 +21,9 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.messages import next_row_messages
+from soilml.identification.data.observations import read_observations
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import read_observations
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.onboard.estimate import Estimate

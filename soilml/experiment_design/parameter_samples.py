@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.identification.data.observations import Observations
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.observations import Observations
 from soilml.identification.posterior import posterior_samples
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling

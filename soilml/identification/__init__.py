@@ -13,13 +13,13 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.identification.data.observations import Observations, read_observations
 from soilml.identification.discrepancy import ignored_discrepancy, included_discrepancy
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
-from soilml.identification.observations import Observations, read_observations
 from soilml.identification.posterior import posterior
 from soilml.io.table import Table
 from soilml.physics.gears.rigid_wheel import RigidWheel

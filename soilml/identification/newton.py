@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
+from soilml.identification.data.observations import Observations
 from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.identification.free_parameters import FreeParameter, values_at
-from soilml.identification.observations import Observations
 from soilml.identification.predictions import linearise, stacked_readings
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel

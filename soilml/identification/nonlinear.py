@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
+from soilml.identification.data.observations import Observations
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
 from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, values_at
-from soilml.identification.observations import Observations
 from soilml.identification.predictions import (
     linearise,
     noise_at_prediction,

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
+from soilml.identification.data.observations import Observations
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.discrepancy import discrepancy_columns
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.observations import Observations
 from soilml.identification.predictions import (
     noise_at_prediction,
     predict_channels,

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.identification.data.observations import Observations
+from soilml.identification.data.operating_points import rows_by_gear
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.observations import Observations
-from soilml.identification.operating_points import rows_by_gear
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.identification.compatibility import check_wheel_size
+from soilml.identification.data.observations import read_observations
+from soilml.identification.data.operating_points import operating_points
 from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import read_observations
-from soilml.identification.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from datagen.recipe import Recipe
 from soilml.config.case import Case
+from soilml.identification.data.observations import read_observations
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import read_observations
 from soilml.identification.posterior import misfit_limit
 from soilml.identification.predictions import stacked_readings
 from soilml.io.table import Table

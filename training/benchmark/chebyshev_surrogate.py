@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
+from soilml.identification.data.observations import Observations
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.observations import Observations
 from soilml.identification.predictions import predict_channels
 
 Floats = NDArray[np.float64]

@@ -34,8 +34,8 @@ from soilml.experiment_design import (
 )
 from soilml.experiment_design.candidate_rows import channel_label
 from soilml.experiment_design.messages import next_row_messages
+from soilml.identification.data.observations import read_observations
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import read_observations
 from soilml.io.atomic_files import output_files
 from soilml.io.read_table import RUNS
 from soilml.optional_imports import need

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
-from soilml.identification.levels import Levels, load_levels, rows_driven_alike, slip_levels
-from soilml.identification.observations import declared_std
-from soilml.identification.operating_points import gear_numbers, operating_points
+from soilml.identification.data.levels import Levels, load_levels, rows_driven_alike, slip_levels
+from soilml.identification.data.observations import declared_std
+from soilml.identification.data.operating_points import gear_numbers, operating_points
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column

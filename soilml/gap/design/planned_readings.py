@@ -12,7 +12,7 @@ from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, positive_std
 from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.operating_points import operating_points
+from soilml.identification.data.operating_points import operating_points
 from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating

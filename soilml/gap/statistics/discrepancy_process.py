@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.operating_points import gear_numbers
+from soilml.identification.data.operating_points import gear_numbers
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import column
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.operating_points import rows_by_gear
+from soilml.identification.data.operating_points import rows_by_gear
 
 if TYPE_CHECKING:
     from soilml.gap.statistics.coordinates import FitCoordinate

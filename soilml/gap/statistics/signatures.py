@@ -18,7 +18,7 @@ from soilml.gap.statistics.batched_predictions import (
     predict_many,
 )
 from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
-from soilml.identification.levels import covariate_levels
+from soilml.identification.data.levels import covariate_levels
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.levels import Levels
+from soilml.identification.data.levels import Levels
 
 Floats = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from soilml.gap.statistics.batched_predictions import (
 )
 from soilml.gap.statistics.coordinates import size_coordinate, soil_coordinate
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
+from soilml.identification.data.observations import read_observations
 from soilml.identification.discrepancy import discrepancy_columns
 from soilml.identification.free_parameters import select_free
-from soilml.identification.observations import read_observations
 from soilml.physics.effects import EFFECTS
 
 WIDTHS = WHEELS.replace("0.12", "0.10", 1)

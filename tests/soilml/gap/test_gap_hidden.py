@@ -5,7 +5,7 @@ import pytest
 from gap_sets import analysed, hidden
 
 from soilml.gap import STATUSES
-from soilml.identification.operating_points import operating_points
+from soilml.identification.data.operating_points import operating_points
 from soilml.quantities import CHANNELS, column
 
 pytestmark = pytest.mark.slow

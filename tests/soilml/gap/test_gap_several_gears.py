@@ -17,8 +17,8 @@ from soilml.gap.statistics.coordinates import (
     soil_coordinate,
 )
 from soilml.gap.statistics.signatures import effect_signatures
+from soilml.identification.data.operating_points import operating_points
 from soilml.identification.free_parameters import select_free
-from soilml.identification.operating_points import operating_points
 from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.operating_points import operating_points
+from soilml.identification.data.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
