@@ -18,6 +18,11 @@ Floats = NDArray[np.float64]
 #: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
 #: about 1.6, which change the evidence by less than 1 near its maximum.
 AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Precision of the size of an effect whose prior is added afterwards, in reference sizes: so weak
+#: that it does not shrink the size, and strong enough for an effect without influence.
+WEAK_PRECISION = 0.1
+#: Range over which the logarithm of a physical effect's size is nearly uniform, in reference sizes.
+SMALLEST_SIZE, LARGEST_SIZE = 0.01, 5.0
 #: Prior probability that a channel has no discrepancy at all.
 NO_DISCREPANCY = 0.5
 #: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and
@@ -118,7 +123,11 @@ class DiscrepancyModel:
                 value, amplitude = float(values[best]), trials[best]
             if before - value < 0.1:
                 break
-        return Evidence(value, amplitude, problem.steps(amplitude[None, :])[0])
+        step, precision = problem.step_and_precision(amplitude)
+        for size, own in zip(step[len(fit.x) :], precision[len(fit.x) :], strict=True):
+            curvature, _, density = _size_prior(float(size), two_sided=False)
+            value += density + float(np.log((own - WEAK_PRECISION + curvature) / own))
+        return Evidence(value, amplitude, step)
 
 
 @dataclass(frozen=True)
@@ -138,11 +147,13 @@ class _Linearised:
         """Evidence (b,) at amplitudes (b, channels)."""
         return self._solve(amplitudes)[0]
 
-    def steps(self, amplitudes: Floats) -> Floats:
-        """Steps (b, p) to the optimum at amplitudes (b, channels)."""
-        return self._solve(amplitudes)[1]
+    def step_and_precision(self, amplitude: Floats) -> tuple[Floats, Floats]:
+        """Step (p,) to the optimum at amplitudes (channels,), and marginal precisions (p,)."""
+        _, step, h = self._solve(amplitude[None, :])
+        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
 
-    def _solve(self, amplitudes: Floats) -> tuple[Floats, Floats]:
+    def _solve(self, amplitudes: Floats) -> tuple[Floats, Floats, Floats]:
+        """Evidence (b,), steps (b, p) and curvature (b, p, p)."""
         t = amplitudes[:, self.channel]  # (b, q)
         m = np.eye(len(self.channel)) + t[:, :, None] * self.gram * t[:, None, :]
         factor = np.linalg.cholesky(m)
@@ -158,7 +169,7 @@ class _Linearised:
         value += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         if p:
             value += np.linalg.slogdet(h)[1]
-        return value + self.constant + amplitude_penalty(amplitudes), step
+        return value + self.constant + amplitude_penalty(amplitudes), step, h
 
 
 def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _Linearised:
@@ -176,10 +187,10 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _
         gram=model._gram,
         cross=model.columns.T @ block,
         plain=block.T @ block,
-        precision=np.concatenate([precision, np.full(k, 2.0)]),
+        precision=np.concatenate([precision, np.full(k, WEAK_PRECISION)]),
         pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]),
         movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
-        constant=sum(constant for _, _, constant in priors) - k * float(np.log(2.0)),
+        constant=sum(constant for _, _, constant in priors),
         channel=model.process.channel,
     )
 
@@ -187,19 +198,26 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _
 def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float, float]:
     r"""Precision of a coordinate's prior at x, and half the derivative and the value of -2 ln p.
 
-    A soil coordinate is uniform. A size or shape with a standard deviation is Gaussian. The size of
-    a physical effect has the Cauchy density with a scale of one reference size, because sizes of
-    several reference sizes occur; 2 / (1 + x^2) is the precision of the Gaussian scale mixture that
-    has the same slope at x. Densities are normalised so that a coordinate that the data do not
-    determine leaves the evidence unchanged.
+    The value is that of -2 ln p - ln(2 pi), which with ln|H| gives the integral over x. A soil
+    coordinate is uniform. A size or shape with a standard deviation is Gaussian. The size of a
+    physical effect is scale-free: between `SMALLEST_SIZE` and `LARGEST_SIZE` reference sizes, its
+    logarithm is nearly uniform, because effects of a hundredth and of several times their
+    reference size occur.
     """
     if not isinstance(coordinate, EffectCoordinate):
         return UNIFORM_PRECISION, 0.0, 0.0
     if np.isfinite(coordinate.std):
         precision = coordinate.std**-2
         return precision, precision * x, precision * x**2 - float(np.log(precision))
-    weight = 2.0 / (1.0 + x**2)
-    return weight, weight * x, 2.0 * float(np.log1p(x**2)) - float(np.log(2.0))
+    return _size_prior(x, two_sided=coordinate.lower < 0.0 < coordinate.upper)
+
+
+def _size_prior(x: float, *, two_sided: bool) -> tuple[float, float, float]:
+    r"""As `_prior`, for the density 1 / [(|x| + e) ln(1 + X / e)] of a size."""
+    shifted = abs(x) + SMALLEST_SIZE
+    span = float(np.log1p(LARGEST_SIZE / SMALLEST_SIZE)) * (2.0 if two_sided else 1.0)
+    value = 2.0 * float(np.log(span * shifted)) - float(np.log(2.0 * np.pi))
+    return shifted**-2, float(np.sign(x)) / shifted, value
 
 
 def _amplitude_masses() -> Floats:

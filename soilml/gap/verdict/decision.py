@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.statistics.coordinates import EffectCoordinate
+from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.verdict.law_difference import law_matters
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
 #: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
 #: several adjustable laws together fit almost any data.
 MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
+
+#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
+#: nothing: a gain error of 18 % without calibration.
+MAX_SIZE_DEVIATION = 3.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,7 @@ def decide(
         return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
     best = accepted[0]
     most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
-    if best.shape_deviation > most or not _predicts(runs):
+    if best.shape_deviation > most or _implausible(best.fit) or not _predicts(runs):
         return Decision("unknown", (), None)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
@@ -70,6 +78,13 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def _implausible(fit: GapFit) -> bool:
+    """Whether a fault of a sensor or the rig is far larger than its prior allows."""
+    sizes = [isinstance(c, EffectCoordinate) and not c.is_shape for c in fit.coordinates]
+    deviation = np.abs(fit.x) * np.sqrt(fit.precision)
+    return bool(np.any(deviation[np.asarray(sizes, dtype=np.bool_)] > MAX_SIZE_DEVIATION))
 
 
 def _predicts(runs: GapReduction | None) -> bool:
