@@ -88,3 +88,29 @@ def test_the_continuous_law_of_braking_explains_driving_and_braking_far_better(t
         assert main(["identify", str(model), str(runs)]) == 0
         misfit.append(json.loads(capsys.readouterr().out)["misfit"])
     assert misfit[0] < 0.4 * misfit[1]
+
+
+def test_plate_and_shear_tests_contain_their_known_soil(tmp_path, monkeypatch):
+    """The simulated bevameter has known parameters; the sand a friction angle by triaxial tests."""
+    path = ROOT / "examples" / "bevameter" / "real.py"
+    spec = importlib.util.spec_from_file_location("bevameter_real", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.chdir(tmp_path)
+    module.run()
+    made = tmp_path / "demo/bevameter"
+    words = ["bevameter", str(made / "crm_plates.csv"), str(made / "crm_ring.csv")]
+    assert main([*words, "--json", str(tmp_path / "crm.json")]) == 0
+    found = json.loads((tmp_path / "crm.json").read_text())
+    known = {"kphi": 2.2e6, "kc": -1.1e5, "n": 1.2}
+    known |= {"cohesion": 2495.0, "friction_angle": 0.4189, "shear_modulus": 0.003}
+    for name, value in known.items():
+        low, high = found["estimates"][name]["another_place_95"]
+        assert low <= value <= high, name
+    assert any("failure line is curved" in text for text in found["remarks"])
+    words = ["bevameter", str(made / "cullinan_shear.csv")]
+    assert main([*words, "--json", str(tmp_path / "sand.json")]) == 0
+    found = json.loads((tmp_path / "sand.json").read_text())
+    low, high = found["estimates"]["shear_strength"]["another_place_95"]
+    assert low <= 93e3 * 0.637 <= high  # tan 32.5 degrees, without cohesion
+    assert any("cannot be told apart" in text for text in found["remarks"])

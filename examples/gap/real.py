@@ -21,7 +21,7 @@ OUT = Path("demo/gap/real")
 
 
 def run() -> None:
-    """KLS-1: the lugged wheel on the smooth one's soil. CMU: a smooth wheel, straight ahead."""
+    """KLS-1: the lugged wheel on the smooth one's soil, and both. CMU: a smooth wheel ahead."""
     data = Path(os.environ.get("SOILML_DATA", ""))
     kls1 = data / "kls1_rashid1" / "single_wheel_tests.csv"
     cmu = data / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
@@ -29,6 +29,7 @@ def run() -> None:
         sys.exit("set SOILML_DATA to the folder that contains kls1_rashid1 and cmu_smooth_wheel")
     OUT.mkdir(parents=True, exist_ok=True)
     lugged(kls1)
+    together(kls1)
     straight(cmu, "all", -1.0)
     straight(cmu, "driving", 0.0)
 
@@ -47,6 +48,17 @@ def lugged(table: Path) -> None:
     _written(runs, rows)
     free = ["--free", "shear_modulus"]  # the soil is the smooth wheel's
     _ran(["gap", str(smooth), str(runs), *free, "--out", str(OUT / "kls1_lugged")])
+
+
+def together(table: Path) -> None:
+    """The smooth and the lugged wheel on one soil, told apart by the column gear."""
+    rows = _rows(table, lambda row: row["run"].startswith("kls1"))
+    for row in rows:
+        row["gear"] = "lugged" if float(row["grouser_height_m"]) > 0.0 else "smooth"
+    runs = OUT / "kls1_together.csv"
+    _written(runs, rows)
+    model = str(KLS1.with_name("two_wheels.toml"))
+    _ran(["gap", model, str(runs), "--out", str(OUT / "kls1_together")])
 
 
 def straight(table: Path, name: str, lowest: float) -> None:
