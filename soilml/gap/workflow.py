@@ -31,7 +31,7 @@ from soilml.gap.verdict.claimed_effects import (
     soil_estimates,
 )
 from soilml.gap.verdict.cross_validation import predict_held_out
-from soilml.gap.verdict.decision import Decision, decide
+from soilml.gap.verdict.decision import Decision, cause_set, decide, unclaimed_effects
 from soilml.gap.verdict.disagreements import disagreements
 from soilml.gap.verdict.remaining_discrepancy import (
     discrepancy_amplitudes,
@@ -216,10 +216,10 @@ def _build_report(
         status=decision.status,
         sentence="",
         model=updated_case(after.fit, discrepancy_amplitudes(problem, after)),
-        cause_set=tuple(c.names for c in decision.claimed),
+        cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
         suspects=tuple(suspects(analysis, obstacles)),
-        best_unclaimed=() if decision.claimed or not decision.shown else decision.shown.names,
+        best_unclaimed=unclaimed_effects(decision, result),
         reasons=_reasons(decision.status, obstacles, conflicts),
         gap=figures,
         soil_before=soil_estimates(result.soil),

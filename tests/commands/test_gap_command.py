@@ -192,13 +192,27 @@ def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
     assert text.strip() == "run,kind,what,separates_sigma,slip,load_N"
 
 
-def test_one_load_is_not_testable_and_names_nothing(inputs, tmp_path, capsys):
+def test_one_load_has_suspects_and_names_nothing(inputs, tmp_path, capsys):
     files = (str(inputs / "model.toml"), str(inputs / "one.csv"))
     found = analysed(inputs, tmp_path, capsys, *files)
-    assert found["status"] == "not-testable"
-    assert found["effects"] == found["cause_set"] == []
+    assert found["status"] == "suspected"
+    assert found["effects"] == []
     assert "one load only" in found["reasons"][0]
+    odds = [suspect["log_odds"] for suspect in found["suspects"]]
+    assert odds == sorted(odds, reverse=True)
+    assert all("one load cannot test them" in s["given"] for s in found["suspects"])
+    first = found["suspects"][0]["effects"]
+    assert found["fits_best_but_not_claimed"] == first
     assert "[[effect]]" not in (tmp_path / "out" / "model.toml").read_text()
+    suspected = (tmp_path / "out" / "model_suspected.toml").read_text()
+    assert all(f'name = "{name}"' in suspected for name in first)
+
+
+def test_a_model_of_an_earlier_suspicion_does_not_stay(inputs, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "model_suspected.toml").write_text("of an earlier analysis")
+    analysed(inputs, tmp_path, capsys, str(inputs / "model.toml"), str(inputs / "runs.csv"))
+    assert not (tmp_path / "out" / "model_suspected.toml").exists()
 
 
 def test_noise_that_nobody_declared_is_bad_data_with_a_hint(inputs, tmp_path, capsys):

@@ -40,9 +40,21 @@ class Posterior:
         """Natural logarithm of the odds that an effect is present."""
         return self._log_odds(lambda names: effect in names)
 
-    def set_log_odds(self, effects: Names) -> float:
-        """Natural logarithm of the odds that all these effects are present."""
-        return self._log_odds(lambda names: set(effects) <= set(names))
+    def ranked(self) -> list[tuple[Names, float]]:
+        """Sets of effects with the natural logarithm of their odds, the likeliest first.
+
+        A set that contains a likelier one counts towards it and is not listed.
+        """
+        groups: dict[Names, set[Names]] = {}
+        for names in sorted(self.log_weights, key=lambda n: (-self.log_weights[n], n)):
+            if names:
+                smaller = next((n for n in groups if set(n) <= set(names)), names)
+                groups.setdefault(smaller, set()).add(names)
+        odds = {
+            names: self._log_odds(lambda other, group=group: other in group)  # type: ignore[misc]
+            for names, group in groups.items()
+        }
+        return sorted(odds.items(), key=lambda item: (-item[1], item[0]))
 
     def _log_odds(self, holds: Callable[[Names], bool]) -> float:
         odds = self._log_sum(holds) - self._log_sum(lambda names: not holds(names))
@@ -64,17 +76,21 @@ def explanations(candidates: Sequence[CandidateFit], found: Posterior) -> tuple[
     A set is left out if a part of it is not rejected either: the evidence for the rest of it is
     not decisive. The first of them is the soil alone where that is not rejected.
     """
-    ordered = sorted(candidates, key=lambda c: c.objective)
-    kept = [
-        c
-        for c in ordered
-        if (
-            c.objective <= ordered[0].objective + REJECTION_THRESHOLD / TEMPERING
-            if c.names
-            else found.weight(()) >= MAX_CHANCE
-        )
-    ]
-    return tuple(c for c in kept if not any(set(o.names) < set(c.names) for o in kept))
+    alone = [c for c in candidates if not c.names and found.weight(()) >= MAX_CHANCE]
+    return _smallest([*(c for c in not_rejected(candidates) if c.names), *alone])
+
+
+def not_rejected(candidates: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
+    """The smallest sets of effects that are not rejected against the best one, the best first."""
+    lowest = min((c.objective for c in candidates if c.names), default=np.inf)
+    limit = lowest + REJECTION_THRESHOLD / TEMPERING
+    return _smallest([c for c in candidates if c.names and c.objective <= limit])
+
+
+def _smallest(candidates: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
+    """The sets of which no part is among the candidates, in order of their objective."""
+    kept = [c for c in candidates if not any(set(o.names) < set(c.names) for o in candidates)]
+    return tuple(sorted(kept, key=lambda c: c.objective))
 
 
 def posterior(

@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.statistics.coordinates import EffectCoordinate
@@ -90,3 +91,17 @@ def _implausible(fit: GapFit) -> bool:
 def _predicts(runs: GapReduction | None) -> bool:
     """Whether held-out runs are predicted better than without the explanation."""
     return runs is None or runs.after <= max(runs.before, 1.0)
+
+
+def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...], ...]:
+    """The explanations that the data do not reject, where a cause is claimed or suspected."""
+    if decision.status == "suspected":
+        return tuple(c.names for c in not_rejected(result.candidates) if c.names)
+    return tuple(c.names for c in decision.claimed)
+
+
+def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ...]:
+    """The likeliest effects where none are claimed."""
+    if decision.claimed or result.likeliest is None:
+        return ()
+    return decision.shown.names if decision.shown else result.likeliest.names

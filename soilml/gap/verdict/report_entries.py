@@ -64,7 +64,7 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
     result = analysis.result
     if result.none is None:
         return []
-    lowest = result.candidates[0].objective
+    lowest = min((c.objective for c in result.candidates if c.names), default=0.0)
     accepted = {c.names for c in result.accepted}
     summaries = []
     for c in result.candidates:
@@ -91,22 +91,18 @@ def suspects(analysis: Analysis, naming_obstacles: Sequence[str]) -> list[Suspec
 
     The odds hold under the conditions that `given` states in words.
     """
-    found = analysis.result.posterior
-    conditions = ["no other cause than those of the catalogue has an effect like it"]
-    runs = len(analysis.problem.readings.runs)
-    if runs == 1:
+    conditions = ["no other cause than those of the catalogue has a similar signature"]
+    if len(analysis.problem.readings.runs) == 1:
         conditions.append("the bed was the same for all rows")
     if any("load" in text for text in naming_obstacles):
         conditions.append(
             "the soil parameters lie inside their priors, because one load cannot test them"
         )
     given = "if " + ", and if ".join(conditions)
-    ordered = sorted(found.log_weights, key=lambda names: -found.log_weights[names])
-    listed: list[tuple[str, ...]] = []
-    for names in ordered:
-        if names and not any(set(smaller) <= set(names) for smaller in listed):
-            listed.append(names)
-    return [Suspect(names, found.set_log_odds(names), given) for names in listed[:LISTED_SUSPECTS]]
+    return [
+        Suspect(names, odds, given)
+        for names, odds in analysis.result.posterior.ranked()[:LISTED_SUSPECTS]
+    ]
 
 
 def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
