@@ -62,8 +62,11 @@ def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
         return json.loads((tmp_path / "demo/gap/real" / name / "gap.json").read_text())
 
     lugged = said("kls1_lugged")
-    assert lugged["status"] == "not-testable" and lugged["effects"] == []
-    assert lugged["fits_best_but_not_claimed"] == ["grousers", "slip-sinkage"]
+    assert lugged["status"] == "suspected" and lugged["effects"] == []
+    together = said("kls1_together")  # the smooth wheel beside it tells what the lugs change
+    assert together["status"] == "suspected" and together["effects"] == []
+    assert together["suspects"][0]["effects"] == ["grousers@lugged"]
+    assert together["suspects"][0]["log_odds"] > 0.0 > together["suspects"][1]["log_odds"]
     driving = said("cmu_driving")
     assert driving["fits_best_but_not_claimed"] == ["slip-sinkage"]
     for found in (driving, said("cmu_all")):

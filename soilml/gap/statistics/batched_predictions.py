@@ -37,7 +37,8 @@ class PredictionRequest:
     """The readings that a case predicts at sets of coordinates, x (sets, p).
 
     `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
-    see `soilml.physics.nearby_equilibrium.SinkageEstimate`.
+    see `soilml.physics.nearby_equilibrium.SinkageEstimate`. `gears` are the readings of each of
+    several gears, where they are known from an earlier request.
     """
 
     case: Case
@@ -45,6 +46,7 @@ class PredictionRequest:
     x: Floats
     readings: StackedReadings
     estimate: SinkageEstimate | None = None
+    gears: Sequence[GearReadings] | None = None
 
     def of_gear(self, part: GearReadings) -> PredictionRequest:
         """The same for the readings of one of several gears."""
@@ -112,16 +114,16 @@ def _by_gear(
 ) -> list[T | InputError]:
     """Answers to all requests; one of several gears is asked for each gear, and joined again."""
     parts = [
-        list(readings_by_gear(r.case, r.coordinates, r.readings)) if r.case.gears else None
+        readings_by_gear(r.case, r.coordinates, r.readings) if r.gears is None else r.gears
         for r in requests
     ]
     asked: list[PredictionRequest] = []
     for request, own in zip(requests, parts, strict=True):
-        asked += [request] if own is None else [request.of_gear(part) for part in own]
+        asked += [request.of_gear(part) for part in own] if request.case.gears else [request]
     found = iter(answer(asked))
     answers: list[T | InputError] = []
     for request, own in zip(requests, parts, strict=True):
-        if own is None:
+        if not request.case.gears:
             answers.append(next(found))
             continue
         each = [next(found) for _ in own]

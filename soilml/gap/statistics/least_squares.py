@@ -19,6 +19,7 @@ from soilml.gap.statistics.batched_predictions import (
     predict_many,
 )
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
+from soilml.gap.statistics.readings_by_gear import readings_by_gear
 from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 Floats = NDArray[np.float64]
@@ -216,6 +217,7 @@ def _descent(request: FitRequest) -> _Descent:
     lower = np.asarray([c.lower for c in coordinates])
     upper = np.asarray([c.upper for c in coordinates])
     weight = np.asarray([1.0 / c.std for c in coordinates])
+    gears = readings_by_gear(request.case, coordinates, readings)
 
     def whitened_residual(y: Floats) -> Floats:
         white = (readings.reading - y) @ request.whiten.T
@@ -225,7 +227,7 @@ def _descent(request: FitRequest) -> _Descent:
         return np.asarray((residual**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
 
     def asked(x: Floats, sinkage: SinkageEstimate | None) -> PredictionRequest:
-        return PredictionRequest(request.case, coordinates, x, readings, sinkage)
+        return PredictionRequest(request.case, coordinates, x, readings, sinkage, gears)
 
     def iterate(x: Floats, model: Linearisation) -> _Iterate:
         residual = whitened_residual(model.prediction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -37,21 +37,30 @@ class GearReadings:
 
 def readings_by_gear(
     case: Case, coordinates: Sequence[FitCoordinate], readings: StackedReadings
-) -> Iterator[GearReadings]:
-    """The readings of each gear of a case with several; a gear without readings is left out."""
+) -> list[GearReadings]:
+    """The readings of each gear of a case with several; none where there is one gear.
+
+    A gear without readings is left out.
+    """
+    parts: list[GearReadings] = []
+    if not case.gears:
+        return parts
     for gear in rows_by_gear(case, readings.at):
         selected, own = readings.of_rows(gear.rows, gear.at)
         if not selected.any():
             continue
         kept = [i for i, c in enumerate(coordinates) if c.path in gear.paths]
-        yield GearReadings(
-            gear.case,
-            [_at_path(coordinates[i], gear.paths[coordinates[i].path]) for i in kept],
-            np.asarray(kept, dtype=np.int64),
-            own,
-            gear.rows,
-            np.flatnonzero(selected),
+        parts.append(
+            GearReadings(
+                gear.case,
+                [_at_path(coordinates[i], gear.paths[coordinates[i].path]) for i in kept],
+                np.asarray(kept, dtype=np.int64),
+                own,
+                gear.rows,
+                np.flatnonzero(selected),
+            )
         )
+    return parts
 
 
 def _at_path(coordinate: FitCoordinate, path: str) -> FitCoordinate:
