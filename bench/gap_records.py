@@ -34,6 +34,11 @@ def first(s: Judged) -> bool:
     return bool(s.get("cause_set")) and s["cause_set"][0] == s["truth"]
 
 
+def right(s: Judged) -> bool:
+    """Whether every effect of the best explanation is one that was hidden."""
+    return bool(s.get("cause_set")) and set(s["cause_set"][0]) <= set(s["truth"])
+
+
 def suspected(s: Judged, most: int) -> bool:
     """Whether the truth is among so many first suspects, or claimed explanations without them."""
     return s["truth"] in (s.get("suspects") or s.get("cause_set") or ())[:most]

@@ -13,10 +13,10 @@ from gap_records import (
     SUSPECT_DESIGNS,
     Judged,
     bare,
-    first,
     holds,
     nameable,
     rate,
+    right,
     scattered,
     suspected,
     unique,
@@ -77,10 +77,10 @@ def _naming(sets: Sequence[Judged]) -> Iterator[Figure]:
         text = f"right cause in the cause set, SNR >= 3, discrepancy {level:.0%}"
         yield _share(text, sum(map(holds, part)), len(part), goal)
     alone = [s for s in sets if unique(s)]
-    yield _share("right when unique, all tiers", sum(map(first, alone)), len(alone), ">= 0.95")
+    yield _share("right when unique, all tiers", sum(map(right, alone)), len(alone), ">= 0.95")
     known = [s for s in alone if s["catalogued"]]
     text = "right when unique, cause in the catalogue"
-    yield _share(text, sum(map(first, known)), len(known))
+    yield _share(text, sum(map(right, known)), len(known))
 
 
 def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:

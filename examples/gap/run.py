@@ -24,7 +24,7 @@ PLANS = {
     "unknown": Plan("C", "stiff-layer", 1.0, 0.01, 8, "dry-sand", 3, seed=5),
 }
 #: Hidden in the story of the slope: a little bulldozing, in times the formula.
-SHARE = 0.02
+SHARE = 0.05
 
 
 @dataclass(frozen=True)

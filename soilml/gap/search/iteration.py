@@ -35,7 +35,7 @@ from soilml.quantities import column
 Floats = NDArray[np.float64]
 
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
-MAX_PASSES = 3
+MAX_PASSES = 2
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the

@@ -17,9 +17,9 @@ from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.verdict.law_difference import law_matters
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
-#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
+#: effect keeps its name: 1.7 sigma for one effect. For several effects the limit is lower, because
 #: several adjustable laws together fit almost any data.
-MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
+MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 3.0, 1.0
 
 #: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
 #: nothing: a gain error of 18 % without calibration.

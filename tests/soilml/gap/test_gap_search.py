@@ -109,7 +109,7 @@ def test_the_search_names_what_acts(dug):
     found = search(problem, soil, 0)
     assert found.has_gap and found.adequate
     assert [c.names for c in found.accepted] == [("slip-sinkage",)]
-    assert found.posterior.probability("slip-sinkage") > 0.99
+    assert found.posterior.probability("slip-sinkage") > 0.89
     assert found.likeliest.names == ("slip-sinkage",)
     assert np.all(found.likeliest.amplitude < 0.5)  # nothing is left for a discrepancy
 
