@@ -199,12 +199,12 @@ def _build_report(
     obstacles = checks.naming_obstacles
     before = soil_marginal(analysis)
     conflicts = [] if result.has_gap else disagreements(problem, result.soil)
-    best = next((c for c in result.accepted if c.names), None)
-    figures = gap_reductions(analysis, best.best if best else before, seed)
+    best = next((c.best for c in result.accepted if c.names), before)
+    figures = gap_reductions(analysis, before, best, seed)
     decision = decide(problem, result, obstacles, conflicts, figures.get("held_out_runs"))
     shown = decision.shown.best if decision.shown else before
-    if best is None or shown is not best.best:
-        figures = gap_reductions(analysis, shown, seed)
+    if shown is not best:
+        figures = gap_reductions(analysis, before, shown, seed)
     if held_out is not None and len(held_out):  # after the verdict, which must not depend on it
         description = split.description
         figures[split.name] = predict_held_out(

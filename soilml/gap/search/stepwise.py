@@ -29,8 +29,9 @@ GAP_LEVEL = 0.03
 #: Significance level of the test for a remainder that the best explanation does not account for.
 LACK_OF_FIT_LEVEL = 0.001
 #: Effects are fitted in full if their predicted gain is within this margin of the largest, and so
-#: many of the largest in any case; the prediction is linear and can be wrong by that much.
-GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 8, 12
+#: many of the largest in any case, more of them beside a large discrepancy; the prediction is
+#: linear and can be wrong by that much.
+GAIN_MARGIN, MIN_FITTED, MIN_FITTED_HIDDEN, MAX_FITTED = 12.0, 4, 8, 12
 #: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
 MIN_NET_GAIN = -2.0
 #: Objective above that of the best candidate up to which shapes are estimated and sets extended.
@@ -48,6 +49,8 @@ LARGE_DISCREPANCY = 2.5
 #: Distance from the middle of the priors at which a second fit starts, relative to the optimum of
 #: the soil alone.
 INWARD = 0.8
+#: Probability of residuals by noise alone above which nothing is left for a further effect.
+COMPLETE_LEVEL = 0.2
 #: Decrease of the objective by an extension below which no larger set is tried.
 MIN_IMPROVEMENT = 1.0
 
@@ -118,10 +121,15 @@ def search(
     none = _soil_alone(problem, soil, starts)
     gains = _predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
-    level = _fit_level(problem, soil, none, {(n,): none for n in _select_by_gain(gains)}, starts)
+    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    selected = _select_by_gain(gains, MIN_FITTED_HIDDEN if hidden else MIN_FITTED)
+    level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
     for _ in range(MAX_EFFECTS - 1):
-        lowest = min(c.objective for c in fitted.values())
+        best = min(fitted.values(), key=lambda c: c.objective)
+        if best.names and _is_complete(problem, best, seed):
+            break
+        lowest = best.objective
         extensions = _extensions(problem, level, fitted, lowest)
         level = _fit_level(problem, soil, none, extensions, starts)
         fitted |= {c.names: c for c in level}
@@ -233,19 +241,26 @@ def _off_bounds(soil: GapFit) -> dict[str, float]:
     return {path: 0.5 + INWARD * (x - 0.5) for path, x in start.items()}
 
 
+def _is_complete(problem: FitProblem, best: CandidateFit, seed: int) -> bool:
+    """Whether a candidate leaves neither a discrepancy nor anything that the catalogue explains."""
+    if float(best.amplitude.max()) > 0.0:
+        return False
+    return _test_residuals(problem, best, seed).p_value > COMPLETE_LEVEL
+
+
 def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> ResidualTest:
     fit = candidate.fit
     signatures, _ = effect_signatures(fit.fitted(), problem.readings, problem.effects_not_in(fit))
     return residual_test(problem, fit, signatures, seed)
 
 
-def _select_by_gain(gains: Mapping[str, float]) -> list[str]:
-    """Effects to fit in full, in order of their predicted gain."""
+def _select_by_gain(gains: Mapping[str, float], least: int) -> list[str]:
+    """At least so many effects to fit in full, in order of their predicted gain."""
     ordered = sorted(gains, key=lambda name: -gains[name])
     if not ordered:
         return []
     close = [n for n in ordered if gains[n] > gains[ordered[0]] - GAIN_MARGIN]
-    return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
+    return ordered[: min(MAX_FITTED, max(least, len(close)))]
 
 
 def _extensions(

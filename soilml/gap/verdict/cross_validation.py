@@ -13,7 +13,7 @@ from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import predict_readings
-from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
+from soilml.gap.statistics.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.reml_covariance import (
     Covariance,
     assemble_covariance,
@@ -49,15 +49,6 @@ def gap_reduction(
         if in_channel.any():
             channels[column(name)] = (float(old[in_channel].mean()), float(new[in_channel].mean()))
     return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
-
-
-def refit(problem: FitProblem, marginal: MarginalFit, selected: Mask) -> GapFit:
-    """Fit the same model to some of the readings, beside the same discrepancy, from its optimum."""
-    fit = marginal.fit
-    matrix = problem.discrepancy.matrix(marginal.evidence.amplitude)[np.ix_(selected, selected)]
-    whiten = np.linalg.inv(np.linalg.cholesky(matrix))
-    readings = problem.readings.subset(selected)
-    return levenberg_marquardt(fit.case, fit.coordinates, readings, whiten, fit.x)
 
 
 def held_out_runs(
@@ -116,25 +107,43 @@ def _cross_validate(
 ) -> GapReduction | None:
     """Predict each fold by refits of both models to all readings outside it."""
     readings = problem.readings
-    before_prediction = np.full(len(readings), np.nan)
-    after_prediction = np.full(len(readings), np.nan)
-    for number in predicted_folds:
-        out = fold == number
-        for fit, target in ((soil, before_prediction), (after, after_prediction)):
-            try:
-                again = refit(problem, fit, ~out)
-            except (InputError, np.linalg.LinAlgError):
-                continue  # without a fit the prediction stays NaN
-            y = predict_readings(again.case, again.coordinates, again.x[None, :], readings)[0]
-            target[out] = y[out]
+    before = _predict_folds(problem, soil, fold, predicted_folds)
+    new = before if after is soil else _predict_folds(problem, after, fold, predicted_folds)
     selected = np.isin(fold, predicted_folds)
     return gap_reduction(
         readings.subset(selected),
         problem.covariance.std[selected],
-        before_prediction[selected],
-        after_prediction[selected],
+        before[selected],
+        new[selected],
         description,
     )
+
+
+def _predict_folds(
+    problem: FitProblem,
+    marginal: MarginalFit,
+    fold: NDArray[np.int64],
+    predicted_folds: NDArray[np.int64],
+) -> Floats:
+    """Prediction of each fold by the same model, refitted to all other readings, (m,).
+
+    The fits are made beside the same discrepancy, from its optimum. Readings of a fold without a
+    fit, and those of other folds, are NaN.
+    """
+    fit, readings = marginal.fit, problem.readings
+    matrix = problem.discrepancy.matrix(marginal.evidence.amplitude)
+    requests = []
+    for number in predicted_folds:
+        rest = fold != number
+        whiten = np.linalg.inv(np.linalg.cholesky(matrix[np.ix_(rest, rest)]))
+        requests.append(FitRequest(fit.case, fit.coordinates, readings.subset(rest), whiten, fit.x))
+    predicted = np.full(len(readings), np.nan)
+    for number, again in zip(predicted_folds, descend_together(requests), strict=True):
+        if isinstance(again, InputError):
+            continue
+        y = predict_readings(again.case, again.coordinates, again.x[None, :], readings)[0]
+        predicted[fold == number] = y[fold == number]
+    return predicted
 
 
 def predict_held_out(

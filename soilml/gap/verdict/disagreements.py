@@ -74,7 +74,7 @@ def _repeats(problem: FitProblem, soil: GapFit) -> list[str]:
 
 def _region(problem: FitProblem, soil: GapFit) -> list[str]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     chosen = region_fold(problem.readings)
     if chosen is None:
@@ -95,7 +95,7 @@ def _region(problem: FitProblem, soil: GapFit) -> list[str]:
         return [f"a fit to the rows outside {name} has no equilibrium inside it"]
     matrix = covariance.matrix[inside] + jacobian @ fit.covariance @ jacobian.T
     square = float(residual @ np.linalg.solve(matrix, residual))
-    if chi2.sf(square, residual.size) >= REGION_LEVEL:
+    if chdtrc(residual.size, square) >= REGION_LEVEL:
         return []
     return [
         f"the region {name} is not predicted by a fit to the other rows: mean squared residual "

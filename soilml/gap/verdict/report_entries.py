@@ -33,13 +33,14 @@ AT_BOUND = 1e-3
 NOTABLE_NOISE_SCALE = 1.25
 
 
-def gap_reductions(analysis: Analysis, after: MarginalFit, seed: int) -> dict[str, GapReduction]:
+def gap_reductions(
+    analysis: Analysis, soil: MarginalFit, after: MarginalFit, seed: int
+) -> dict[str, GapReduction]:
     """Figures of the fitted rows and of cross-validation, as far as the runs allow it.
 
     Before is the soil alone, fitted under noise and scatter; after is the explanation shown.
     """
     problem = analysis.problem
-    soil = soil_marginal(analysis)
     std = problem.covariance.std
     description = "all rows fitted"
     figures = {
