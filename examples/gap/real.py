@@ -28,10 +28,24 @@ def run() -> None:
     if not (kls1.is_file() and cmu.is_file()):
         sys.exit("set SOILML_DATA to the folder that contains kls1_rashid1 and cmu_smooth_wheel")
     OUT.mkdir(parents=True, exist_ok=True)
+    smooth(kls1)
     lugged(kls1)
     together(kls1)
-    straight(cmu, "all", -1.0)
-    straight(cmu, "driving", 0.0)
+    straight(cmu, "driving", 0.0, 1.0)
+    straight(cmu, "braking", -1.0, 0.0)
+    straight(cmu, "all", -1.0, 1.0)
+
+
+def smooth(table: Path) -> None:
+    """The smooth wheel alone, with the priors of its model file."""
+    rows = _rows(table, lambda row: row["run"] == "kls1_smooth_w59")
+    runs = OUT / "kls1_smooth.csv"
+    _written(runs, rows)
+    case = read_case(KLS1)
+    case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
+    model = OUT / "kls1_prior.toml"
+    save_text(model, case_as_toml(case, ["the model file of the wheel, with noise of the pull"]))
+    _ran(["gap", str(model), str(runs), "--out", str(OUT / "kls1_smooth")])
 
 
 def lugged(table: Path) -> None:
@@ -61,10 +75,11 @@ def together(table: Path) -> None:
     _ran(["gap", model, str(runs), "--out", str(OUT / "kls1_together")])
 
 
-def straight(table: Path, name: str, lowest: float) -> None:
-    """The trials without slip angle above a slip; repeats of one slip are in different runs."""
+def straight(table: Path, name: str, lowest: float, highest: float) -> None:
+    """The trials without slip angle between two slips; repeats of one slip are in different runs."""
     rows = _rows(
-        table, lambda row: float(row["slip_angle_rad"]) == 0.0 and float(row["slip"]) > lowest
+        table,
+        lambda row: float(row["slip_angle_rad"]) == 0.0 and lowest < float(row["slip"]) < highest,
     )
     seen: dict[str, int] = {}
     for row in rows:
