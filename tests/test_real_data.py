@@ -69,8 +69,8 @@ def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
     assert together["suspects"][0]["log_odds"] > 0.0 > together["suspects"][1]["log_odds"]
     driving = said("cmu_driving")
     assert driving["fits_best_but_not_claimed"] == ["slip-sinkage"]
-    for found in (driving, said("cmu_all")):
-        assert found["cause_set"] == []
+    for found in (driving, said("cmu_braking"), said("cmu_all")):
+        assert found["effects"] == []
         assert any("one load only" in reason for reason in found["reasons"])
 
 

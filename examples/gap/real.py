@@ -21,7 +21,7 @@ OUT = Path("demo/gap/real")
 
 
 def run() -> None:
-    """KLS-1: the lugged wheel on the smooth one's soil, and both. CMU: a smooth wheel ahead."""
+    """KLS-1: a smooth and a lugged wheel, singly and together. CMU: a smooth wheel, straight."""
     data = Path(os.environ.get("SOILML_DATA", ""))
     kls1 = data / "kls1_rashid1" / "single_wheel_tests.csv"
     cmu = data / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
@@ -76,7 +76,7 @@ def together(table: Path) -> None:
 
 
 def straight(table: Path, name: str, lowest: float, highest: float) -> None:
-    """The trials without slip angle between two slips; repeats of one slip are in different runs."""
+    """The trials without slip angle between two slips, repeats of a slip in different runs."""
     rows = _rows(
         table,
         lambda row: float(row["slip_angle_rad"]) == 0.0 and lowest < float(row["slip"]) < highest,
