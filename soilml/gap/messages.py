@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from soilml.gap.report_parts import GapReduction, decimal
+from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy, decimal
 from soilml.gap.results import GapReport
 
 #: Suspects that the sentence lists.
 LISTED_SUSPECTS = 3
+#: Logarithm of odds below which they are called even, and the largest odds that are stated.
+EVEN_ODDS, MOST_ODDS = 0.1, 10_000
 #: Discrepancy in sigma from which the sentence states it.
 NOTABLE_DISCREPANCY = 0.3
 
@@ -92,21 +95,31 @@ def _suspected(report: GapReport) -> str:
 
 def _odds(log_odds: float) -> str:
     """Odds against all other explanations, in words."""
-    odds = min(abs(log_odds), 30.0)
-    number = decimal(2.718281828**odds, 2)
-    if odds > 9.2:  # ten thousand to one
-        number = "more than 10000"
+    if abs(log_odds) < EVEN_ODDS:
+        return "even odds"
+    if abs(log_odds) > math.log(MOST_ODDS):
+        number = f"more than {MOST_ODDS}"
+    else:
+        number = decimal(math.exp(abs(log_odds)), 2)
     return f"odds {number} to 1" if log_odds >= 0.0 else f"odds 1 to {number}"
 
 
 def _remainder(report: GapReport) -> str:
     """The remaining discrepancy of each channel, in the reading's unit and in sigma."""
     parts = [
-        f"{name} {decimal(d.after_value, 2)} {d.unit} ({decimal(d.after_sigma, 2)} sigma)"
+        f"{_size(name, d)} ({decimal(d.after_sigma, 2)} sigma)"
         for name, d in report.discrepancy.items()
         if d.after_sigma >= NOTABLE_DISCREPANCY
     ]
     return f"A smooth discrepancy is left, root mean square: {', '.join(parts)}." if parts else ""
+
+
+def _size(name: str, discrepancy: RemainingDiscrepancy) -> str:
+    """A discrepancy with the name of its channel; lengths in mm."""
+    channel = name.rpartition("_")[0].replace("_", " ")
+    if discrepancy.unit == "m":
+        return f"{channel} {decimal(1e3 * discrepancy.after_value, 2)} mm"
+    return f"{channel} {decimal(discrepancy.after_value, 2)} {discrepancy.unit}"
 
 
 def unsupported_conclusions(

@@ -34,8 +34,9 @@ Floats = NDArray[np.float64]
 START_SIZE = 0.7
 #: Prior standard deviation of the error of a sensor or rig without calibration, in reference sizes.
 UNCALIBRATED_STD = 2.0
-#: Range of slip above which the dependence of an effect on it can be estimated.
-MIN_SLIP_RANGE = 0.05
+#: Range of slip, and of log load, above which the dependence of an effect on it can be estimated; a
+#: load that scatters by this much about one level can suffice.
+MIN_SLIP_RANGE, MIN_LOG_LOAD_RANGE = 0.05, 0.1
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class FitProblem:
         """The coordinates of the effects' shapes that the range of slip and load can determine."""
         varies = {
             "by_slip": np.ptp(self.readings.slip) > MIN_SLIP_RANGE,
-            "by_load": self.readings.load_levels.count >= 2,
+            "by_load": bool(np.ptp(np.log(self.readings.load)) > MIN_LOG_LOAD_RANGE),
         }
         shapes = [c for name in names for c in shape_coordinates(self.effects[name])]
         return [c for c in shapes if varies[c.name]]

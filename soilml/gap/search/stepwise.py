@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.search.candidate_fits import (
-    EFFECT_PENALTY,
     CandidateFit,
     fit_candidates,
     fit_shapes,
@@ -17,10 +16,16 @@ from soilml.gap.search.candidate_fits import (
 )
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
 from soilml.gap.search.posterior import Posterior, explanations, posterior
+from soilml.gap.search.predicted_gains import (
+    noise_only_gains,
+    predicted_gains,
+    predicted_with_and_without,
+)
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
+from soilml.gap.statistics.coordinates import SoilCoordinate
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.gap.statistics.signatures import Signature, Untestable, effect_signatures
+from soilml.gap.statistics.signatures import Untestable, effect_signatures
 
 Floats = NDArray[np.float64]
 
@@ -29,9 +34,10 @@ GAP_LEVEL = 0.03
 #: Significance level of the test for a remainder that the best explanation does not account for.
 LACK_OF_FIT_LEVEL = 0.001
 #: Effects are fitted in full if their predicted gain is within this margin of the largest, and so
-#: many of the largest in any case, more of them beside a large discrepancy; the prediction is
-#: linear and can be wrong by that much.
-GAIN_MARGIN, MIN_FITTED, MIN_FITTED_HIDDEN, MAX_FITTED = 12.0, 4, 8, 12
+#: many of the largest in any case; the prediction is linear and can be wrong by that much.
+GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
+#: Beside a large discrepancy, so many effects more: those that explain most under noise alone.
+FITTED_HIDDEN = 6
 #: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
 MIN_NET_GAIN = -2.0
 #: Objective above that of the best candidate up to which shapes are estimated and sets extended.
@@ -119,10 +125,13 @@ def search(
             soil, soil_test, (), (), soil_test, {}, Posterior({}), tuple(untestable)
         )
     none = _soil_alone(problem, soil, starts)
-    gains = _predicted_with_and_without(problem, none, soil, signatures)
+    gains = predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
-    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
-    selected = _select_by_gain(gains, MIN_FITTED_HIDDEN if hidden else MIN_FITTED)
+    selected = _select_by_gain(gains)
+    if float(none.amplitude.max()) >= LARGE_DISCREPANCY:
+        alone = noise_only_gains(problem, soil, signatures)
+        ordered = sorted(alone, key=lambda name: -alone[name])[:FITTED_HIDDEN]
+        selected += [name for name in ordered if name not in selected]
     level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
     for _ in range(MAX_EFFECTS - 1):
@@ -162,42 +171,6 @@ def _soil_alone(problem: FitProblem, soil: GapFit, starts: Starts) -> CandidateF
     return CandidateFit((), marginal, marginal)
 
 
-def _predicted_with_and_without(
-    problem: FitProblem, none: CandidateFit, soil: GapFit, signatures: Sequence[Signature]
-) -> dict[str, float]:
-    """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
-
-    A discrepancy of large amplitude can hide an effect that explains nearly everything.
-    """
-    plain = MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
-    with_discrepancy, without = (
-        predicted_gains(problem, CandidateFit((), fit, fit), none.objective, signatures)
-        for fit in (none.best, plain)
-    )
-    return {name: max(gain, without[name]) for name, gain in with_discrepancy.items()}
-
-
-def predicted_gains(
-    problem: FitProblem,
-    candidate: CandidateFit,
-    objective: float,
-    signatures: Sequence[Signature],
-) -> dict[str, float]:
-    """Decrease of an objective by one more effect, linearised at a candidate, by effect name.
-
-    An effect whose size would have an impossible sign gains nothing.
-    """
-    gains = {}
-    for s in signatures:
-        evidence = problem.discrepancy.evidence(
-            candidate.fit, candidate.amplitude, s.column[:, None]
-        )
-        possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
-        value = evidence.value + EFFECT_PENALTY * (len(candidate.names) + 1)
-        gains[s.name] = objective - value if possible else -EFFECT_PENALTY
-    return gains
-
-
 def _fit_level(
     problem: FitProblem,
     soil: GapFit,
@@ -207,16 +180,17 @@ def _fit_level(
 ) -> list[CandidateFit]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Beside a large discrepancy, single effects also start from the soil under noise alone.
+    Beside a large discrepancy, single effects are fitted under noise alone first.
     """
-    requests = []
+    requests, noise_starts = [], []
+    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
     for names, base in sets.items():
+        noise_starts.append(_off_bounds(soil))
+        hidden &= not base.names
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, none.amplitude)
         requests.append((names, base.catalogue_law.fit.start_values(), smaller))
-    single = all(len(names) == 1 for names in sets)
-    hidden = single and float(none.amplitude.max()) >= LARGE_DISCREPANCY
-    fitted = fit_candidates(problem, requests, _off_bounds(soil) if hidden else None)
+    fitted = fit_candidates(problem, requests, noise_starts if hidden else None)
     if not fitted:
         return []
     lowest = min(none.objective, *(c.objective for c in fitted))
@@ -232,13 +206,15 @@ def _fit_level(
 
 
 def _off_bounds(soil: GapFit) -> dict[str, float]:
-    """The soil of a fit, nearer to the middle of its priors.
+    """The coordinates of a fit, those of the soil nearer to the middle of their priors.
 
     Where an effect is missing, soil parameters are often at a bound, from which the fit with the
     effect would not move.
     """
-    start = soil.start_values()
-    return {path: 0.5 + INWARD * (x - 0.5) for path, x in start.items()}
+    return {
+        c.path: 0.5 + INWARD * (float(x) - 0.5) if isinstance(c, SoilCoordinate) else float(x)
+        for c, x in zip(soil.coordinates, soil.x, strict=True)
+    }
 
 
 def _is_complete(problem: FitProblem, best: CandidateFit, seed: int) -> bool:
@@ -254,13 +230,13 @@ def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> 
     return residual_test(problem, fit, signatures, seed)
 
 
-def _select_by_gain(gains: Mapping[str, float], least: int) -> list[str]:
-    """At least so many effects to fit in full, in order of their predicted gain."""
+def _select_by_gain(gains: Mapping[str, float]) -> list[str]:
+    """Effects to fit in full, in order of their predicted gain."""
     ordered = sorted(gains, key=lambda name: -gains[name])
     if not ordered:
         return []
     close = [n for n in ordered if gains[n] > gains[ordered[0]] - GAIN_MARGIN]
-    return ordered[: min(MAX_FITTED, max(least, len(close)))]
+    return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
 
 
 def _extensions(
@@ -277,8 +253,10 @@ def _extensions(
         others = problem.effects_not_in(fit)
         signatures, _ = effect_signatures(fit.fitted(), problem.readings, others)
         gains = predicted_gains(problem, candidate, candidate.objective, signatures)
-        for name in sorted(gains, key=lambda n: -gains[n])[:EXTENSIONS]:
+        promising = [n for n in gains if gains[n] > MIN_NET_GAIN]
+        promising = sorted(promising, key=lambda n: -gains[n])[:EXTENSIONS]
+        for name in promising:
             names = tuple(sorted((*candidate.names, name)))
-            if gains[name] > MIN_NET_GAIN and names not in fitted and names not in extended:
+            if names not in fitted and names not in extended:
                 extended[names] = candidate
     return extended

@@ -14,7 +14,8 @@ from soilml.gap.search.candidate_fits import (
 )
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import explanations, posterior
-from soilml.gap.search.stepwise import predicted_gains, search
+from soilml.gap.search.predicted_gains import predicted_gains
+from soilml.gap.search.stepwise import search
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.verdict.cross_validation import (
