@@ -16,6 +16,7 @@ from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, 
 from datagen.blind_sets.wheel_state import WheelState
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
 from soilml.config.case import read_case
+from soilml.physics.operating_point import COVARIATES
 
 PLAN = Plan("A", "slip-sinkage", 1.0, 0.01, 8, "dry-sand", 3, 7)
 OF_SOILML = {**MECHANISMS["A"], **MECHANISMS["S"]}
@@ -41,7 +42,7 @@ def batch(count, seed):
 def of_soilml(rows, effects=()):
     """Torque, drawbar pull and sinkage as the package has them, (3, n)."""
     soil = Soil(**{f.name: getattr(rows, f.name) for f in fields(Soil)})
-    at = Operating(**{f.name: getattr(rows, f.name) for f in fields(Operating)})
+    at = Operating(**{f: getattr(rows, f) for f in ("slip", "load", *COVARIATES)})
     force = Model(Wheel(radius=RADIUS, width=WIDTH), tuple(effects))(soil, at)
     return np.stack([force.torque, force.drawbar_pull, force.sinkage])
 
@@ -58,7 +59,9 @@ def apart(one, other):
 
 
 def test_the_wheel_is_the_packages():
-    rows = batch(400, seed=1)
+    """Driving and braking."""
+    slip = np.random.default_rng(9).uniform(-0.4, 0.6, 400)
+    rows = replace(batch(400, seed=1), slip=slip)
     assert apart(of_hidden(rows), of_soilml(rows)).max() < 1e-5
 
 
