@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy, decimal
 from soilml.gap.results import GapReport
+from soilml.gap.verdict.decision import NOT_DECISIVE
 
 #: Suspects that the sentence lists.
 LISTED_SUSPECTS = 3
@@ -45,6 +46,12 @@ def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
             return f"There is a gap, but these runs cannot identify its cause: {why}."
         case "suspected":
             return _suspected(report)
+        case "unknown" if report.reasons:
+            best = " + ".join(report.best_unclaimed)
+            return (
+                f"There is a gap, and no cause is named: {best} fits best, but "
+                f"{'; '.join(report.reasons)}. {_remainder(report)}"
+            ).strip()
         case "unknown":
             return (
                 "There is a gap, and no effect of the catalogue explains it better than a smooth "
@@ -53,8 +60,8 @@ def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
         case "class":
             sets = ", or ".join(" + ".join(names) for names in report.cause_set)
             return (
-                f"The gap is explained equally well by {sets}: {reduction}. These runs cannot "
-                f"distinguish them. {_remainder(report)}"
+                f"Each of these may explain the gap, the likeliest first: {sets}. With the first, "
+                f"{reduction}. These runs cannot distinguish them. {_remainder(report)}"
             ).strip()
         case "partly-named":
             return f"The evidence supports {names}: {reduction}. {_remainder(report)}".strip()
@@ -81,11 +88,7 @@ def _suspected(report: GapReport) -> str:
     listed = "; ".join(
         f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
     )
-    why = (
-        "; ".join(report.reasons)
-        if report.reasons
-        else "the evidence is not decisive beside the model's usual error"
-    )
+    why = "; ".join(report.reasons or (NOT_DECISIVE,))
     first = " + ".join(report.suspects[0].effects)
     return (
         f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first: "

@@ -31,8 +31,14 @@ from soilml.gap.verdict.claimed_effects import (
     soil_estimates,
 )
 from soilml.gap.verdict.cross_validation import predict_held_out
-from soilml.gap.verdict.decision import Decision, cause_set, decide, unclaimed_effects
-from soilml.gap.verdict.disagreements import disagreements
+from soilml.gap.verdict.decision import (
+    Decision,
+    cause_set,
+    decide,
+    reasons,
+    unclaimed_effects,
+)
+from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagree
 from soilml.gap.verdict.remaining_discrepancy import (
     discrepancy_amplitudes,
     remaining_discrepancy,
@@ -43,6 +49,7 @@ from soilml.gap.verdict.report_entries import (
     competing_explanations,
     gap_reductions,
     readings_and_predictions,
+    soil_beside_discrepancy,
     soil_marginal,
     suspects,
     variance_component_entries,
@@ -145,8 +152,8 @@ def gap(
     notes += exclusions
     checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
     if checks.errors:
-        reasons = (*checks.errors, *checks.naming_obstacles)
-        return _bad_data_report(case, reasons, checks.notes, seed)
+        errors = (*checks.errors, *checks.naming_obstacles)
+        return _bad_data_report(case, errors, checks.notes, seed)
     if unusable_rows:
         rows = "1 row is" if unusable_rows == 1 else f"{unusable_rows} rows are"
         notes.append(f"{rows} excluded: the status is not ok")
@@ -177,11 +184,11 @@ def _free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[FreePa
 
 
 def _bad_data_report(
-    case: Case, reasons: Sequence[str], notes: tuple[str, ...], seed: int
+    case: Case, errors: Sequence[str], notes: tuple[str, ...], seed: int
 ) -> GapReport:
     """The report on data that cannot be analysed."""
     return GapReport(
-        "bad-data", "; ".join(reasons), case, reasons=tuple(reasons), notes=notes, seed=seed
+        "bad-data", "; ".join(errors), case, reasons=tuple(errors), notes=notes, seed=seed
     )
 
 
@@ -198,7 +205,8 @@ def _build_report(
     problem, result = analysis.problem, analysis.result
     obstacles = checks.naming_obstacles
     before = soil_marginal(analysis)
-    conflicts = [] if result.has_gap else disagreements(problem, result.soil)
+    smooth_gap = result.has_gap
+    conflicts = [] if smooth_gap else disagreements(problem, result.soil)
     best = next((c.best for c in result.accepted if c.names), before)
     figures = gap_reductions(analysis, before, best, seed)
     decision = decide(problem, result, obstacles, conflicts, figures.get("held_out_runs"))
@@ -210,23 +218,24 @@ def _build_report(
         figures[split.name] = predict_held_out(
             problem, result.soil, shown.fit, held_out, description
         )
-    none = result.none.best if result.none else before
+    none = soil_beside_discrepancy(analysis)
     after = shown if decision.claimed else none  # what model.toml contains
+    alike = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     report = GapReport(
         status=decision.status,
         sentence="",
         model=updated_case(after.fit, discrepancy_amplitudes(problem, after)),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
-        suspects=tuple(suspects(analysis, obstacles)),
+        suspects=tuple(suspects(analysis, obstacles)) if smooth_gap else (),
         best_unclaimed=unclaimed_effects(decision, result),
-        reasons=_reasons(decision.status, obstacles, conflicts),
+        reasons=reasons(decision, obstacles, conflicts or alike),
         gap=figures,
         soil_before=soil_estimates(result.soil),
         soil_after=soil_estimates(after.fit),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable={u.name: u.reason for u in result.untestable},
-        notes=(*checks.notes, *analysis_notes(analysis, after.fit)),
+        notes=(*checks.notes, *analysis_notes(analysis, after.fit, alike)),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,
@@ -238,7 +247,7 @@ def _build_report(
         report = replace(report, suspected_model=suspected)
     if decision.claimed:
         report = _with_effects(report, analysis, decision)
-    if result.has_gap:
+    if smooth_gap:
         report = _with_disagreement(report, analysis, none, shown if decision.shown else none, seed)
     effects_before = effect_names(case)
     return replace(
@@ -248,13 +257,6 @@ def _build_report(
             unsupported_conclusions(report, obstacles, _fixed_parameters(case, free))
         ),
     )
-
-
-def _reasons(status: str, obstacles: Sequence[str], conflicts: Sequence[str]) -> tuple[str, ...]:
-    """Why no cause is named, or why the absence of a gap is not stated."""
-    if status in ("not-testable", "suspected"):
-        return tuple(obstacles)
-    return tuple(conflicts) if status == "undecided" else ()
 
 
 def _with_effects(report: GapReport, analysis: Analysis, decision: Decision) -> GapReport:

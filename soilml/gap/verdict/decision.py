@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.gap.report_parts import GapReduction
+from soilml.gap.report_parts import GapReduction, decimal
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.problem import FitProblem
@@ -26,17 +26,22 @@ MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 3.0, 1.0
 MAX_SIZE_DEVIATION = 3.0
 
 
+#: Why nothing is named where the evidence for the suspects is weak.
+NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
+
+
 @dataclass(frozen=True)
 class Decision:
     """The status, the explanations it claims, and the one whose figures are shown.
 
     `shown` is the first of the claimed explanations or of the suspects; None where nothing is
-    named or suspected.
+    named or suspected. `reason` says why an explanation that the evidence supports is not claimed.
     """
 
     status: str
     claimed: tuple[CandidateFit, ...]
     shown: CandidateFit | None
+    reason: str = ""
 
 
 def decide(
@@ -69,9 +74,8 @@ def decide(
     if not accepted or () in {c.names for c in accepted}:
         return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
     best = accepted[0]
-    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
-    if best.shape_deviation > most or _implausible(best.fit) or not _predicts(runs):
-        return Decision("unknown", (), None)
+    if reason := _why_not_claimed(best, runs):
+        return Decision("unknown", (), None, reason)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:
@@ -79,6 +83,21 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def _why_not_claimed(best: CandidateFit, runs: GapReduction | None) -> str:
+    """Why the likeliest explanation is not claimed in spite of its evidence; empty if it is."""
+    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
+    if _implausible(best.fit):
+        return "the fault of a sensor or of the rig would have to be implausibly large"
+    if runs is not None and not _predicts(runs):
+        return (
+            "held-out runs are predicted worse with it than without it: mean squared residual "
+            f"{decimal(runs.after)} instead of {decimal(runs.before)}"
+        )
+    if best.shape_deviation > most:
+        return "its law would have to differ too much from that of the catalogue"
+    return ""
 
 
 def _implausible(fit: GapFit) -> bool:
@@ -91,6 +110,25 @@ def _implausible(fit: GapFit) -> bool:
 def _predicts(runs: GapReduction | None) -> bool:
     """Whether held-out runs are predicted better than without the explanation."""
     return runs is None or runs.after <= max(runs.before, 1.0)
+
+
+def reasons(
+    decision: Decision, obstacles: Sequence[str], disagreements: Sequence[str]
+) -> tuple[str, ...]:
+    """Why no cause can be named, or why the absence of a gap is not stated.
+
+    Of the rows driven alike that disagree, the worst are named beside the suspects, because no
+    suspect explains their difference.
+    """
+    match decision.status:
+        case "undecided":
+            return tuple(disagreements)
+        case "suspected" if disagreements:
+            worst = f"rows driven alike disagree: {disagreements[0]}"
+            return (*(obstacles or (NOT_DECISIVE,)), worst)
+        case "suspected" | "not-testable":
+            return tuple(obstacles)
+    return (decision.reason,) if decision.reason else ()
 
 
 def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...], ...]:

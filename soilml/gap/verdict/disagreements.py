@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from soilml.errors import InputError
@@ -13,6 +11,7 @@ from soilml.gap.statistics.coordinates import linearise
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
+    VarianceComponents,
     assemble_covariance,
     run_effect_columns,
 )
@@ -34,7 +33,7 @@ REPEAT_LEVEL = 0.001
 def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
     """What disagrees with what although no smooth gap was found; empty where nothing does."""
     components, readings = problem.covariance.components, problem.readings
-    found = _repeats(problem, soil)
+    found = repeats_that_disagree(problem, soil)
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale >= NOISE_SCALED_UP:
             found.append(
@@ -53,23 +52,32 @@ def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
     return found
 
 
-def _repeats(problem: FitProblem, soil: GapFit) -> list[str]:
-    """Rows driven alike that differ by more than declared noise and usual scatter explain."""
-    readings = problem.readings
+def repeats_that_disagree(problem: FitProblem, fit: GapFit) -> list[str]:
+    """Rows driven alike that differ by more than declared noise and usual scatter explain.
+
+    The predictions of `fit` account for their small differences in slip and load.
+    """
+    readings, found = problem.readings, problem.covariance.components
     several = len(readings.runs) > 1
-    usual = replace(
-        problem.covariance.components,
-        noise_scale=np.ones(len(readings.channels)),
-        friction_angle_std=RUN_EFFECT_UNITS["friction_angle"] * several,
-        bearing_std=RUN_EFFECT_UNITS["bearing"] * several,
-    )
-    columns = run_effect_columns(soil.fitted(), readings)
-    covariance = assemble_covariance(readings, columns, usual).matrix
-    return [
-        comparison.sentence
-        for comparison in repeat_disagreement(readings, covariance, soil.prediction)
-        if comparison.p_value < REPEAT_LEVEL
-    ]
+    columns = run_effect_columns(fit.fitted(), readings)
+    sentences: dict[str, str] = {}
+    agree: set[str] = set()
+    for memory in sorted(
+        {0.0, found.autocorrelation}
+    ):  # rows disagree only if they do with and without
+        usual = VarianceComponents(
+            np.ones(len(readings.channels)),
+            RUN_EFFECT_UNITS["friction_angle"] * several,
+            RUN_EFFECT_UNITS["bearing"] * several,
+            memory,
+            found.degrees_of_freedom,
+        )
+        covariance = assemble_covariance(readings, columns, usual).matrix
+        for comparison in repeat_disagreement(readings, covariance, fit.prediction):
+            sentences.setdefault(comparison.channel, comparison.sentence)
+            if comparison.p_value >= REPEAT_LEVEL:
+                agree.add(comparison.channel)
+    return [text for channel, text in sentences.items() if channel not in agree]
 
 
 def _region(problem: FitProblem, soil: GapFit) -> list[str]:

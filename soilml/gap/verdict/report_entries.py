@@ -17,9 +17,10 @@ from soilml.gap.search.iteration import Analysis
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import REJECTION_THRESHOLD
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
-from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.statistics.evidence import AMPLITUDES, Evidence
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
+from soilml.gap.statistics.repeats import overstated_noise_notes
 from soilml.gap.verdict.cross_validation import gap_reduction, held_out_region, held_out_runs
 from soilml.quantities import column
 
@@ -58,6 +59,21 @@ def soil_marginal(analysis: Analysis) -> MarginalFit:
     soil = analysis.result.soil
     none = np.zeros(len(analysis.problem.readings.channels))
     return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x))))
+
+
+def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
+    """The soil alone beside a smooth discrepancy, which model.toml has where nothing is claimed.
+
+    At the largest amplitude that is tried, a discrepancy of any size is cheap, and the soil would
+    go wherever the rest looks smoothest; it then stays where noise and scatter alone put it.
+    """
+    problem, none = analysis.problem, analysis.result.none
+    if none is None:
+        return soil_marginal(analysis)
+    if none.amplitude.max() < AMPLITUDES[-1]:
+        return none.best
+    soil = analysis.result.soil
+    return MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
 
 
 def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
@@ -116,18 +132,29 @@ def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
     return [*accepted, *rivals][:2] if accepted else rivals[:3]
 
 
-def analysis_notes(analysis: Analysis, after: GapFit) -> list[str]:
-    """Notes on outliers, estimates at a bound, noise and run-to-run variation."""
+def analysis_notes(analysis: Analysis, after: GapFit, alike: Sequence[str]) -> list[str]:
+    """Notes on outliers, estimates at a bound, repeats, noise and run-to-run variation.
+
+    `after` is the fit that model.toml contains, `alike` says which repeats disagree.
+    """
     readings = analysis.problem.readings
     components = analysis.problem.covariance.components
     notes = []
     if analysis.outliers:
         listed = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
-        notes.append(f"{len(analysis.outliers)} readings are outliers and were excluded: {listed}")
+        count = len(analysis.outliers)
+        many = (
+            f"{count} readings are outliers and were"
+            if count > 1
+            else "1 reading is an outlier and was"
+        )
+        notes.append(f"{many} excluded: {listed}")
     notes += _bound_notes(after.coordinates, after.x.tolist())
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
             notes.append(f"the noise of {column(name)} is {scale:.2g} times as large as declared")
+    notes += overstated_noise_notes(readings)
+    notes += [f"rows driven alike disagree: {text}" for text in alike]
     if 1 < len(readings.runs) < FEW_RUNS:
         notes.append(
             f"run-to-run variation of the soil cannot be estimated from fewer than {FEW_RUNS} "

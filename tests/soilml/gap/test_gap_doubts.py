@@ -1,0 +1,88 @@
+"""What a report says of readings that disagree with each other or with their declared noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import MODEL, case_of, driven, fit_problem
+
+from soilml.gap import gap
+from soilml.gap.html.page import page
+from soilml.gap.messages import verdict_sentence
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.results import GapReport
+from soilml.gap.search.stepwise import search
+from soilml.gap.verdict.decision import decide, reasons
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
+
+TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
+
+
+def times(text: str, factor: float) -> str:
+    """The model file with all declared noise multiplied."""
+    return text.replace('"1 % + 0.2"', f'"{factor} % + {0.2 * factor}"').replace(
+        '"1 %"', f'"{factor} %"'
+    )
+
+
+def changed(table, name, values):
+    """The table with other readings of one channel."""
+    return Table(table.columns | {name: values})
+
+
+def test_noise_far_above_the_scatter_of_repeats_is_noted():
+    table = driven(case_of(), loads=TWICE)
+    report = gap(case_of(times(MODEL, 5.0)), table)
+    assert report.status == "no-gap"
+    assert any("the noise is overstated" in note for note in report.notes)
+    assert not any("overstated" in note for note in gap(case_of(), table).notes)
+
+
+def test_two_runs_that_differ_are_told_beside_the_suspects():
+    table = driven(case_of(), loads=(60.0, 60.0), slips=12)
+    torque = table["torque_Nm"] * np.where(table["run"] == "run_1", 1.43, 1.0)
+    report = gap(case_of(), changed(table, "torque_Nm", torque))
+    assert report.status == "suspected"
+    told = [reason for reason in report.reasons if "rows driven alike disagree" in reason]
+    assert len(told) == 1 and "torque" in told[0] and told[0] in report.sentence
+    assert not any("drawbar pull" in note for note in report.notes if "alike" in note)
+
+
+def test_understated_noise_is_undecided():
+    report = gap(case_of(times(MODEL, 0.33)), driven(case_of(), seed=4))
+    assert report.status == "undecided"
+    assert any("as much as their declared noise" in reason for reason in report.reasons)
+
+
+@pytest.mark.slow
+def test_a_strange_but_repeatable_response_leaves_the_soil_where_it_was():
+    table = driven(case_of(), loads=TWICE, seed=2)
+    bump = np.exp(-0.5 * ((table["slip"] - 0.4) / 0.06) ** 2)
+    table = changed(table, "torque_Nm", table["torque_Nm"] * (1.0 + 0.35 * bump))
+    report = gap(case_of(), changed(table, "drawbar_pull_N", table["drawbar_pull_N"] + 8.0 * bump))
+    assert report.status == "unknown"
+    for name, before in report.soil_before.items():
+        assert report.soil_after[name].value == pytest.approx(before.value, rel=1e-6)
+    ranges = {name: np.ptp([0.0, *table[name]]) for name in report.discrepancy}
+    for name, left in report.discrepancy.items():
+        assert left.after_value < 0.3 * ranges[name]
+    assert "no named effect does not" not in page(report, "model.toml", "runs.csv")
+
+
+def test_an_explanation_that_predicts_worse_is_not_claimed_and_why_is_told():
+    digging, few = EFFECTS["slip-sinkage"](n1=0.4), ("slip-sinkage", "torque-gain")
+    problem = fit_problem(case_of(), driven(case_of(), [digging], seed=2))
+    problem = replace(problem, effects={name: EFFECTS[name] for name in few})
+    result = search(problem, problem.fit_soil([np.full(3, 0.5)]), seed=0)
+    worse = GapReduction(50.0, 90.0, {}, 96, "every run predicted by fits to the others")
+    decision = decide(problem, result, [], [], worse)
+    assert decision.status == "unknown"
+    told = reasons(decision, [], [])
+    report = GapReport(
+        "unknown", "", case_of(), best_unclaimed=("slip-sinkage",), reasons=told,
+        gap={"train": worse},
+    )  # fmt: skip
+    assert "slip-sinkage fits best, but held-out runs are predicted worse with it than" in (
+        verdict_sentence(report, ())
+    )
