@@ -32,9 +32,11 @@ from soilml.gap.verdict.claimed_effects import (
 )
 from soilml.gap.verdict.cross_validation import predict_held_out
 from soilml.gap.verdict.decision import (
+    NOTHING_IS_BETTER,
     Decision,
     cause_set,
     decide,
+    is_left_open,
     reasons,
     unclaimed_effects,
 )
@@ -205,8 +207,10 @@ def _build_report(
     problem, result = analysis.problem, analysis.result
     obstacles = checks.naming_obstacles
     before = soil_marginal(analysis)
-    smooth_gap = result.has_gap
+    smooth_gap = result.has_gap and not is_left_open(result)
     conflicts = [] if smooth_gap else disagreements(problem, result.soil)
+    if result.has_gap and not (smooth_gap or conflicts):
+        conflicts = [NOTHING_IS_BETTER]
     best = next((c.best for c in result.accepted if c.names), before)
     figures = gap_reductions(analysis, before, best, seed)
     decision = decide(problem, result, obstacles, conflicts, figures.get("held_out_runs"))

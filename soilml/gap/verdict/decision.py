@@ -28,6 +28,8 @@ MAX_SIZE_DEVIATION = 3.0
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
+#: Why nothing is said where the soil alone is rejected without an alternative.
+NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ def decide(
     """
     if not result.has_gap:
         return Decision("undecided" if disagreements else "no-gap", (), None)
+    if is_left_open(result):
+        return Decision("undecided", (), None)
     likeliest, none = result.likeliest, result.none
     suspects = bool(likeliest and none and likeliest.objective < none.objective)
     if naming_obstacles:
@@ -83,6 +87,17 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def is_left_open(result: SearchResult) -> bool:
+    """Whether the soil alone is rejected, though no effect and no smooth discrepancy is better.
+
+    The readings then scatter in a way that the estimated noise does not describe.
+    """
+    none, likeliest = result.none, result.likeliest
+    if not result.has_gap or none is None or np.any(none.amplitude > 0.0):
+        return False
+    return likeliest is None or none.objective <= likeliest.objective
 
 
 def _why_not_claimed(best: CandidateFit, runs: GapReduction | None) -> str:

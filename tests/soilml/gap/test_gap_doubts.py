@@ -55,6 +55,14 @@ def test_understated_noise_is_undecided():
     assert any("as much as their declared noise" in reason for reason in report.reasons)
 
 
+def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
+    monkeypatch.setattr("soilml.gap.search.stepwise.GAP_LEVEL", 1.01)
+    report = gap(case_of(), driven(case_of()))
+    assert report.status == "undecided"
+    assert "no effect or smooth discrepancy is better" in report.sentence
+    assert not report.suspects and not report.next_runs and not report.discrepancy
+
+
 @pytest.mark.slow
 def test_a_strange_but_repeatable_response_leaves_the_soil_where_it_was():
     table = driven(case_of(), loads=TWICE, seed=2)
