@@ -213,7 +213,7 @@ def _build_report(
         conflicts = [NOTHING_IS_BETTER]
     best = next((c.best for c in result.accepted if c.names), before)
     figures = gap_reductions(analysis, before, best, seed)
-    decision = decide(problem, result, obstacles, conflicts, figures.get("held_out_runs"))
+    decision = decide(problem, result, obstacles, conflicts)
     shown = decision.shown.best if decision.shown else before
     if shown is not best:
         figures = gap_reductions(analysis, before, shown, seed)

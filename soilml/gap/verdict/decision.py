@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.gap.report_parts import GapReduction, decimal
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.problem import FitProblem
@@ -51,7 +50,6 @@ def decide(
     result: SearchResult,
     naming_obstacles: Sequence[str],
     disagreements: Sequence[str],
-    runs: GapReduction | None,
 ) -> Decision:
     """The status of a report; see `soilml.gap.results.STATUSES`.
 
@@ -61,8 +59,6 @@ def decide(
         Why these runs cannot identify a cause.
     disagreements : sequence of str
         Measurements that disagree with each other, which forbid a verdict without a gap.
-    runs : GapReduction, optional
-        Held-out runs predicted with and without the best explanation.
     """
     if not result.has_gap:
         return Decision("undecided" if disagreements else "no-gap", (), None)
@@ -78,7 +74,7 @@ def decide(
     if not accepted or () in {c.names for c in accepted}:
         return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
     best = accepted[0]
-    if reason := _why_not_claimed(best, runs):
+    if reason := _why_not_claimed(best):
         return Decision("unknown", (), None, reason)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
@@ -100,16 +96,11 @@ def is_left_open(result: SearchResult) -> bool:
     return likeliest is None or none.objective <= likeliest.objective
 
 
-def _why_not_claimed(best: CandidateFit, runs: GapReduction | None) -> str:
+def _why_not_claimed(best: CandidateFit) -> str:
     """Why the likeliest explanation is not claimed in spite of its evidence; empty if it is."""
     most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
     if _implausible(best.fit):
         return "the fault of a sensor or of the rig would have to be implausibly large"
-    if runs is not None and not _predicts(runs):
-        return (
-            "held-out runs are predicted worse with it than without it: mean squared residual "
-            f"{decimal(runs.after)} instead of {decimal(runs.before)}"
-        )
     if best.shape_deviation > most:
         return "its law would have to differ too much from that of the catalogue"
     return ""
@@ -120,11 +111,6 @@ def _implausible(fit: GapFit) -> bool:
     sizes = [isinstance(c, EffectCoordinate) and not c.is_shape for c in fit.coordinates]
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)
     return bool(np.any(deviation[np.asarray(sizes, dtype=np.bool_)] > MAX_SIZE_DEVIATION))
-
-
-def _predicts(runs: GapReduction | None) -> bool:
-    """Whether held-out runs are predicted better than without the explanation."""
-    return runs is None or runs.after <= max(runs.before, 1.0)
 
 
 def reasons(
