@@ -68,7 +68,7 @@ def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
     go wherever the rest looks smoothest; it then stays where noise and scatter alone put it.
     """
     problem, none = analysis.problem, analysis.result.none
-    if none is None:
+    if none is None or not none.amplitude.any():
         return soil_marginal(analysis)
     if none.amplitude.max() < AMPLITUDES[-1]:
         return none.best

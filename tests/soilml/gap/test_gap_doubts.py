@@ -9,7 +9,7 @@ from gap_sets import MODEL, case_of, driven, fit_problem
 from soilml.gap import gap
 from soilml.gap.html.page import page
 from soilml.gap.messages import verdict_sentence
-from soilml.gap.report_parts import GapReduction
+from soilml.gap.report_parts import GapReduction, Suspect
 from soilml.gap.results import GapReport
 from soilml.gap.search.stepwise import search
 from soilml.gap.verdict.decision import decide, reasons
@@ -61,6 +61,7 @@ def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
     assert report.status == "undecided"
     assert "no effect or smooth discrepancy is better" in report.sentence
     assert not report.suspects and not report.next_runs and not report.discrepancy
+    assert report.soil_after == report.soil_before
 
 
 @pytest.mark.slow
@@ -94,3 +95,12 @@ def test_an_explanation_that_predicts_worse_is_not_claimed_and_why_is_told():
     assert "slip-sinkage fits best, but held-out runs are predicted worse with it than" in (
         verdict_sentence(report, ())
     )
+
+
+def test_a_suspect_that_enlarges_the_residuals_is_explained():
+    suspect = Suspect(("grousers",), 2.7, "if no other cause has a similar signature")
+    figures = {"train": GapReduction(8.8, 10.1, {}, 108, "all rows fitted")}
+    report = GapReport("suspected", "", case_of(), suspects=(suspect,), gap=figures)
+    assert "8.80 -> 10.1 (noise alone gives 1; it grows because" in verdict_sentence(report, ())
+    figures = {"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")}
+    assert "grows" not in verdict_sentence(replace(report, gap=figures), ())
