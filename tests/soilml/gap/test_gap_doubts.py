@@ -4,17 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven, fit_problem
+from gap_sets import MODEL, case_of, driven
 
 from soilml.gap import gap
 from soilml.gap.html.page import page
 from soilml.gap.messages import verdict_sentence
 from soilml.gap.report_parts import GapReduction, Suspect
 from soilml.gap.results import GapReport
-from soilml.gap.search.stepwise import search
-from soilml.gap.verdict.decision import decide, reasons
 from soilml.io.table import Table
-from soilml.physics.effects import EFFECTS
 
 TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
 
@@ -77,24 +74,6 @@ def test_a_strange_but_repeatable_response_leaves_the_soil_where_it_was():
     for name, left in report.discrepancy.items():
         assert left.after_value < 0.3 * ranges[name]
     assert "no named effect does not" not in page(report, "model.toml", "runs.csv")
-
-
-def test_an_explanation_that_predicts_worse_is_not_claimed_and_why_is_told():
-    digging, few = EFFECTS["slip-sinkage"](n1=0.4), ("slip-sinkage", "torque-gain")
-    problem = fit_problem(case_of(), driven(case_of(), [digging], seed=2))
-    problem = replace(problem, effects={name: EFFECTS[name] for name in few})
-    result = search(problem, problem.fit_soil([np.full(3, 0.5)]), seed=0)
-    worse = GapReduction(50.0, 90.0, {}, 96, "every run predicted by fits to the others")
-    decision = decide(problem, result, [], [], worse)
-    assert decision.status == "unknown"
-    told = reasons(decision, [], [])
-    report = GapReport(
-        "unknown", "", case_of(), best_unclaimed=("slip-sinkage",), reasons=told,
-        gap={"train": worse},
-    )  # fmt: skip
-    assert "slip-sinkage fits best, but held-out runs are predicted worse with it than" in (
-        verdict_sentence(report, ())
-    )
 
 
 def test_a_suspect_that_enlarges_the_residuals_is_explained():
