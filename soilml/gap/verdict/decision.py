@@ -74,6 +74,8 @@ def decide(
     if not accepted or () in {c.names for c in accepted}:
         return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
     best = accepted[0]
+    if not suspects:  # many weak rivals share the probability that the soil alone lacks
+        return Decision("unknown", (), None)
     if reason := _why_not_claimed(best):
         return Decision("unknown", (), None, reason)
     if len(accepted) > 1:
