@@ -44,6 +44,7 @@ from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagre
 from soilml.gap.verdict.remaining_discrepancy import (
     discrepancy_amplitudes,
     remaining_discrepancy,
+    with_uncertain_discrepancy,
 )
 from soilml.gap.verdict.report_entries import (
     analysis_notes,
@@ -225,10 +226,11 @@ def _build_report(
     none = soil_beside_discrepancy(analysis)
     after = shown if decision.claimed else none  # what model.toml contains
     alike = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
+    intervals = with_uncertain_discrepancy(problem, after)
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=updated_case(after.fit, discrepancy_amplitudes(problem, after)),
+        model=updated_case(intervals, discrepancy_amplitudes(problem, after)),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
         suspects=tuple(suspects(analysis, obstacles)) if smooth_gap else (),
@@ -236,7 +238,7 @@ def _build_report(
         reasons=reasons(decision, obstacles, conflicts or alike),
         gap=figures,
         soil_before=soil_estimates(result.soil),
-        soil_after=soil_estimates(after.fit),
+        soil_after=soil_estimates(intervals, result.candidates, result.posterior),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable={u.name: u.reason for u in result.untestable},
         notes=(*checks.notes, *analysis_notes(analysis, after.fit, alike)),
@@ -247,7 +249,8 @@ def _build_report(
         curves=readings_and_predictions(analysis, shown.fit),
     )
     if decision.status == "suspected":
-        suspected = updated_case(shown.fit, discrepancy_amplitudes(problem, shown))
+        fit = with_uncertain_discrepancy(problem, shown)
+        suspected = updated_case(fit, discrepancy_amplitudes(problem, shown))
         report = replace(report, suspected_model=suspected)
     if decision.claimed:
         report = _with_effects(report, analysis, decision)
@@ -267,9 +270,10 @@ def _with_effects(report: GapReport, analysis: Analysis, decision: Decision) -> 
     """The report with the effects that it claims and their similarity to other effects."""
     claimed, posterior = decision.claimed, analysis.result.posterior
     similarity = signature_similarity(analysis.problem, claimed[0].fit, claimed[0].amplitude)
+    intervals = with_uncertain_discrepancy(analysis.problem, claimed[0].best)
     return replace(
         report,
-        effects=tuple(named_effects(claimed, similarity, posterior)),
+        effects=tuple(named_effects(claimed, intervals, similarity, posterior)),
         mimic_radius=similarity.largest_cosine(claimed[0].names),
     )
 

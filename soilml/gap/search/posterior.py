@@ -8,11 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.statistics.evidence import TEMPERING
 
-#: Factor on differences of the objective: below 1, because Laplace's approximation, the amplitudes
-#: at their maximum and estimated covariances overstate the evidence. Calibrated on simulated sets
-#: (`python bench/gap.py --seed 7`) that take no part in the published benchmark.
-TEMPERING = 0.5
 #: Decrease of the objective by the best explanation from which another one is rejected: tempered
 #: odds of 1 to 33.
 REJECTION_THRESHOLD = 14.0

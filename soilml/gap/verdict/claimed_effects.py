@@ -23,11 +23,27 @@ from soilml.quantities import column
 Floats = NDArray[np.float64]
 
 
-def soil_estimates(fit: GapFit) -> dict[str, EstimatedValue]:
-    """The soil parameters of a fit, by name."""
+def soil_estimates(
+    fit: GapFit, candidates: Sequence[CandidateFit] = (), posterior: Posterior | None = None
+) -> dict[str, EstimatedValue]:
+    """The soil parameters of a fit, by name.
+
+    With `candidates`, each standard deviation includes the spread of their estimates about this
+    one, weighted by their posterior probabilities (Hoeting et al., Statist. Sci. 14, 1999, eq. 3).
+    """
     values, stds = fit.values(), fit.stds()
+    weights = [posterior.weight(c.names) if posterior else 0.0 for c in candidates]
+    total = max(sum(weights), 1e-300)
+    others = [c.fit.values() for c in candidates]
+
+    def spread(path: str) -> float:
+        squares = [(other[path] - values[path]) ** 2 for other in others]
+        return float(np.sqrt(np.dot(weights, squares) / total)) if squares else 0.0
+
     return {
-        c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
+        c.name: EstimatedValue(
+            values[c.path], float(np.hypot(stds[c.path], spread(c.path))), c.unit
+        )
         for c in fit.coordinates
         if isinstance(c, SoilCoordinate)
     }
@@ -44,15 +60,21 @@ def effect_estimates(fit: GapFit, effect: str) -> dict[str, EstimatedValue]:
 
 
 def named_effects(
-    accepted: Sequence[CandidateFit], similarity: SignatureSimilarity, posterior: Posterior
+    accepted: Sequence[CandidateFit],
+    fit: GapFit,
+    similarity: SignatureSimilarity,
+    posterior: Posterior,
 ) -> list[NamedEffect]:
-    """The effects of the best candidate, with the effects of the other accepted candidates."""
+    """The effects of the best candidate, with the effects of the other accepted candidates.
+
+    `fit` is that of the best candidate, with its intervals.
+    """
     best = accepted[0]
     alternatives = {n for c in accepted[1:] for n in c.names} - set(best.names)
     effects = []
     for name in best.names:
         snr, rival = similarity.separation(name, _size(best.fit, name))
-        estimates = effect_estimates(best.fit, name)
+        estimates = effect_estimates(fit, name)
         effects.append(
             NamedEffect(
                 name,

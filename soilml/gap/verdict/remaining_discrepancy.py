@@ -8,9 +8,24 @@ from numpy.typing import NDArray
 from soilml.gap.report_parts import RemainingDiscrepancy, decimal
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.least_squares import GapFit
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
+
+
+#: Expected amplitude, in usual ones, below which no discrepancy of a channel is stated.
+LEAST_AMPLITUDE = 0.1
+
+
+def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> GapFit:
+    """The fit with intervals under the expected amplitudes of the discrepancy.
+
+    The estimates are those of the most probable amplitudes.
+    """
+    return marginal.fit.whitened_by(
+        problem.discrepancy.whiten(marginal.evidence.expected_amplitude)
+    )
 
 
 def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
@@ -74,9 +89,10 @@ def discrepancy_amplitudes(problem: FitProblem, marginal: MarginalFit) -> dict[s
 
     Channels without a discrepancy are left out.
     """
-    std = marginal.evidence.amplitude * problem.discrepancy.process.usual
+    std = marginal.evidence.expected_amplitude * problem.discrepancy.process.usual
+    least = LEAST_AMPLITUDE * problem.discrepancy.process.usual
     return {
         column(name): float(value)
-        for name, value in zip(problem.readings.channels, std, strict=True)
-        if value > 0.0
+        for name, value, smallest in zip(problem.readings.channels, std, least, strict=True)
+        if value > smallest
     }

@@ -58,7 +58,7 @@ def soil_marginal(analysis: Analysis) -> MarginalFit:
     """The soil alone under noise and scatter, without any discrepancy."""
     soil = analysis.result.soil
     none = np.zeros(len(analysis.problem.readings.channels))
-    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x))))
+    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x)), none))
 
 
 def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:

@@ -45,7 +45,8 @@ def dug():
 
 def alone(soil):
     """The soil alone without discrepancy."""
-    return MarginalFit(soil, Evidence(soil.objective, np.zeros(3), np.zeros(len(soil.x))))
+    none = np.zeros(3)
+    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x)), none))
 
 
 def fitted(problem, soil, *names):
