@@ -238,7 +238,9 @@ def _build_report(
         reasons=reasons(decision, obstacles, conflicts or alike),
         gap=figures,
         soil_before=soil_estimates(result.soil),
-        soil_after=soil_estimates(intervals, result.candidates, result.posterior),
+        soil_after=soil_estimates(
+            intervals, result.candidates if smooth_gap else (), result.posterior
+        ),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable={u.name: u.reason for u in result.untestable},
         notes=(*checks.notes, *analysis_notes(analysis, after.fit, alike)),
@@ -256,10 +258,9 @@ def _build_report(
         report = _with_effects(report, analysis, decision)
     if smooth_gap:
         report = _with_disagreement(report, analysis, none, shown if decision.shown else none, seed)
-    effects_before = effect_names(case)
     return replace(
         report,
-        sentence=verdict_sentence(report, effects_before),
+        sentence=verdict_sentence(report, effect_names(case)),
         not_claimed=tuple(
             unsupported_conclusions(report, obstacles, _fixed_parameters(case, free))
         ),
