@@ -52,6 +52,8 @@ def fit_marginal(
             if isinstance(fit, InputError):
                 continue
             evidence = problem.discrepancy.evidence(fit, amplitude)
+            if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
+                continue
             found[i] = MarginalFit(fit, evidence)
             if _changed(amplitude, evidence.amplitude):
                 again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)

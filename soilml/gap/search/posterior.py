@@ -112,7 +112,8 @@ def posterior(
     """
     objectives = {c.names: c.objective for c in candidates}
     for name, gain in predicted.items():
-        objectives.setdefault((name,), none.objective - gain)
+        if np.isfinite(gain):  # else its signature is that of rows without an equilibrium
+            objectives.setdefault((name,), none.objective - gain)
     logs = {names: -0.5 * TEMPERING * value for names, value in objectives.items()}
     total = float(np.logaddexp.reduce(list(logs.values())))
     return Posterior({names: value - total for names, value in logs.items()})
