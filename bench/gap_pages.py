@@ -64,8 +64,8 @@ def _head(sets: Sequence[Judged]) -> str:
         "cause's signature, after the soil has adapted, times the sine of its angle to the most "
         "similar effect. The method was tuned on sets of another seed, except for three rules that "
         "were changed after a first look at these sets: held-out runs no longer veto a name, "
-        "rivals that do not beat the soil alone are no class, and intervals allow for amplitudes that are "
-        "not excluded. "
+        "rivals that do not beat the soil alone are no class, and intervals allow for amplitudes "
+        "that are not excluded. "
         f"{os.cpu_count()} cores, Python {platform.python_version()}.\n"
     )
 
