@@ -33,7 +33,7 @@ from soilml import Estimator
 from soilml.cli.progress import progress_bar
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.onboard.set_contract import ABSENT_STD
+from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
 from soilml.quantities import SHEAR
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.recipe_family import RecipeFamily
@@ -221,7 +221,8 @@ def load_files(case: Case, wheel: str, any_wheel: str) -> list[Estimator]:
         "cohesion_max": case.prior["cohesion"].upper,
         "shear_modulus_max": case.prior["shear_modulus"].upper,
     }
-    return [Estimator.load(wheel), Estimator.load(any_wheel).on(**context)]
+    exact = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+    return [Estimator.load(wheel).on(**exact), Estimator.load(any_wheel).on(**context, **exact)]
 
 
 def measured(

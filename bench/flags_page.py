@@ -16,7 +16,8 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 DETECTED, HARMLESS, SUMMARY_SIZE = 0.95, 1.3, 16
 CHANNELS = ("Torque only", "Torque, sinkage and drawbar pull")
 ABOUT = (
-    "Reference wheel, six slips at six loads, 2 % torque noise, 100 soils per fault. Detection "
+    "Reference wheel, six slips at six loads, 2 % torque noise, 100 soils per fault; files with "
+    "exact sensors. Detection "
     "rates in %: *flagged* by `wheel.onnx`; by a *chi-square* test of the exact model, which does "
     "not know the fault; and by a *likelihood-ratio* test that knows the fault and its size, about "
     "the most powerful test there is. Both tests have a false alarm rate of 1 %. *Error*: rms "

@@ -28,6 +28,8 @@ from datagen.blind_sets.factorial_plan import Plan, benchmark_plans, plan_matrix
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
+#: Seed of the published sets; the method was tuned on sets of others (0, 1, 3, 7).
+SEED = 2
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
@@ -51,7 +53,9 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seed", type=int, default=0, help="0 is the benchmark's own")
+    parser.add_argument(
+        "--seed", type=int, default=SEED, help=f"{SEED}, the default, is the benchmark's own"
+    )
     parser.add_argument(
         "--factorial", action="store_true", help="the 1593 sets without discrepancy instead"
     )

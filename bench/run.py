@@ -18,9 +18,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import advice
 import board
+import c_export
 import learning
+import model_errors
 import physics
 import prospects
+import slip
+import streams
 import systems
 from benchmarks_file import FILE, MARK, ROOT
 
@@ -107,6 +111,17 @@ PARTS = (
         lambda folder: learning.flagged(),
     ),
     Part(
+        "model-errors",
+        "Wrong sensors and wrong models",
+        f"`wheel.onnx` on {model_errors.SETS} soils a line, {model_errors.ROWS} rows each at three "
+        "loads, 2 % torque noise (`python bench/model_errors.py`). Sets are simulated by the "
+        "reference wheel of blind sets, which shares no code with `soilml`. First the file with "
+        "exact sensors and the prior for refused sets, as files were before they knew of errors; "
+        "then as it answers with its usual errors. Score: mean of the interval score over "
+        "parameters and sets, in standard deviations of the prior; the prior has about 3.3.",
+        lambda folder: model_errors.tables(ROOT / "exported" / "wheel.onnx"),
+    ),
+    Part(
         "rules",
         "Fusion rules for regressors of the same reading",
         "LS-SVM, MLP and linear regression read the same three numbers, so that their errors are "
@@ -130,6 +145,24 @@ PARTS = (
         "the capacity of the regressor.",
         learning.centres,
     ),
+    Part(
+        "streams",
+        "A day of driving",
+        f"{streams.DAYS} simulated days of docs/driving.md on each line, by the reference wheel of "
+        "`datagen/blind_sets`: three soils of 100 rows, 2 % torque noise, slip with a standard "
+        "deviation of 0.02; 2 % of the rows are glitches (torque doubled or zero, slip off by a "
+        "half), torque is stuck for 20 rows, a pause lasts 10 rows, and over the last 150 rows the "
+        "friction angle falls by 7 degrees or the zero of the torque sensor rises by 0.5 N m. "
+        "Width: median standard deviation over that of the prior. "
+        f"Intervals and flag `in_range`: rows from the {streams.SETTLED}th on one soil on, "
+        "glitches apart. Alarms: sound rows of unchanged soil that were set aside or called a "
+        f"change, drift or stuck sensor. Changes by rms change of torque: how many were told "
+        f"within {streams.WITHIN} rows; median and largest delay in rows. Drift: how many were "
+        "flagged; median and largest delay. Last column: of the rows in a drift whose mean is off "
+        "by more than so many standard deviations, the share that carries a flag, and their "
+        "number.",
+        lambda folder: streams.table(ROOT / "exported" / "wheel.onnx"),
+    ),
     Part("loo", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()),
     Part(
         "board",
@@ -137,6 +170,13 @@ PARTS = (
         "Median and 99th percentile (p99) in microseconds, one thread. Goals: 60 us for one "
         "reading and for a set of 16, 0.2 s to the first estimate, 0.5 MB per file.",
         lambda folder: board.latency() + "\n\n" + board.cold_start(),
+    ),
+    Part(
+        "c",
+        "Exported C files",
+        "`soilml export-c` (docs/c-export.md) beside onnxruntime, one thread. Goals: half of the "
+        "latency of onnxruntime, differences as small as those of rounding.",
+        c_export.c_export,
     ),
     Part(
         "pull",
@@ -157,6 +197,17 @@ PARTS = (
         "Other gears",
         "50 000 operating points each, at typical loads of the gear.",
         lambda folder: systems.gears(),
+    ),
+    Part(
+        "slip",
+        "Slip of a wheel-leg",
+        "Slip from torque and from vibration (Comin and Saaj 2017, eqs. 18 and 24): the released "
+        "linear files, and LS-SVM variants trained on the same data, on strides that no file was "
+        "trained on. Each cell: RMSE over the standard deviation of the prior, coverage of the "
+        "90 % interval. The rules prior-once and eq. 26 take errors for independent. *World*: what "
+        "differs from the recipe of the files. *Disagreement*: difference between the two files in "
+        "standard deviations of that difference, 1 where both are right.",
+        slip.tables,
     ),
     Part(
         "walking",

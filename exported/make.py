@@ -1,4 +1,4 @@
-"""Train the released models again: `make models`.
+"""Train the released models again: `make models`, or `python exported/make.py NAME ...`.
 
 The same tree on the same machine and library versions gives the same bytes.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import shlex
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from soilml.cli import main
@@ -22,6 +23,10 @@ RELEASED = {
     "wheel_mlp": ("wheel", "mlp"),
     "wheel_linear": ("wheel", "linear"),
     "kls1_wheel": (KLS1, "fused"),
+    "slip_torque": ("wheel_leg", "slip_torque"),
+    "slip_vibration": ("wheel_leg", "slip_vibration"),
+    "slip_torque_known": ("wheel_leg_known", "slip_torque"),
+    "slip_vibration_known": ("wheel_leg_known", "slip_vibration"),
 }
 
 
@@ -29,10 +34,14 @@ RELEASED = {
 SIMULATED = {"any_wheel": "any_wheel"}
 
 
-def run() -> None:
-    """Generate each recipe's data once, and train every spec on it."""
+def run(names: Sequence[str]) -> None:
+    """Generate each recipe's data once, and train every spec on it; all files, or those named."""
+    if unknown := set(names) - {*RELEASED, *SIMULATED}:
+        sys.exit(f"no file {', '.join(unknown)}; there are: {', '.join((*RELEASED, *SIMULATED))}")
     with tempfile.TemporaryDirectory() as folder:
         for name, (recipe, spec) in RELEASED.items():
+            if names and name not in names:
+                continue
             data = str(Path(folder) / f"{Path(recipe).stem}_{len(recipe)}.parquet")
             steps = [["train", spec, data, str(HERE / f"{name}.onnx")]]
             if not Path(data).exists():
@@ -40,6 +49,8 @@ def run() -> None:
             for step in steps:
                 _run_command(step)
     for name, spec in SIMULATED.items():
+        if names and name not in names:
+            continue
         _run_command(["train", spec, str(HERE / f"{name}.onnx")])
 
 
@@ -51,4 +62,4 @@ def _run_command(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    run()
+    run(sys.argv[1:])

@@ -28,6 +28,7 @@ _HOME = {
     "Table": "soilml.io.table",
     "Estimate": "soilml.onboard.estimate",
     "Estimator": "soilml.onboard.estimator",
+    "SoilTracker": "soilml.onboard.tracking",
     "Parameter": "soilml.parameters",
     "Force": "soilml.physics.contact",
     "EFFECTS": "soilml.physics.effects",

@@ -1,10 +1,18 @@
-"""Modules that need libraries which are not installed on board."""
+"""Modules that need libraries which are not installed on board, or not in every Python."""
 
 from __future__ import annotations
 
 import importlib
+import sys
 
 from soilml.errors import MissingLibraryError
+
+if sys.version_info >= (3, 11):  # noqa: UP036
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["need", "tomllib"]
 
 
 def need(module: str, command: str, extra: str = "ground") -> None:

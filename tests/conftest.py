@@ -15,6 +15,9 @@ from scipy.stats import qmc
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
+from compiled_c_fixtures import compiled as compiled
+from compiled_c_fixtures import exported as exported
+
 #: The reference wheel on dry sand.
 WHEEL_ON_SAND = """\
 [gear]
@@ -241,8 +244,46 @@ def any_set_file(any_posterior, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return _exported(tmp_path_factory.mktemp("any_set"), any_posterior.family, any_posterior, noise)
 
 
+def simulated_run(posterior, rows, seed=0, x=(0.2, -0.3, 0.1)):
+    """Readings (rows,) of a soil in the middle of the prior, with 2 % of noise."""
+    rng = np.random.default_rng(seed)
+    recipe = posterior.family.recipe
+    slip, load = (part.at(rng.random(rows)) for part in (recipe.slip, recipe.load))
+    answers = posterior.family.responses(
+        np.stack([slip, load], axis=1), np.broadcast_to(x, (rows, 1, 3))
+    )[:, 0]
+    torque = np.exp(answers[:, 0]) * load * (1.0 + 0.02 * rng.standard_normal(rows))
+    return {"slip": slip, "load": load, "torque": torque}, np.exp(answers[:, 1])
+
+
+#: Noise of the sensors as it is declared in `whole_file`.
+FILE_NOISE = {"torque": [0.01, 0.02], "torque_bias": [0.0, 0.01], "sinkage": [0.0005, 0.05]}
+
+
+@pytest.fixture(scope="session")
+def whole_file(small_data: Path, wheel_posterior, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with estimates of single readings and a set posterior, as `wheel.onnx` is."""
+    from dataclasses import replace
+
+    from training.data.dataset import read_dataset
+    from training.export.model_file import export_model
+    from training.spec import read_spec
+    from training.train import train
+
+    def fill(folder: Path) -> None:
+        (folder / "spec.toml").write_text('seed = 1\n[[regressor]]\ntype = "linear"\n')
+        spec = read_spec(folder / "spec.toml")
+        trained = train(spec, read_dataset(small_data, spec.features, spec.targets))
+        posterior = replace(wheel_posterior, noise=FILE_NOISE)
+        whole = replace(trained, set_posterior=posterior)
+        export_model(whole, folder / "whole.onnx", small_data)
+
+    return shared_folder(tmp_path_factory, "whole_file", fill) / "whole.onnx"
+
+
 #: Fixtures that train: tests that use one are slow.
 TRAINED = {
+    "whole_file",
     "small_data",
     "small_model",
     "wheel_posterior",

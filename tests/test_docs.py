@@ -19,7 +19,16 @@ PAGES = sorted(
     for page in ROOT.glob(pattern)
 )
 #: pages whose Python blocks are run; docs/physics.md ends with an effect that a command loads
-RUN = ("README.md", "docs/physics.md", "docs/sets.md", "docs/advice.md", "docs/pull.md")
+RUN = (
+    "README.md",
+    "docs/physics.md",
+    "docs/sets.md",
+    "docs/driving.md",
+    "docs/advice.md",
+    "docs/pull.md",
+    "docs/papers/slip_models.md",
+    "exported/README.md",
+)
 
 
 def blocks(page, language):

@@ -10,7 +10,7 @@ import pytest
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[1]
-SENSORS = {"torque-gain", "torque-offset", "load-gain", "drawbar-gain", "slip-scale"}
+SENSORS = {"torque-gain", "torque-offset", "load-gain", "drawbar-gain", "slip-scale", "slip-offset"}
 
 
 @pytest.fixture(scope="module")

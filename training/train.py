@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -15,6 +15,7 @@ from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import PoolingCalibration, PoolingRule, pool_within_prior
 from soilml.quantities import Z_90
+from training.calibration.held_out import carry_errors
 from training.calibration.metrics import Metrics, compute_metrics
 from training.calibration.recalibration import (
     CalibratedRegressor,
@@ -74,6 +75,8 @@ class TrainedModel:
         Of single rows: of each member, of each fusion rule, and of the estimator.
     pooled_scores : dict of str to dict of int to Metrics
         Of pooled rows, by pattern of operating conditions and number of rows.
+    repeat_scores : dict of int to Metrics
+        Of repeated readings at one slip, by their number, for targets that differ between rows.
     set_posterior : SetPosteriorGraph or None
         Posterior of several rows, where the spec asks for it.
     set_figures : dict of int to SetFigures
@@ -90,6 +93,7 @@ class TrainedModel:
     scores: dict[str, Metrics]
     pooled_scores: dict[str, dict[int, Metrics]]
     members: tuple[CalibratedRegressor, ...]
+    repeat_scores: dict[int, Metrics] = field(default_factory=dict)
     set_posterior: SetPosteriorGraph | None = None
     set_figures: dict[int, SetFigures] = field(default_factory=dict)
 
@@ -167,7 +171,7 @@ def train(
     calibrate = calibrate_single_rows if spec.per_row else calibrate_pooling
     pooling = calibrate(mean, covariance, calibration, prior, run_conditions(parts.train))
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
-    return TrainedModel(
+    trained = TrainedModel(
         spec=spec,
         estimator=estimator,
         domain=TrainingDomain.of(parts.train.features, spec.features, spec.seed),
@@ -181,6 +185,12 @@ def train(
         set_posterior=set_posterior,
         set_figures=set_figures,
     )
+    if spec.per_row:
+        pooling, repeats = carry_errors(
+            trained.predict, pooling, calibration, parts.calibration.rows(scored), prior.std
+        )
+        trained = replace(trained, pooling=pooling, repeat_scores=repeats)
+    return trained
 
 
 def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
@@ -198,6 +208,7 @@ def _train_set_posterior(
     family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
     response = fit_response(family, spec.set_posterior, progress)
     posterior = calibrate_misfit_limits(family, response, progress)
+    posterior = replace(posterior, noise=family.declared_noise())
     return posterior, validate_posterior(posterior, progress)
 
 

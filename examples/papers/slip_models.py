@@ -50,6 +50,13 @@ CASES = {
         ),
     },
 }
+#: Specs of one sensor each, and what they are called in the table.
+NAMES = {
+    "slip_torque_lssvm": "torque alone",
+    "slip_vibration_lssvm": "vibration alone",
+    "slip_torque": "torque alone, linear",
+    "slip_vibration": "vibration alone, linear",
+}
 RULES = ("inverse-variance", "pairwise", "best-linear")
 BANDS = np.linspace(0.1, 0.99, 30)
 
@@ -70,7 +77,8 @@ def smaller(name: str) -> Spec:
     """A packaged spec with fewer centres."""
     spec = read_spec(name)
     for reader in spec.regressors:
-        reader.model.set_params(centres=60)
+        if "centres" in reader.model.get_params():
+            reader.model.set_params(centres=60)
     return spec
 
 
@@ -105,20 +113,23 @@ def slip_of(folder: Path, changes: dict[str, str]) -> tuple[list[tuple[str, str,
     lines.append(line("one file: both read at once", score.relative[0], score.cover90[0]))
     table = read_table(test)
     table = table.rows(table.answered)
-    found = {}
-    for name in ("slip_torque", "slip_vibration"):
+    alone = {}
+    for name in NAMES:
         export_model(learned(smaller(name), data), folder / f"{name}.onnx", data)
         estimator = Estimator.load(folder / f"{name}.onnx")
-        found[name] = estimator(**{n: table[column(n)] for n in estimator.inputs})
+        alone[name] = estimator(**{n: table[column(n)] for n in estimator.inputs})
+    machines, linear = [*alone.values()][:2], [*alone.values()][2:]
+    found = dict(alone)
     for rule in ACROSS_FILES:
-        found[f"two files: {rule}"] = fuse_estimates([*found.values()][:2], rule).estimate
-    names = {"slip_torque": "torque alone", "slip_vibration": "vibration alone"}
+        found[f"two files: {rule}"] = fuse_estimates(machines, rule).estimate
+    for rule in ("correlated", "prior-once", "inverse-variance"):
+        found[f"two linear files: {rule}"] = fuse_estimates(linear, rule).estimate
     for place, (name, estimate) in enumerate(found.items()):
         off = estimate.mean[:, 0] - table["slip"]
         held = (estimate.low[:, 0] <= table["slip"]) & (table["slip"] <= estimate.high[:, 0])
         relative = np.sqrt(np.mean(off**2)) / estimate.prior.std[0]
-        at = place if name in names else len(lines)
-        lines.insert(at, line(names.get(name, name), relative, held.mean()))
+        at = place if name in NAMES else len(lines)
+        lines.insert(at, line(NAMES.get(name, name), relative, held.mean()))
     return lines, {"slip": table["slip"], **found}
 
 
@@ -141,9 +152,9 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
     figure = Figure(figsize=(12.0, 7.6), layout="constrained")
     axes = figure.subplots(2, 3)
     shown = {
-        "torque alone": "slip_torque",
-        "vibration alone": "slip_vibration",
-        "two files fused": "two files: prior-once",
+        "torque alone": "slip_torque_lssvm",
+        "vibration alone": "slip_vibration_lssvm",
+        "two files fused": "two files: correlated",
     }
     slip = found["slip"]
     for k, (axis, (title, key)) in enumerate(zip(axes[0], shown.items(), strict=True)):

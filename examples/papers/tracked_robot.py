@@ -54,6 +54,7 @@ PRIOR = {
 }
 SYMBOLS = ("n", r"$\varphi$", "$k_p$", "K", "c")
 UNITS = {"kphi": 1e-3, "cohesion": 1e-3}
+LABELS = ("simulated", "Table 1", "truth of the simulated")
 TABLE = ("n", "friction_angle", "kp", "shear_modulus", "cohesion")
 
 
@@ -237,23 +238,19 @@ def draw_stress(ax: plt.Axes) -> None:
     profile = Model(WANG2018.track).profile(ground, at, points)
     sunk = Model(WANG2018.track)(ground, at).sinkage
     belt = WANG2018.track.contact_geometry(sunk, ground, at)
-    ends = (
-        0.0,
-        float(0.1 * belt.entry),
-        float(0.1 * (belt.entry + belt.leave)),
-        float(0.1 * (belt.entry + belt.leave) + belt.arc_radius * (belt.leave + belt.meet)),
-    )
-    total = ends[3] + 0.1 * float(belt.meet + belt.exit)
+    bottom, front = float(0.1 * belt.entry), float(0.1 * (belt.entry + belt.leave))
+    rear = front + float(belt.arc_radius * (belt.leave + belt.meet))
+    total = rear + 0.1 * float(belt.meet + belt.exit)
     way = np.linspace(0.0, total, points)
     ax.plot(way, 1e-3 * profile.normal, color="#26547c", label="normal")
     ax.plot(way, 1e-3 * profile.shear, color="#d1495b", label="shear")
-    ax.axvspan(ends[0], ends[2], color="0.92")
-    ax.axvspan(ends[3], total, color="0.92")
+    ax.axvspan(0.0, front, color="0.92")
+    ax.axvspan(rear, total, color="0.92")
     top = 1e-3 * float(profile.normal.max())
-    for x, text in ((ends[1] + 0.02, "unloading"), (ends[3] - 0.19, "reloading")):
+    for x, text in ((bottom + 0.02, "unloading"), (rear - 0.19, "reloading")):
         ax.annotate(text, (x, 0.9 * top), fontsize=9, va="top")
     ax.annotate("front\nwheel", (0.01, 1.08 * top), fontsize=8, va="top")
-    ax.annotate("rear\nwheel", (ends[3] - 0.005, 1.08 * top), fontsize=8, va="top", ha="right")
+    ax.annotate("rear\nwheel", (rear - 0.005, 1.08 * top), fontsize=8, va="top", ha="right")
     ax.set(xlabel="way along the belt from entry, m", ylabel="stress, kPa")
     ax.set(xlim=(0, total), ylim=(0, 1.15 * top))
     ax.set_title("Stress under a track on sand, slip 0.2")
@@ -271,23 +268,10 @@ def draw_groups(ax: plt.Axes, case: Case, groups: GroupFits) -> None:
         factor = {"friction_angle": np.pi / 180.0, "kphi": 1e3, "cohesion": 1e3}.get(name, 1.0)
         shown = [prior.fraction(factor * v) for v in theirs]
         spread = np.linspace(-0.08, 0.08, 8)
-        ax.plot(i - 0.17 + spread, ours, "o", color="#26547c", label="simulated" if not i else None)
-        ax.plot(
-            i + 0.17 + spread,
-            shown,
-            "D",
-            mfc="none",
-            color="#c08a2d",
-            label="Table 1" if not i else None,
-        )
-        ax.hlines(
-            true,
-            i - 0.35,
-            i + 0.02,
-            color="#d1495b",
-            lw=2,
-            label="truth of the simulated" if not i else None,
-        )
+        simulated, published, truth = LABELS if i == 0 else (None, None, None)
+        ax.plot(i - 0.17 + spread, ours, "o", color="#26547c", label=simulated)
+        ax.plot(i + 0.17 + spread, shown, "D", mfc="none", color="#c08a2d", label=published)
+        ax.hlines(true, i - 0.35, i + 0.02, color="#d1495b", lw=2, label=truth)
     ax.axhspan(0.0, 1.0, color="0.95", zorder=0)
     ax.set_xticks(range(5), SYMBOLS)
     ax.set(ylabel="position within the prior, 0 to 1", ylim=(-0.06, 1.24))

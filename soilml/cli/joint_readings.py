@@ -8,7 +8,8 @@ import numpy as np
 
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_contract import OPTIONAL_READINGS
+from soilml.onboard.set_contract import OPERATING_NOISE, OPERATING_STD_INPUTS, OPTIONAL_READINGS
+from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import CHANNELS, column
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ def joint_readings(
     """Inputs for the pooled estimate of all rows of one soil, (rows,) by name.
 
     In addition to the required readings: sinkage and drawbar pull where the table has them and
-    their noise is known, and columns of standard deviations, which replace the noise of the file.
+    their noise is known, and columns of standard deviations, those of slip and load included, which
+    replace the noise of the file.
     The discrepancy of a case is included in them, for rows of which all are estimated `together`.
     """
     readings = row_readings(estimator, table)
@@ -41,6 +43,9 @@ def joint_readings(
             readings[f"{name}_std"] = _fill_blank_std(
                 table[spread], estimator, name, readings[name]
             )
+    for name, input_name in zip(OPERATING_NOISE, OPERATING_STD_INPUTS, strict=True):
+        if (spread := f"{column(name)}_std") in table:
+            readings[input_name] = _fill_blank_std(table[spread], estimator, name, readings[name])
     if case is not None and case.discrepancy:
         from soilml.identification.trained_estimator import std_with_discrepancy
 
@@ -56,6 +61,18 @@ def _fill_blank_std(spread: Any, estimator: Estimator, name: str, reading: Any) 
     return np.where(np.isfinite(spread) & (spread > 0.0), spread, own)
 
 
+def unused_std_note(estimator: Estimator, table: Table) -> list[str]:
+    """A note on columns of standard deviations that estimates of single rows do not use."""
+    if estimator.sets is not None and estimator.sets.sets_only:
+        return []
+    spreads = [f"{column(name)}_std" for name in (*CHANNELS, *OPERATING_NOISE)]
+    given = [key for key in spreads if key in table]
+    if not given:
+        return []
+    hint = "give --by" if estimator.sets is not None else "train a file with [set_posterior]"
+    return [f"estimates of single rows do not use {', '.join(given)}; {hint} to have them used"]
+
+
 def channel_note(estimator: Estimator, readings: dict[str, Any]) -> list[str]:
     """A note on the channels used, for a file that can use more than it requires."""
     if estimator.sets is None:
@@ -65,4 +82,23 @@ def channel_note(estimator: Estimator, readings: dict[str, Any]) -> list[str]:
         for name in CHANNELS
         if name in readings and np.isfinite(readings[name]).any()
     ]
-    return [f"uses slip, load and {', '.join(used)}"]
+    return [f"uses slip, load and {', '.join(used)}", *_common_error_note(estimator.sets)]
+
+
+def _common_error_note(sets: SetPosterior) -> list[str]:
+    """A note on the errors that all rows are assumed to share."""
+    texts = {
+        "slip_bias": "slip {:g}",
+        "load_gain": "load {:.3g} %",
+        "torque_gain": "torque {:.3g} %",
+        "sinkage_bias": "sinkage {:g} m",
+        "drawbar_pull_bias": "drawbar pull {:g} N",
+    }
+    said = [
+        texts[name].format(100.0 * std if name.endswith("gain") else std)
+        for name, std in sets.common_errors.items()
+        if std > 0.0
+    ]
+    if not said:
+        return []
+    return [f"assumes that all rows share errors with standard deviations of {', '.join(said)}"]

@@ -29,6 +29,7 @@ friction angle and shear modulus, each with its uncertainty.
 
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
+  from a model file to C       soilml export-c
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
@@ -50,6 +51,7 @@ COMMANDS = {
     "gap": "soilml.cli.commands.gap",
     "generate": "datagen.commands.generate",
     "train": "training.commands.train",
+    "export-c": "training.commands.export_c",
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",
     "pull": "soilml.cli.commands.pull",

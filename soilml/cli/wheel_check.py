@@ -1,56 +1,150 @@
-"""The wheel that `estimate` assumes, and whether it is that of the table."""
+"""The wheel that `estimate` assumes, and whether it is that of the case and of the table."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from itertools import chain
 
 import numpy as np
 
+from soilml.config.case import Case, read_case_of_one_gear
 from soilml.errors import InputError, TableError
-from soilml.identification.compatibility import check_wheel_columns
+from soilml.identification.compatibility import (
+    check_wheel_columns,
+    effect_differences,
+    gear_differences,
+    prior_differences,
+    recipe_case,
+    value_differences,
+)
+from soilml.identification.trained_estimator import condition_on_case, with_sensors_of
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
-from soilml.optional_imports import need
 from soilml.quantities import QUANTITIES
-
-if TYPE_CHECKING:
-    from soilml.config.case import Case
 
 _HINT = "select rows with --where, or train a model for this wheel"
 
 
-def apply_case_option(
-    args: argparse.Namespace, estimator: Estimator
-) -> tuple[Estimator, Case | None, list[str]]:
-    """The estimator for the wheel and soil of `--case`, the case, and notes on what it ignores.
+def describe_file(estimator: Estimator) -> str:
+    """What a model file is for, in one line: gear, effects, estimated quantities with their prior.
 
-    Raises `InputError` where a file for wheels of any size has no case, or another file has one.
+    Bounds of the prior that a context input scales are given by its name until it is set.
     """
-    any_wheel = estimator.sets is not None and bool(estimator.sets.missing_context)
-    if any_wheel and args.case is None:
-        raise InputError(
-            f"{args.model} is for wheels of any size: give --case MODEL.toml with your [gear], "
-            "[soil], [soil.prior] and [noise]"
+    gear = dict(json.loads(estimator.metadata["gear"]))
+    limits = {} if estimator.sets is None else estimator.sets.context_ranges
+    fixed = {} if estimator.sets is None else estimator.sets.context_values
+    for name in ("radius", "width"):
+        gear[name] = fixed.get(f"wheel_{name}", gear.get(name, limits.get(f"wheel_{name}")))
+    sizes = [f"{k} {_number(v)}" for k, v in gear.items() if k != "type" and v is not None]
+    effects = [e["name"] for e in json.loads(estimator.metadata["recipe"]).get("effect", [])]
+    with_effects = f"with {', '.join(effects)}" if effects else "without effects"
+    priors = [
+        f"{entry['name'].replace('_', ' ')} {ends[0]:.4g} to {ends[1]:.4g} {entry['unit']}"
+        if (scale := entry.get("scale")) is None or scale in fixed
+        else f"{entry['name'].replace('_', ' ')} {entry['lower']:.3g} to 1 {scale}"
+        for entry, *ends in zip(
+            json.loads(estimator.metadata["outputs"]),
+            estimator.prior.lower,
+            estimator.prior.upper,
+            strict=True,
         )
-    if args.case is None:
-        return estimator, None, []
-    if not any_wheel:
-        raise InputError(f"{args.model} is for one wheel only; omit --case")
-    need("array_api_compat", "estimate --case")
-    from soilml.config.case import read_case_of_one_gear
-    from soilml.identification.trained_estimator import condition_on_case
+    ]
+    return (
+        f"{estimator.path}: for a {gear.get('type', 'gear that it does not state')}"
+        f"{' of ' if sizes else ''}{', '.join(sizes)}, {with_effects}; reads "
+        f"{', '.join(estimator.inputs)}; estimates {', '.join(priors)}"
+    )
 
-    case = read_case_of_one_gear(args.case, gear=args.gear)
-    conditioned, notes = condition_on_case(estimator, case)
-    if case.discrepancy:
-        notes.append(
-            f"[discrepancy] of {', '.join(case.discrepancy)} is included as independent errors of "
-            "the rows, enlarged by the rows that are alike: intervals are wider than those of "
-            "soilml identify"
+
+def apply_case_option(
+    args: argparse.Namespace, estimators: list[Estimator]
+) -> tuple[list[Estimator], Case | None, list[str]]:
+    """The estimators for the wheel and soil of `--case`, the case, and notes on what is ignored.
+
+    Raises `InputError` where a file for wheels of any size has no case, and where the gear or the
+    effects of the case are not those of a file.
+    """
+    case = None
+    if args.case is not None:
+        case = read_case_of_one_gear(args.case, gear=args.gear, with_bias=True)
+    given, notes = [], []
+    for estimator in estimators:
+        if estimator.sets is not None and estimator.sets.missing_context:
+            if case is None:
+                raise InputError(
+                    f"{estimator.path} is for wheels of any size: give --case MODEL.toml with your "
+                    "[gear], [soil], [soil.prior] and [noise]"
+                )
+            estimator, own_notes = condition_on_case(estimator, case)
+            notes += own_notes
+        elif case is not None:
+            together = estimator.sets is not None and args.by is not None
+            notes += _compare(args, estimator, case, ignores_noise=not together)
+            estimator = with_sensors_of(estimator, case) if together else estimator
+        given.append(estimator)
+    if case is not None and case.discrepancy:
+        notes.append(_discrepancy_note(args, given[0], case))
+    return given, case, notes
+
+
+def _compare(
+    args: argparse.Namespace, estimator: Estimator, case: Case, ignores_noise: bool
+) -> list[str]:
+    """Notes on what differs between a file for one wheel and the case.
+
+    Raises `InputError` where gear or effects do.
+    """
+    own = recipe_case(estimator.metadata["recipe"], estimator.path)
+    if own is None:
+        return [
+            f"{estimator.path} does not state its wheel: it cannot be compared with {args.case}"
+        ]
+    values = list(value_differences(case, own))  # an effect's path has a point: slip-sinkage.n1
+    of_effects = [text for text in values if "." in text.split()[0]]
+    wrong = [*gear_differences(case, own), *effect_differences(case, own), *of_effects]
+    if wrong:
+        said = "; ".join(wrong).replace("the model file", args.case)
+        raise InputError(
+            f"{estimator.path} is not for the wheel of {args.case}: {said}; train a file for this "
+            "model, or correct [gear] and [[effect]]"
         )
-    return conditioned, case, notes
+    different = chain(
+        (text for text in values if text not in of_effects),
+        prior_differences(case, own, estimator.names),
+        _noise_differences(case, own) if ignores_noise else (),
+    )
+    return [
+        f"{estimator.path}: {text.replace('the model file', args.case)}, which is ignored"
+        for text in different
+    ]
+
+
+def _noise_differences(case: Case, own: Case) -> Iterator[str]:
+    """Declared noise of the case that is not that of the file."""
+    for key, noise in case.noise.items():
+        if noise != own.noise.get(key):
+            yield f"noise of {key} as in its recipe, the model file has another one"
+    if case.bias:
+        yield f"no bias of {', '.join(case.bias)}, the model file declares it"
+
+
+def _discrepancy_note(args: argparse.Namespace, estimator: Estimator, case: Case) -> str:
+    names = ", ".join(case.discrepancy)
+    if estimator.sets is None or (args.by is None and not estimator.sets.sets_only):
+        return f"estimate ignores the [discrepancy] of {names}: the file takes no noise of a row"
+    return (
+        f"[discrepancy] of {names} is included as independent errors of the rows, enlarged by the "
+        "rows that are alike: intervals are wider than those of soilml identify"
+    )
+
+
+def _number(value: object) -> str:
+    """A number, or the ends of a range."""
+    if isinstance(value, tuple):
+        return f"{value[0]:.3g} to {value[1]:.3g} m"
+    return f"{value:g} m" if isinstance(value, float) else str(value)
 
 
 def check_table_wheel(estimator: Estimator, table: Table) -> None:

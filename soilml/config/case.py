@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from soilml.config.measurement_noise import Noise, take_noise
@@ -17,6 +18,7 @@ from soilml.config.model_settings import (
     take_instance,
     take_priors,
 )
+from soilml.config.sensor_bias import take_bias
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
@@ -47,6 +49,8 @@ class Case:
         Where several gears were driven: each by its name in the column `gear` of a table, with the
         effects of its own; `model` has the effects that all share, on the first gear. A gear's own
         effect replaces a shared one of the same name. Empty where there is one gear.
+    bias
+        Errors that all readings of a sensor share, by column name: `torque_Nm`, `slip`.
     """
 
     model: Model
@@ -55,12 +59,17 @@ class Case:
     noise: dict[str, Noise] = field(default_factory=dict)
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
     gears: dict[str, Model] = field(default_factory=dict)
+    bias: dict[str, Noise] = field(default_factory=dict)
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value.
 
         Parameters of one of several gears are `gears.lugged.radius` and `grousers@lugged.height`.
         """
+        return dict(self._parameters)
+
+    @cached_property
+    def _parameters(self) -> dict[str, tuple[Parameter, Any]]:
         own = located(self.soil)
         for path, entry in located(self.model).items():
             if not (self.gears and path.startswith("gear.")):
@@ -180,15 +189,23 @@ def read_case_of_one_gear(
     path: str | os.PathLike[str],
     effects: Mapping[str, type[Effect]] = EFFECTS,
     gear: str | None = None,
+    with_bias: bool = False,
 ) -> Case:
     """Read the case of one gear; `gear` names it where the file has several.
+
+    The table [bias] is read with `with_bias`; otherwise it is refused, so that nobody takes it as
+    used where it is not.
 
     Raises
     ------
     InputError
         As `read_case` does, and where the file has several gears and none of this name.
     """
-    case = read_case(path, effects)
+    settings = read_settings(path)
+    case = take_case(settings, effects)
+    if with_bias:
+        case = replace(case, bias=take_bias(settings.table("bias")))
+    settings.finish()
     if not case.gears and gear is None:
         return case
     known = ", ".join(case.gears)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from typing import Any
 
 from soilml.config.prior_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import check, declared
+from soilml.parameters import Parameter, check, declared
 from soilml.physics.effects import Effect
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
@@ -99,13 +99,28 @@ def take_instance(cls: type, settings: Settings) -> Any:
     return made
 
 
+def _within_bounds(settings: Settings, key: str, prior: Prior, parameter: Parameter) -> Prior:
+    """A normal prior, cut off at the bounds of its parameter."""
+    lower, upper = max(prior.lower, parameter.lower), min(prior.upper, parameter.upper)
+    if prior.lower < 0.0 <= parameter.lower:
+        settings.fail(
+            f"{key}: a normal prior about zero has values below zero, which {key} cannot have; "
+            f"needed is {{ half-normal = {prior.normal_std:g} }}, or a range"
+        )
+    if not lower < upper:
+        settings.fail(f"{key}: a normal prior about zero lies outside the bounds of {key}")
+    return replace(prior, lower=lower, upper=upper)
+
+
 def take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
     """Priors of the parameters that a dataclass declares, by name."""
     priors = {}
     settings.permit(declared(cls))
     for key, parameter in declared(cls).items():
         if key in settings:
-            prior = take_prior(settings, key)
+            prior = take_prior(settings, key, about_zero=True)
+            if prior.normal_std is not None:
+                prior = _within_bounds(settings, key, prior, parameter)
             if not parameter.lower <= prior.lower < prior.upper <= parameter.upper:
                 settings.fail(
                     f"{key} is [{prior.lower:g}, {prior.upper:g}]; it must lie between "

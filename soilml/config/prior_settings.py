@@ -7,11 +7,26 @@ import math
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 
+#: Priors about zero by the name that they have in a model file.
+NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 
-def take_prior(settings: Settings, key: str) -> Prior:
-    """Read `key = [lower, upper]` or `key = { range = [lower, upper], scale = "log" }`."""
+
+def take_prior(settings: Settings, key: str, *, about_zero: bool = False) -> Prior:
+    """Read `key = [lower, upper]` or `key = { range = [lower, upper], scale = "log" }`.
+
+    With `about_zero`, also a normal prior about zero, `{ normal = 0.2 }`, or its positive half,
+    `{ half-normal = 0.2 }`.
+    """
     needed = "[lower, upper], or { range = [lower, upper], scale = 'log' }"
+    if about_zero:
+        needed += ", or { normal = std }, or { half-normal = std }"
     value = settings.take(key, (list, dict), needed)
+    kind = next(iter(value)) if isinstance(value, dict) and len(value) == 1 else None
+    if about_zero and kind in NORMAL:
+        std = value[kind]
+        if isinstance(std, bool) or not isinstance(std, int | float) or not 0.0 < std < math.inf:
+            settings.fail(f"{key}: {kind} is {std!r}; needed is a standard deviation above zero")
+        return NORMAL[kind](float(std))
     log = False
     if isinstance(value, dict):
         log = value.get("scale") == "log"

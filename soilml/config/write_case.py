@@ -35,6 +35,9 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     if case.noise:
         lines += ["", "[noise]"]
         lines += [f"{key} = {_setting(noise.as_setting())}" for key, noise in case.noise.items()]
+    if case.bias:
+        lines += ["", "[bias]"]
+        lines += [f"{key} = {_setting(bias.as_setting())}" for key, bias in case.bias.items()]
     if case.discrepancy:
         lines += ["", "[discrepancy]"]
         settings = discrepancy_as_settings(case.discrepancy)

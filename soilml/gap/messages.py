@@ -141,12 +141,6 @@ def unsupported_conclusions(
         )
     if report.status == "partly-named":
         conclusions.append("the cause of the remaining discrepancy")
-        train = report.gap["train"]
-        if train.after >= train.before:
-            conclusions.append(
-                "a smaller misfit: the soil alone bends its parameters to absorb a part of the "
-                "discrepancy; the evidence for the effect is in the shape of the readings"
-            )
     if report.status == "form-open":
         conclusions.append(
             "the law of the effect: by_slip and by_load describe these data empirically"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from soilml.gap.data.checks import (
     estimate_repeat_noise,
     without_duplicate_rows,
 )
+from soilml.gap.data.free_soil import fixed_parameters, free_soil_parameters
 from soilml.gap.data.holdout import HoldoutSplit, split_holdout
 from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
 from soilml.gap.design.discriminating_runs import next_runs
@@ -39,6 +40,7 @@ from soilml.gap.verdict.decision import (
     is_left_open,
     reasons,
     unclaimed_effects,
+    with_refused_outside,
 )
 from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagree
 from soilml.gap.verdict.remaining_discrepancy import (
@@ -60,10 +62,9 @@ from soilml.gap.verdict.report_entries import (
 from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import updated_case
 from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.identification.free_parameters import FreeParameter
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.quantities import SHEAR
 
 
 def gap(
@@ -76,6 +77,7 @@ def gap(
     calibration: Mapping[str, float] | None = None,
     costs: Mapping[str, float] | None = None,
     seed: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> GapReport:
     """Find where a model disagrees with measured rows, and the effect that the model lacks.
 
@@ -104,6 +106,8 @@ def gap(
         ranked by what they discriminate per cost.
     seed : int
         Of all random draws; the same input gives the same report.
+    progress : callable, optional
+        Called with the share of the work that is done, from 0 to 1, as it grows.
 
     Returns
     -------
@@ -147,7 +151,7 @@ def gap(
     table, unusable_rows = table.rows(usable), int(np.count_nonzero(~usable))
     table, duplicate_rows = without_duplicate_rows(table)
     split = split_holdout(table, holdout, seed)
-    soil = _free_soil_parameters(case, free)
+    soil = free_soil_parameters(case, free)
 
     readings = stack_readings(case, split.analysed)
     repeat_noise, notes = estimate_repeat_noise(readings)
@@ -163,27 +167,18 @@ def gap(
     checks = replace(checks, notes=(*notes, *checks.notes))
 
     place = split.analysed.place
-    analysis = analyse(case, soil, readings, effects, calibration or {}, seed, place)
+    analysis = analyse(
+        case, soil, readings, effects, calibration or {}, seed, place, progress or (lambda _: None)
+    )
     if analysis.error:
         return _bad_data_report(case, (analysis.error,), checks.notes, seed)
     held_out = None
     if split.held_out is not None:
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
+    analysis = replace(analysis, result=with_refused_outside(analysis.result))
     report = _build_report(case, analysis, checks, soil, split, held_out, seed)
     return replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
-
-
-def _free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[FreeParameter]:
-    """The soil parameters to fit: those named, else those with a prior, else the shear parameters.
-
-    Raises `InputError` where a named parameter is one of the gear or of an effect.
-    """
-    selected = select_free(case, free if free is not None or case.prior else SHEAR)
-    other = [f.path for f in selected if "." in f.path]
-    if free is not None and other:
-        raise InputError(f"--free {other[0]} is not a soil parameter; only those can be freed here")
-    return [f for f in selected if "." not in f.path]
 
 
 def _bad_data_report(
@@ -261,9 +256,7 @@ def _build_report(
     return replace(
         report,
         sentence=verdict_sentence(report, effect_names(case)),
-        not_claimed=tuple(
-            unsupported_conclusions(report, obstacles, _fixed_parameters(case, free))
-        ),
+        not_claimed=tuple(unsupported_conclusions(report, obstacles, fixed_parameters(case, free))),
     )
 
 
@@ -291,10 +284,3 @@ def _with_disagreement(
         discrepancy=remaining_discrepancy(problem, before, after),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
-
-
-def _fixed_parameters(case: Case, free: Sequence[FreeParameter]) -> list[str]:
-    """Soil and gear parameters that were fixed at the values of the model file."""
-    freed = {f.path for f in free}
-    soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
-    return [*soil, *(path for path in case.parameters() if path.startswith(("gear.", "gears.")))]

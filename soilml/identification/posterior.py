@@ -22,6 +22,7 @@ from soilml.identification.predictions import (
     stack_channels,
     stacked_readings,
 )
+from soilml.numerics.chi_squared import chi_squared_quantile
 from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
@@ -251,10 +252,6 @@ def _sampling_warnings(sample: ImportanceSample) -> tuple[str, ...]:
 def misfit_limit(freedom: int) -> float:
     """Misfit per degree of freedom that noise alone exceeds with a probability of 0.001.
 
-    The 0.999 quantile of chi-squared over its degrees of freedom, by the approximation of Wilson
-    and Hilferty, Proc. National Academy of Sciences 17, 1931; infinite without a degree of freedom.
+    The 0.999 quantile of chi-squared over its degrees of freedom; infinite without any.
     """
-    if freedom < 1:
-        return np.inf
-    variance = 2.0 / (9.0 * freedom)
-    return float((1.0 - variance + Z_999 * np.sqrt(variance)) ** 3)
+    return chi_squared_quantile(freedom, Z_999) / freedom if freedom >= 1 else np.inf

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.config.sensor_bias import common_errors
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import independent_bound, slip_load_points
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, OPERATING_NOISE
 from soilml.parameters import declared
 from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
@@ -66,13 +69,8 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
             f"the prior of kphi has a standard deviation of a factor {math.exp(bearing_std):.2g}, "
             f"the file allows {math.exp(widest):.2g}: intervals may be too narrow"
         )
-    noise = {
-        name: (case.noise[column(name)].constant, case.noise[column(name)].share)
-        for name in CHANNELS
-        if column(name) in case.noise
-    }
-    conditioned = estimator.on(
-        noise=noise,
+    conditioned = with_sensors_of(estimator, case).on(
+        noise=None,
         wheel_radius=float(gear.radius),
         wheel_width=float(gear.width),
         bearing_modulus=bearing,
@@ -81,6 +79,22 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
         **upper_bounds,
     )
     return conditioned, warnings + _prior_differences(conditioned, case)
+
+
+def with_sensors_of(estimator: Estimator, case: Case) -> Estimator:
+    """The estimator of a file with a set posterior, with the noise and bias that a case declares.
+
+    Raises `InputError` where the file takes as exact what the case declares to have an error.
+    """
+    noise = {
+        name: (case.noise[column(name)].constant, case.noise[column(name)].share)
+        for name in (*CHANNELS, *OPERATING_NOISE)
+        if column(name) in case.noise
+    }
+    errors = common_errors(case.bias)
+    if "torque_bias" in errors:
+        noise["torque_bias"] = (errors.pop("torque_bias"), 0.0)
+    return estimator.on(noise, **errors)
 
 
 def std_with_discrepancy(
@@ -132,13 +146,17 @@ def std_with_discrepancy(
 
 
 def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
-    """A file for many wheels conditioned on the case, without torque bias; any other as it is.
+    """A file with sensors without common errors, conditioned on the case if it is for many wheels.
 
-    For readings that were simulated with the case, whose torque sensor has no bias.
+    For readings that were simulated with the case, whose sensors have noise alone.
     """
-    if estimator.sets is None or not estimator.sets.missing_context:
+    if estimator.sets is None:
         return estimator
-    return condition_on_case(estimator, case)[0].on(noise={"torque_bias": (0.0, 0.0)})
+    exact: dict[str, Any] = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+    if not estimator.sets.missing_context:
+        return estimator.on(**exact)
+    conditioned = condition_on_case(estimator, case)[0]
+    return conditioned.on(noise={"torque_bias": (0.0, 0.0)}, **exact)
 
 
 def _log_std(prior: Prior, bearing: float) -> float:
@@ -157,6 +175,7 @@ def _prior_differences(estimator: Estimator, case: Case) -> list[str]:
         if (
             own is None
             or own.log
+            or own.normal_std is not None
             or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > (0.02 * width)
         ):
             unit = declared(Soil)[name].unit

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import difflib
 import os
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
+from soilml.optional_imports import tomllib
 
 
 class Settings:

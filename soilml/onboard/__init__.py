@@ -1,7 +1,7 @@
 """The onboard runtime: estimates from one ONNX file, with numpy and onnxruntime only."""
 
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_posterior import Memory
+from soilml.onboard.memory import Memory
 
-__all__ = ["Estimate", "Estimator", "Memory", "PriorSummary"]
+__all__ = ["Estimate", "Estimator", "Memory", "PriorSummary", "Reason"]

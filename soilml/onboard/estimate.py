@@ -3,14 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import InputError
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 
 Floats = NDArray[np.float64]
+
+#: A mean closer to an end of the prior than so many standard deviations is at the edge.
+EDGE_STDS = 1.5
+
+
+class Reason(IntEnum):
+    """Why an estimate is out of range; 0 where it is not. Numbers are never reused.
+
+    It is then the prior, or, where the rows are inconsistent, widened.
+    """
+
+    ESTIMATED = 0
+    OUT_OF_RANGE = 1
+    INCONSISTENT = 2
+    NO_INFORMATION = 3
+    CONTRADICTORY = 4
+
+    @property
+    def words(self) -> str:
+        """The reason as half a sentence."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Reason.ESTIMATED: "estimated from the readings",
+    Reason.OUT_OF_RANGE: "the readings, or more than a tenth of the rows, are out of range",
+    Reason.INCONSISTENT: "no soil of the prior explains all rows",
+    Reason.NO_INFORMATION: "no reading has so little noise that it is used",
+    Reason.CONTRADICTORY: "the files contradict each other",
+}
+#: Stands for a field that follows from the others.
+_NOT_GIVEN: NDArray[Any] = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -41,10 +77,20 @@ class Estimate:
     low, high : ndarray, shape (..., q)
         Ends of the 90 % interval, inside the range of the prior.
     in_range : ndarray of bool, shape (...)
-        False where the readings lie outside the training domain, or are inconsistent with any soil
-        of the prior. Mean and standard deviation are then those of the prior.
+        False where the readings lie outside the training domain: the estimate is then the prior.
+        False also where several readings are inconsistent with any soil of the prior: the estimate
+        is then widened as far as the misfit says.
     prior : PriorSummary
         The prior of the same quantities.
+    misfit : ndarray, shape (...)
+        Least sum of squared residuals in standard deviations, from a set posterior; else NaN.
+    rows_used, rows_set_aside : ndarray of int, shape (...)
+        Rows in the training range, which the estimate uses, and rows out of it, which it does not.
+        Rows that repeat another one are in neither.
+    reason : ndarray of int, shape (...)
+        A `Reason`: why `in_range` is false, and 0 where it is true.
+    errors : HeldOutErrors or None
+        Errors of the file that made the estimate, for `soilml.onboard.multi_sensor`.
 
     Examples
     --------
@@ -64,6 +110,30 @@ class Estimate:
     high: Floats
     in_range: NDArray[np.bool_]
     prior: PriorSummary
+    errors: HeldOutErrors | None = field(default=None, repr=False)
+    misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    rows_used: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    rows_set_aside: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    reason: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+
+    #: The fields that are arrays with the leading dimensions of the readings.
+    ARRAYS: ClassVar[tuple[str, ...]] = (
+        *("mean", "std", "covariance", "low", "high", "in_range"),
+        *("misfit", "rows_used", "rows_set_aside", "reason"),
+    )
+
+    def __post_init__(self) -> None:
+        """Fields that are not given are those of single readings."""
+        inside = np.asarray(self.in_range)
+        if self.misfit is _NOT_GIVEN:
+            object.__setattr__(self, "misfit", np.full(inside.shape, np.nan))
+        if self.rows_used is _NOT_GIVEN:
+            object.__setattr__(self, "rows_used", inside.astype(int))
+        if self.rows_set_aside is _NOT_GIVEN:
+            object.__setattr__(self, "rows_set_aside", 1 - inside.astype(int))
+        if self.reason is _NOT_GIVEN:
+            reason = np.where(inside, int(Reason.ESTIMATED), int(Reason.OUT_OF_RANGE))
+            object.__setattr__(self, "reason", reason)
 
     @staticmethod
     def gaussian(
@@ -75,6 +145,7 @@ class Estimate:
         std: Floats,
         in_range: NDArray[np.bool_],
         coverage_factor: Floats,
+        errors: HeldOutErrors | None = None,
     ) -> Estimate:
         """An estimate whose 90 % interval is ``mean -+ coverage_factor * std``.
 
@@ -92,6 +163,7 @@ class Estimate:
             high=np.clip(mean + half, prior.lower, prior.upper),
             in_range=in_range,
             prior=prior,
+            errors=errors,
         )
 
     @staticmethod
@@ -100,25 +172,32 @@ class Estimate:
         units: tuple[str, ...],
         prior: PriorSummary,
         shape: tuple[int, ...] = (),
+        errors: HeldOutErrors | None = None,
     ) -> Estimate:
-        """The prior itself as an estimate of a given leading shape, with `in_range` false."""
+        """The prior itself as an estimate of a given leading shape, with `in_range` false.
+
+        Raises `InputError` for a shape that is not of whole numbers of zero or more.
+        """
+        if not all(isinstance(size, int | np.integer) and size >= 0 for size in shape):
+            raise InputError(f"shape is {shape}; needed are whole numbers of zero or more")
         q = len(names)
         mean, std = (np.broadcast_to(x, (*shape, q)).copy() for x in (prior.mean, prior.std))
         covariance = np.broadcast_to(np.diag(prior.std**2), (*shape, q, q)).copy()
         in_range, factor = np.zeros(shape, dtype=bool), np.full(q, Z_90)
-        return Estimate.gaussian(names, units, prior, mean, covariance, std, in_range, factor)
+        parts = (mean, covariance, std, in_range, factor, errors)
+        return Estimate.gaussian(names, units, prior, *parts)
 
     @staticmethod
     def stack(estimates: Sequence[Estimate], shape: tuple[int, ...]) -> Estimate:
         """Estimates of the same quantities as one; `shape` is put before their own dimensions."""
         first = estimates[0]
-        parts = {
+        parts: dict[str, Any] = {
             key: np.reshape(
                 [getattr(e, key) for e in estimates], (*shape, *getattr(first, key).shape)
             )
-            for key in ("mean", "std", "covariance", "low", "high", "in_range")
+            for key in Estimate.ARRAYS
         }
-        return Estimate(names=first.names, units=first.units, prior=first.prior, **parts)
+        return replace(first, **parts)
 
     @property
     def abstains(self) -> NDArray[np.bool_]:
@@ -127,11 +206,28 @@ class Estimate:
         return np.asarray(vague | ~np.asarray(self.in_range)[..., None])
 
     @property
+    def at_edge(self) -> NDArray[np.bool_]:
+        """Whether a mean is within 1.5 standard deviations of an end of its prior, (..., q).
+
+        A soil outside of the prior shows in this way.
+        """
+        low = self.mean - EDGE_STDS * self.std < self.prior.lower
+        return np.asarray(low | (self.mean + EDGE_STDS * self.std > self.prior.upper))
+
+    @property
+    def explanation(self) -> Any:
+        """The reason in words: a text, or an array (...) of texts."""
+        words = np.asarray([reason.words for reason in Reason], dtype=object)
+        return words[self.reason]
+
+    @property
     def prior_std(self) -> Floats:
         """Standard deviation of the prior, (q,)."""
         return self.prior.std
 
     def __getitem__(self, name: str) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (...) of one quantity."""
+        """Mean and standard deviation (...) of one quantity; `InputError` for another name."""
+        if name not in self.names:
+            raise InputError(f"{name!r} is not estimated; there are: {', '.join(self.names)}")
         i = self.names.index(name)
         return self.mean[..., i], self.std[..., i]

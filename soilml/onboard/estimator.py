@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NoReturn, final
 
 import numpy as np
 import onnxruntime as ort
@@ -16,17 +16,15 @@ from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
+from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.model_file import open_model, read_fields, read_prior, read_probe
-from soilml.onboard.set_posterior import Memory, SetPosterior, without_copies
+from soilml.onboard.probe import reproduces
+from soilml.onboard.row_estimates import run_rows
+from soilml.onboard.set_estimate import estimate_of_set
+from soilml.onboard.set_posterior import SetPosterior, without_copies
 
 Floats = NDArray[np.float64]
-
-#: Largest deviation of mean or std from the file's own probe, in prior standard deviations.
-PROBE_TOLERANCE = 1e-4
-#: The same for sets: a rounding difference can change which samples are drawn.
-SET_PROBE_TOLERANCE = 0.05
-#: Outputs of the graph for single readings.
-ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
+NoiseModels = Mapping[str, tuple[float, float]]
 
 
 @final
@@ -82,12 +80,14 @@ class Estimator:
         >>> dict(zip(estimator.names, estimator.units))
         {'cohesion': 'Pa', 'friction_angle': 'rad', 'shear_modulus': 'm'}
         """
+        if not isinstance(path, str | os.PathLike):
+            raise InputError(f"path is a {type(path).__name__}; needed is the name of a model file")
         file = Path(path)
         session, metadata = open_model(file)
         try:
             fields, probe = read_fields(metadata), read_probe(metadata)
             estimator = Estimator(str(file), metadata=metadata, session=session, **fields)
-            passed = all(estimator._reproduces(**entry) for entry in probe)
+            passed = all(reproduces(estimator, **entry) for entry in probe)
         except (KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
@@ -96,9 +96,7 @@ class Estimator:
             raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator
 
-    def on(
-        self, noise: Mapping[str, tuple[float, float]] | None = None, **given: float
-    ) -> Estimator:
+    def on(self, noise: NoiseModels | None = None, **given: float) -> Estimator:
         """The same estimator for one wheel and bearing, where the file serves many wheels.
 
         Parameters
@@ -107,11 +105,14 @@ class Estimator:
             Replaces the file's own noise for sets: channel, or ``torque_bias``, to its constant
             part in SI units and its share of the reading.
         **given : float
-            Wheel, bearing and ends of the prior in SI units, by the names of the file's card.
+            Wheel, bearing and ends of the prior in SI units, by the names of the file's card; and
+            standard deviations of errors that all readings share, by `COMMON_ERROR_INPUTS`.
 
         Raises `InputError` for a name that the file does not take, or a value out of its range.
         """
-        sets = (self.sets or SetPosterior(0, {}, {}, {}, False)).with_context(given, noise or {})
+        if self.sets is None:
+            raise InputError(f"{self.path} has no set posterior: it takes no wheel and no noise")
+        sets = self.sets.with_context(given, {} if noise is None else noise)
         return replace(self, sets=sets, prior=read_prior(self.metadata, sets.context_values))
 
     def __call__(self, **measured: Any) -> Estimate:
@@ -140,19 +141,18 @@ class Estimator:
         if self.sets is not None and self.sets.sets_only:
             return self._rows_as_sets(self.sets, measured)
         flat, shape = flatten_readings(self.inputs, measured)
-        with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
-            feed = {n: a.astype(np.float32) for n, a in zip(self.inputs, flat, strict=True)}
-        mean, std, covariance, in_range = self.session.run(ROW_OUTPUTS, feed)
+        found = run_rows(self.session, dict(zip(self.inputs, flat, strict=True)))
         q = len(self.names)
         return Estimate.gaussian(
             self.names,
             self.units,
             self.prior,
-            mean.astype(np.float64).reshape(*shape, q),
-            covariance.astype(np.float64).reshape(*shape, q, q),
-            std.astype(np.float64).reshape(*shape, q),
-            in_range.reshape(shape),
+            found["mean"].reshape(*shape, q),
+            found["covariance"].reshape(*shape, q, q),
+            found["std"].reshape(*shape, q),
+            found["in_range"].reshape(shape),
             self.pooling.single_row_coverage_factor,
+            self.pooling.held_out,
         )
 
     def run(self, **measured: Any) -> Estimate:
@@ -160,15 +160,15 @@ class Estimator:
 
         Uses the set posterior where the file has one, otherwise `pooled`. Rows that repeat another
         in every reading count once. Rows out of range are left out, up to a tenth of them; where
-        there are more, or where no soil of the prior is consistent with all rows, `in_range` is
-        false and the estimate is the prior.
+        there are more, `in_range` is false and the estimate is the prior. It is false also where
+        no soil of the prior is consistent with all rows; the estimate is then widened.
 
         Parameters
         ----------
         **measured : array_like, shape (rows,)
             Every quantity in `inputs`, in SI units. A set posterior also takes ``sinkage`` and
             ``drawbar_pull``, NaN in rows without them, and ``torque_std``, ``sinkage_std`` and
-            ``drawbar_pull_std`` where the noise differs from that of the file.
+            ``drawbar_pull_std`` where the noise is not the file's, ``slip_std`` and ``load_std``.
 
         Raises
         ------
@@ -209,11 +209,10 @@ class Estimator:
                 "a run cannot be pooled; estimate each by itself"
             )
         flat, _ = flatten_readings(self.inputs, measured)
+        rows = dict(zip(self.inputs, flat, strict=True))
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        rows = dict(zip(self.inputs, flat, strict=True))
-        estimate = pool_run(self(**rows), rows, self.pooling)
-        return self.prior_estimate() if estimate is None else estimate
+        return pool_run(self(**rows), rows, self.pooling)
 
     def rows_in_range(self, **measured: Any) -> NDArray[np.bool_]:
         """Whether each reading of a run lies in the training domain, (rows,)."""
@@ -224,17 +223,24 @@ class Estimator:
 
     def start(self) -> Memory:
         """The memory of a soil before its first reading; see `step`."""
-        return self._configured_sets.start()
+        return self._configured_sets.start(self.memory_id)
+
+    @property
+    def memory_id(self) -> str:
+        """Identity of its memories: file, wheel, bearing, prior and sensors' common errors."""
+        of_set = {} if self.sets is None else self.sets.context_values | self.sets.common_errors
+        return memory_identity(self.metadata, of_set)
 
     def step(self, memory: Memory, **measured: Any) -> tuple[Estimate, Memory]:
         """The estimate from all readings so far, after one or more new ones, and the new memory.
 
-        The order of the readings does not matter, and the memory does not grow with their number.
+        The memory does not grow with the number of readings, and their order matters little.
 
         Parameters
         ----------
         memory : Memory
-            From `start`, or from the step before. One of another file raises `InputError`.
+            From `start`, or from the step before. One of another file, wheel or prior raises
+            `InputError`.
         **measured : float or array_like
             As for `run`.
 
@@ -249,13 +255,13 @@ class Estimator:
         3
         """
         sets = self._configured_sets
-        if not (isinstance(memory, Memory) and memory.system.shape[1] == sets.terms + 1):
-            raise InputError("this memory is not of this file: begin with estimator.start()")
-        return self._set_estimate(sets.rows(measured), memory)
+        memory = check_memory(memory, sets.columns, self.memory_id, self.path)
+        estimate, memory = self._set_estimate(sets.rows(measured), memory)
+        return estimate, memory.packed()
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate (*shape, q), flagged as out of range."""
-        return Estimate.from_prior(self.names, self.units, self.prior, shape)
+        return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
 
     @property
     def _configured_sets(self) -> SetPosterior:
@@ -272,10 +278,19 @@ class Estimator:
     def _set_estimate(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
         """Estimate and memory after these rows (m,)."""
         found, memory = self._configured_sets.update(self.session, rows, memory)
-        mean, std, covariance, low, high = (np.asarray(x, np.float64) for x in found[:5])
-        in_range = np.asarray(bool(found[5][0]))
-        parts = (mean, std, covariance, low, high, in_range)
-        return Estimate(self.names, self.units, *parts, self.prior), memory
+        return estimate_of_set(self.names, self.units, self.prior, found, memory), memory
+
+    def __deepcopy__(self, memo: object = None) -> Estimator:
+        """The estimator itself, which nothing changes."""
+        return self
+
+    __copy__ = __deepcopy__
+
+    def __reduce__(self) -> NoReturn:
+        """Raise `InputError`: the session of the runtime belongs to this process."""
+        raise InputError(
+            "an Estimator cannot be pickled: hand over its path, and load it by Estimator.load"
+        )
 
     def _rows_as_sets(self, sets: SetPosterior, measured: Mapping[str, Any]) -> Estimate:
         """Every row as a set of its own."""
@@ -283,15 +298,3 @@ class Estimator:
         shape = np.broadcast_shapes(*(np.shape(value) for value in measured.values()))
         single = [{k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size)]
         return Estimate.stack([self._set_estimate(row, sets.start())[0] for row in single], shape)
-
-    def _reproduces(
-        self, readings: Any, mean: Any, std: Any, in_range: Any, given: Any = None
-    ) -> bool:
-        """Whether the answers to a probe agree with those stored in the file."""
-        if given is None:
-            answer, tolerance = self(**readings), PROBE_TOLERANCE
-        else:
-            answer, tolerance = self.on(**given).run(**readings), SET_PROBE_TOLERANCE
-        deviations = np.abs(answer.mean - np.asarray(mean)), np.abs(answer.std - np.asarray(std))
-        agree = all(bool(np.all(part < tolerance * answer.prior_std)) for part in deviations)
-        return np.array_equal(answer.in_range, in_range) and agree

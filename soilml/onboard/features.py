@@ -6,6 +6,7 @@ Training and the onboard runtime share this module, so that their inputs are the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,33 @@ READABLE: dict[str, tuple[float, float]] = {
     "sinkage": (-np.inf, np.inf),
     "vibration": (-np.inf, np.inf),
 }
+#: A longer argument is cut in an error message.
+MOST_SHOWN = 40
+
+
+def as_numbers(name: str, value: Any) -> Floats:
+    """An argument as an array of float64; raises `InputError` for what is not real numbers."""
+    if type(value) is float:
+        return np.asarray(value)
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind == "O" and all(isinstance(x, Real) for x in array.flat):
+            array = array.astype(np.float64)
+    except (TypeError, ValueError, RuntimeError, OverflowError):
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf" or isinstance(value, np.ma.MaskedArray):
+        shown = " ".join(repr(value).split())
+        shown = shown if len(shown) <= MOST_SHOWN else f"{shown[:MOST_SHOWN]}..."
+        raise InputError(f"{name} is {shown}; needed is a number or an array of numbers")
+    return array.astype(np.float64, copy=False)
+
+
+def as_number(name: str, value: Any) -> float:
+    """An argument as one number; raises `InputError` for anything else."""
+    array = as_numbers(name, value)
+    if array.size != 1:
+        raise InputError(f"{name} has {array.size} elements; needed is one number")
+    return float(array.reshape(()))
 
 
 def numerator_denominator(feature: str) -> tuple[str, str | None]:
@@ -56,7 +84,7 @@ def flatten_readings(
 ) -> tuple[list[Floats], tuple[int, ...]]:
     """The named quantities broadcast and flattened, and the shape they were broadcast to.
 
-    Raises `InputError` for one that is missing, unknown, not finite or outside `READABLE`.
+    Raises `InputError` for one that is missing, unknown, no number, or outside `READABLE`.
     """
     for name in measured:
         if name not in names:
@@ -65,7 +93,7 @@ def flatten_readings(
     for name in names:
         if name not in measured:
             raise InputError(f"{name} is missing; this model reads {', '.join(names)}")
-        array = np.asarray(measured[name], dtype=np.float64)
+        array = as_numbers(name, measured[name])
         low, high = READABLE[name]
         bad = ~((array > low) & (array < high))
         if bad.any():

@@ -6,12 +6,14 @@ This is what a model file without a set posterior does for a run of several rows
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 
 Floats = NDArray[np.float64]
 
@@ -105,6 +107,7 @@ class PoolingCalibration:
     patterns: tuple[RunPattern, ...]
     single_row_coverage_factor: Floats  # (q,) of the 90 % interval of one row
     inconsistency_limits: Floats  # (2,) that rows of one soil hardly ever exceed
+    held_out: HeldOutErrors | None = None  # of files whose rows cannot be pooled (slip)
 
     def label(self, pattern: RunPattern) -> str:
         """Name of a pattern: "steady", "slip free", "slip and load free"."""
@@ -214,7 +217,7 @@ def pool_within_prior(
 
 def pool_run(
     single: Estimate, measured: Mapping[str, Floats], calibration: PoolingCalibration
-) -> Estimate | None:
+) -> Estimate:
     """Pool the single-row estimates (m,) of a run of one soil into one estimate.
 
     Parameters
@@ -228,21 +231,26 @@ def pool_run(
 
     Returns
     -------
-    Estimate or None
-        None where more than a tenth of the rows are out of range, or where the rows are less
-        consistent with each other than rows of one soil hardly ever are.
+    Estimate
+        The prior, with the reason, where more than a tenth of the rows are out of range, or where
+        the rows are less consistent with each other than rows of one soil hardly ever are.
     """
     valid = single.in_range
     head = single.names, single.units, single.prior
     if valid.size == 1:
         parts = (single.mean[0], single.covariance[0], single.std[0], valid[0])
         return Estimate.gaussian(*head, *parts, calibration.single_row_coverage_factor)
+    count: dict[str, Any] = {
+        "rows_used": np.asarray(int(valid.sum())),
+        "rows_set_aside": np.asarray(int((~valid).sum())),
+    }
     if valid.sum() < LEAST_SHARE_IN_RANGE * valid.size:
-        return None
+        return replace(Estimate.from_prior(*head), **count)
     rule = calibration.rule({name: values[valid] for name, values in measured.items()})
     pooled = pool_within_prior(single.mean[valid], single.covariance[valid], single.prior, rule)
     if bool((pooled.inconsistency > calibration.inconsistency_limits).any()):
-        return None
+        reason = np.asarray(int(Reason.INCONSISTENT))
+        return replace(Estimate.from_prior(*head), reason=reason, **count)
     std = np.sqrt(np.diag(pooled.covariance))
     parts = (pooled.mean, pooled.covariance, std, np.asarray(True))
-    return Estimate.gaussian(*head, *parts, rule.coverage_factor)
+    return replace(Estimate.gaussian(*head, *parts, rule.coverage_factor), **count)

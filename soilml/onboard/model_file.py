@@ -14,6 +14,7 @@ import onnxruntime as ort
 
 from soilml.errors import ModelFileError
 from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
 from soilml.onboard.set_posterior import SetPosterior
 
@@ -136,6 +137,7 @@ def read_pooling(entry: Mapping[str, Any]) -> PoolingCalibration:
         patterns=patterns,
         single_row_coverage_factor=np.asarray(entry["alone"], float),
         inconsistency_limits=np.asarray(entry["doubt"], float),
+        held_out=HeldOutErrors.of(entry["held_out"]) if "held_out" in entry else None,
     )
 
 
@@ -152,6 +154,7 @@ def write_pooling(pooling: PoolingCalibration) -> dict[str, Any]:
         ],
         "alone": pooling.single_row_coverage_factor.tolist(),
         "doubt": pooling.inconsistency_limits.tolist(),
+        **({} if pooling.held_out is None else {"held_out": pooling.held_out.entry()}),
     }
 
 

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.fusion.correlated_fusion import fuse_rows
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.fusion.joint_errors import are_comparable
 from soilml.onboard.gaussian_pooling import pool
 from soilml.quantities import Z_90
 
 Floats = NDArray[np.float64]
 
+#: Fusion by variance and by the correlation of the errors, which the files carry.
+CORRELATED = "correlated"
 #: Fusion of estimates with independent errors and a common prior, which is counted once.
 PRIOR_ONCE = "prior-once"
-#: Rules by which estimates of different files can be fused; `best-linear` needs the correlation of
-#: their errors, which is known only within one file.
-ACROSS_FILES = (PRIOR_ONCE, *(rule for rule in RULES if rule != BEST_LINEAR))
+#: Rules by which estimates of different files can be fused; `best-linear` has one set of weights
+#: for all rows, and is for regressors of one file.
+ACROSS_FILES = (CORRELATED, PRIOR_ONCE, *(rule for rule in RULES if rule != BEST_LINEAR))
 #: Estimates further apart than this are contradictory, in standard deviations of the difference.
 CONTRADICTION = 4.0
 #: Priors that differ by less than this share of their standard deviation count as the same.
@@ -29,14 +34,32 @@ SAME_PRIOR = 0.05
 
 @dataclass(frozen=True)
 class MultiSensorEstimate:
-    """A fused estimate (...), and which of the m estimates it used in each row, (m, ...)."""
+    """A fused estimate, and how it was made.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        Of leading shape (...).
+    used : ndarray of bool, shape (m, ...)
+        Which of the m estimates each row used.
+    rule : str
+        The rule that was applied.
+    disagreement : ndarray, shape (...)
+        By the rule `correlated`, the largest difference of two files in standard deviations of that
+        difference: its mean square over many readings is about 1 where the files are right for
+        this soil, and well above where one is not. 0 for a single file and by other rules.
+    """
 
     estimate: Estimate
     used: NDArray[np.bool_]
+    rule: str
+    disagreement: Floats
 
 
-def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> MultiSensorEstimate:
-    r"""Fuse estimates of the same quantities and prior that were made from different sensors.
+def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> MultiSensorEstimate:
+    r"""Fuse estimates of the same quantities and prior, of several sensors or of one repeatedly.
+
+    Repeated readings must be of one soil, slip and load; each is an estimate of the same file.
 
     Estimates out of range are not used. A single remaining one is returned unchanged. Where none
     remains, or where two differ by more than `CONTRADICTION` standard deviations of their
@@ -46,8 +69,12 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
     ----------
     estimates : sequence of Estimate
         All of one shape (...), with the same names and prior.
-    rule : str
-        One of `ACROSS_FILES`. `prior-once`,
+    rule : str, optional
+        One of `ACROSS_FILES`; `correlated` by default, or `prior-once` where the correlation is not
+        known. `correlated` weighs by variance under the correlation of the errors, which files
+        trained from the same data carry (`soilml.onboard.fusion.correlated_fusion`): repeated
+        readings of a file share the error that its soil causes. Where one file alone was better on
+        the held-out rows, the fused estimate is that file's. `prior-once`,
 
         .. math:: P^{-1} = P_0^{-1} + \sum_i (P_i^{-1} - P_0^{-1}),
 
@@ -60,31 +87,48 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str = PRIOR_ONCE) -> Mul
     Returns
     -------
     MultiSensorEstimate
-        Its intervals are Gaussian. A single file trained on all sensors accounts for correlated
-        errors and has calibrated intervals.
+        Its intervals are calibrated on held-out rows by the rule `correlated`, and Gaussian by the
+        others, which take repeated readings for independent.
 
     Raises
     ------
     InputError
-        For an unknown rule, and for estimates of different quantities, shapes or priors.
+        For an unknown rule, for estimates of different quantities, shapes or priors, and for the
+        rule `correlated` where the correlation is not known.
     """
-    if rule not in ACROSS_FILES:
+    if rule is not None and rule not in ACROSS_FILES:
         raise InputError(f"rule is {rule!r}; for estimates of several files: {_join(ACROSS_FILES)}")
     _check_compatible(estimates)
+    known = are_comparable([e.errors for e in estimates])
+    if rule == CORRELATED and not known:
+        raise InputError(
+            "rule is 'correlated', but the files do not carry their errors on common rows: train "
+            "them from one data file, or give another rule"
+        )
+    rule = rule or (CORRELATED if known else PRIOR_ONCE)
     stacked = _stack_rows(estimates)
     used = np.stack([e.in_range.reshape(-1) for e in estimates])
-    used = used & ~_contradictory(stacked.mean, stacked.covariance, used)
-    fused = _fuse_rows(stacked, used, estimates[0].prior, rule)
-    return _as_estimate(fused, used, estimates[0])
+    contradictory = _contradictory(stacked.mean, stacked.covariance, used)
+    used = used & ~contradictory
+    files = [e.errors for e in estimates if e.errors is not None] if rule == CORRELATED else []
+    fused = _fuse_rows(stacked, used, estimates[0].prior, rule, files)
+    found = _as_estimate(fused, used, estimates[0], rule)
+    shape = found.estimate.in_range.shape
+    reason = np.where(contradictory.reshape(shape), Reason.CONTRADICTORY, found.estimate.reason)
+    return replace(found, estimate=replace(found.estimate, reason=reason))
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """Mean (..., n, q), covariance (..., n, q, q) and ends of the interval (..., 2, n, q)."""
+    """Mean (..., n, q), covariance (..., n, q, q) and ends of the interval (..., 2, n, q).
+
+    Fused rows also have their disagreement (n,).
+    """
 
     mean: Floats
     covariance: Floats
     ends: Floats
+    disagreement: Floats
 
 
 def _stack_rows(estimates: Sequence[Estimate]) -> _Rows:
@@ -94,15 +138,23 @@ def _stack_rows(estimates: Sequence[Estimate]) -> _Rows:
         mean=np.stack([e.mean.reshape(-1, q) for e in estimates]),
         covariance=np.stack([e.covariance.reshape(-1, q, q) for e in estimates]),
         ends=np.stack([np.stack([e.low, e.high]).reshape(2, -1, q) for e in estimates]),
+        disagreement=np.zeros(estimates[0].in_range.size),
     )
 
 
-def _fuse_rows(stacked: _Rows, used: NDArray[np.bool_], prior: PriorSummary, rule: str) -> _Rows:
+def _fuse_rows(
+    stacked: _Rows,
+    used: NDArray[np.bool_],
+    prior: PriorSummary,
+    rule: str,
+    files: Sequence[HeldOutErrors],
+) -> _Rows:
     """Fused rows from the estimates that are used in each, (m, n); the prior where none is."""
     n = used.shape[1]
     mean = np.tile(prior.mean, (n, 1))
     covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
     ends = np.stack([mean - Z_90 * prior.std, mean + Z_90 * prior.std])
+    disagreement = np.zeros(n)
     for pattern in np.unique(used, axis=1).T:
         rows, members = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
         if members.size == 1:
@@ -110,15 +162,25 @@ def _fuse_rows(stacked: _Rows, used: NDArray[np.bool_], prior: PriorSummary, rul
             mean[rows] = stacked.mean[only, rows]
             covariance[rows] = stacked.covariance[only, rows]
             ends[:, rows] = stacked.ends[only][:, rows]
+        elif members.size > 1 and rule == CORRELATED:
+            std = np.sqrt(np.diagonal(stacked.covariance[members][:, rows], axis1=2, axis2=3))
+            by = [files[int(i)] for i in members]
+            found = fuse_rows(stacked.mean[members][:, rows], std, by)
+            mean[rows], ends[:, rows] = found.mean, (found.low, found.high)
+            disagreement[rows] = found.disagreement.max(axis=-1)
+            correlation = _mean_correlation(stacked.covariance[members][:, rows])
+            covariance[rows] = correlation * found.std[:, :, None] * found.std[:, None, :]
         elif members.size > 1:
             parts = stacked.mean[members][:, rows], stacked.covariance[members][:, rows]
             mean[rows], covariance[rows] = _fuse(*parts, prior, rule)
             half = Z_90 * np.sqrt(np.diagonal(covariance[rows], axis1=1, axis2=2))
             ends[:, rows] = mean[rows] - half, mean[rows] + half
-    return _Rows(mean, covariance, ends)
+    return _Rows(mean, covariance, ends, disagreement)
 
 
-def _as_estimate(fused: _Rows, used: NDArray[np.bool_], first: Estimate) -> MultiSensorEstimate:
+def _as_estimate(
+    fused: _Rows, used: NDArray[np.bool_], first: Estimate, rule: str
+) -> MultiSensorEstimate:
     """The fused rows with the leading dimensions, names and prior of the first estimate."""
     q, shape, prior = len(first.names), first.in_range.shape, first.prior
     low, high = np.clip(fused.ends, prior.lower, prior.upper).reshape(2, *shape, q)
@@ -134,7 +196,12 @@ def _as_estimate(fused: _Rows, used: NDArray[np.bool_], first: Estimate) -> Mult
         in_range=np.asarray(used.any(axis=0).reshape(shape)),
         prior=prior,
     )
-    return MultiSensorEstimate(estimate, used.reshape(len(used), *shape))
+    return MultiSensorEstimate(
+        estimate,
+        used.reshape(len(used), *shape),
+        rule,
+        np.asarray(fused.disagreement.reshape(shape)),
+    )
 
 
 def _fuse(
@@ -147,8 +214,14 @@ def _fuse(
         return pooled.mean, pooled.covariance
     std = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
     fused = RULES[rule](mean, std)
-    correlation = np.mean(covariance / (std[..., None] * std[..., None, :]), axis=0)
+    correlation = _mean_correlation(covariance)
     return fused.mean, correlation * fused.std[:, :, None] * fused.std[:, None, :]
+
+
+def _mean_correlation(covariance: Floats) -> Floats:
+    """Correlation (n, q, q) between quantities, the mean over estimates (m, n, q, q)."""
+    std = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
+    return np.asarray(np.mean(covariance / (std[..., None] * std[..., None, :]), axis=0))
 
 
 def _contradictory(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -165,6 +238,9 @@ def _contradictory(mean: Floats, covariance: Floats, used: NDArray[np.bool_]) ->
 def _check_compatible(estimates: Sequence[Estimate]) -> None:
     if not estimates:
         raise InputError("no estimate given; needed is one or more")
+    for given in estimates:
+        if not isinstance(given, Estimate):
+            raise InputError(f"an estimate is a {type(given).__name__}; needed is an Estimate")
     first = estimates[0]
     for other in estimates[1:]:
         if other.names != first.names:

@@ -12,6 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+#: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
+#: files without that entry have version 1. docs/onnx-interface.md lists the changes.
+INTERFACE = "2"
+
 #: Readings that every row must have, and readings that a row may lack.
 REQUIRED_READINGS = ("slip", "torque", "load")
 OPTIONAL_READINGS = ("sinkage", "drawbar_pull")
@@ -20,10 +24,34 @@ READING_INPUTS = ("slip", "load", "torque", "sinkage", "drawbar_pull")
 #: Standard deviations of a row in the order of the graph's inputs: noise of the three channels, and
 #: the bias of the torque sensor, which all rows share.
 STD_INPUTS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
+#: Standard deviations of a row's slip and load, zero where they are exact. Files of earlier
+#: versions lack these inputs.
+OPERATING_STD_INPUTS = ("slip_std", "load_std")
+#: Names under which that noise is declared.
+OPERATING_NOISE = ("slip", "load")
+#: Standard deviations of errors that all rows of a set share: offset of slip, relative errors of
+#: load and torque, offsets of sinkage and drawbar pull.
+COMMON_ERROR_INPUTS = (
+    "slip_bias",
+    "load_gain",
+    "torque_gain",
+    "sinkage_bias",
+    "drawbar_pull_bias",
+)
+#: Errors that all rows share, in the order of their columns of the residual system, after those of
+#: the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
+ERROR_COLUMNS = (
+    "torque_bias",
+    "sinkage_bias",
+    "drawbar_pull_bias",
+    "torque_gain",
+    "slip_bias",
+    "load_gain",
+)
 #: Channels in the order in which a response surface predicts them.
 RESPONSE_CHANNELS = ("torque", "sinkage", "drawbar_pull")
 #: Names under which the noise of a file, or of a user, is declared.
-NOISE_NAMES = ("torque", *OPTIONAL_READINGS, "torque_bias")
+NOISE_NAMES = ("torque", *OPTIONAL_READINGS, "torque_bias", *OPERATING_NOISE)
 
 #: Inputs and outputs that carry the memory of a stream: the residual system and the counts of
 #: informative readings, rows, and rows in range.
@@ -41,11 +69,18 @@ SET_SWITCH = "joint"
 #: largest noise that the graph gives any weight to is smaller by orders of magnitude.
 ABSENT_READING = 1.0
 ABSENT_STD = 1e6
+#: For callers that feed a graph themselves: a reading of this value was not measured, and this
+#: standard deviation is that of the file's noise. They are the defaults of the inputs.
+NOT_MEASURED = -1e30
+NOISE_OF_FILE = -1.0
+#: Counts in the place of a memory that is not finite: so many rows out of range that every further
+#: set is refused.
+DAMAGED_COUNTS = (0.0, 1e9, 0.0)
 #: Smallest standard deviation that a proportional noise model gives to a reading of zero (SI
 #: units). The graph takes logarithms no further down either.
 LEAST_STD = 1e-12
 
 
-def empty_memory(terms: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The residual system (0, terms + 1) and the counts (3,) before the first reading, float32."""
-    return np.zeros((0, terms + 1), np.float32), np.zeros(3, np.float32)
+def empty_memory(columns: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """The residual system (0, columns) and the counts (3,) before the first reading, float32."""
+    return np.zeros((0, columns), np.float32), np.zeros(3, np.float32)

@@ -1,13 +1,13 @@
 """Estimates from all readings of one soil, onboard: the set posterior of a model file.
 
-The estimate follows from all readings jointly and does not depend on their order. What they
-contribute is kept in a memory of bounded size, so that a rover can continue where it stopped.
+The estimate follows from all readings jointly; their order matters little. What they contribute
+is kept in a memory of bounded size, so that a rover can continue where it stopped.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, final
 
 import numpy as np
@@ -15,14 +15,24 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.features import READABLE, flatten_readings
+from soilml.onboard.common_errors import (
+    check_takes_errors,
+    read_common_errors,
+    with_common_errors,
+)
+from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings
+from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
     LEAST_STD,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
     NOISE_NAMES,
+    OPERATING_NOISE,
+    OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
     REQUIRED_READINGS,
     ROW_IN_RANGE,
@@ -34,50 +44,14 @@ from soilml.onboard.set_contract import (
 )
 
 Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 Feed = dict[str, NDArray[Any]]
 
-#: Rows of the residual system beyond which it is replaced by its triangular factor, which has at
-#: most as many rows as columns: 36 with three unknowns, 72 with five.
-MOST_SYSTEM_ROWS = 192
 #: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
 ROWS_PER_CALL = 256
+#: Standard deviations that may be zero.
+MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
 #: Stands for the smallest positive standard deviation: zero and negative values are refused.
 POSITIVE_STD = 1e-300
-
-
-@final
-@dataclass(frozen=True)
-class Memory:
-    """Sufficient statistics of the readings so far: a linear system and three counts, float32.
-
-    Parameters
-    ----------
-    system : ndarray
-        Residual system (k, terms + 1) of the readings; k stays below `MOST_SYSTEM_ROWS` plus the
-        rows of one call, however many readings there were.
-    counts : ndarray
-        Informative readings, rows, and rows in range, (3,).
-    """
-
-    system: Singles
-    counts: Singles
-
-    @property
-    def rows(self) -> int:
-        """Number of rows that were read."""
-        return int(self.counts[1])
-
-    def packed(self) -> Memory:
-        """An equivalent memory, with the triangular factor of a large system in its place.
-
-        The likelihood depends on the system A only through A^T A = R^T R, with R its triangular
-        factor (Golub and Van Loan, Matrix Computations, section 5.3).
-        """
-        if len(self.system) <= MOST_SYSTEM_ROWS:
-            return self
-        factor: Any = np.linalg.qr(self.system.astype(np.float64), mode="r")
-        return replace(self, system=factor.astype(np.float32))
 
 
 @final
@@ -88,7 +62,7 @@ class SetPosterior:
     Parameters
     ----------
     terms : int
-        Number of monomials: columns of the residual system, less one.
+        Number of monomials.
     noise : dict
         Noise model by name: constant part, and share of the reading.
     context_ranges : dict
@@ -97,6 +71,9 @@ class SetPosterior:
         Values of the context inputs that were set.
     sets_only : bool
         Whether the file has no regressors of single rows.
+    common_errors : dict
+        Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`. Empty for a
+        file of an earlier version, which takes slip and load as exact.
     """
 
     terms: int
@@ -104,6 +81,7 @@ class SetPosterior:
     context_ranges: dict[str, tuple[float, float]]
     context_values: dict[str, float]
     sets_only: bool
+    common_errors: dict[str, float] = field(default_factory=dict)
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -114,17 +92,21 @@ class SetPosterior:
             noise={str(k): (float(v[0]), float(v[1])) for k, v in noise.items()},
             context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context.items()},
             context_values={},
+            common_errors=read_common_errors(metadata),
             sets_only=bool(metadata["alone"]),
         )
+
+    @property
+    def columns(self) -> int:
+        """Columns of the residual system: monomials, and errors that all rows share."""
+        return self.terms + (len(ERROR_COLUMNS) if self.common_errors else 1)
 
     @property
     def missing_context(self) -> tuple[str, ...]:
         """Context inputs that must be set before anything is estimated."""
         return tuple(name for name in self.context_ranges if name not in self.context_values)
 
-    def with_context(
-        self, context: Mapping[str, Any], noise: Mapping[str, tuple[float, float]]
-    ) -> SetPosterior:
+    def with_context(self, context: Mapping[str, Any], noise: Mapping[str, Any]) -> SetPosterior:
         """A copy with context inputs (wheel, bearing values, prior) and noise set.
 
         Raises
@@ -132,29 +114,31 @@ class SetPosterior:
         InputError
             If a name is not known, or a value is out of the range of the file.
         """
-        for name, (constant, share) in noise.items():
-            if name not in NOISE_NAMES or not (constant >= 0.0 and share >= 0.0):
-                raise InputError(
-                    f"noise of {name} is {constant:g} and {share:g} of the reading; needed are two "
-                    f"numbers of zero or more for one of {', '.join(NOISE_NAMES)}"
-                )
-        for name, value in context.items():
+        parts = {name: _noise_parts(name, value) for name, value in _items("noise", noise)}
+        for name in OPERATING_NOISE:
+            check_takes_errors(self.common_errors, name, sum(parts.get(name, ())))
+        values = {name: as_number(name, value) for name, value in context.items()}
+        common = with_common_errors(self.common_errors, values)
+        values = {name: v for name, v in values.items() if name not in COMMON_ERROR_INPUTS}
+        for name, value in values.items():
             if name not in self.context_ranges:
                 known = ", ".join(self.context_ranges) or "none: it was trained for one wheel"
                 raise InputError(
                     f"{name!r} is not a context input of this file; its context inputs: {known}"
                 )
             low, high = self.context_ranges[name]
-            if not low <= float(value) <= high:
+            if not low <= value <= high:
                 raise InputError(
                     f"{name} is {value:g}; the range of this file is {low:g} to {high:g}"
                 )
-        values = self.context_values | {k: float(v) for k, v in context.items()}
-        return replace(self, context_values=values, noise=self.noise | dict(noise))
+        values = self.context_values | values
+        noise = self.noise | parts
+        return replace(self, context_values=values, noise=noise, common_errors=common)
 
-    def start(self) -> Memory:
-        """The memory before the first reading."""
-        return Memory(*empty_memory(self.terms))
+    def start(self, file: str = "") -> Memory:
+        """The memory before the first reading, of the file with this identity."""
+        system, counts = empty_memory(self.columns)
+        return Memory(system.astype(np.float64), counts, file)
 
     def rows(self, measured: Mapping[str, Any]) -> dict[str, Floats]:
         """Row inputs of the graph (m,) from readings, checked and completed.
@@ -170,7 +154,7 @@ class SetPosterior:
         InputError
             If a reading is missing, not finite, out of its physical range, or not an input.
         """
-        known = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS)
+        known = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)
         for name in measured:
             if name not in known:
                 raise InputError(f"{name!r} is not read by this model; it reads {', '.join(known)}")
@@ -185,10 +169,14 @@ class SetPosterior:
             rows[f"{name}_std"] = np.where(absent, ABSENT_STD, std)
         for name, source in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
-        for name in STD_INPUTS:
-            least = 0.0 if name == "torque_bias" else POSITIVE_STD
+        for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
+            std = self._std(name, source, rows[source], measured, shape)
+            check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
+            rows |= {name: std} if self.common_errors else {}
+        for name in rows.keys() - {*REQUIRED_READINGS, *OPTIONAL_READINGS}:
+            least = 0.0 if name in MAY_BE_ZERO else POSITIVE_STD
             if not (rows[name] >= least).all():
-                needed = "zero or more" if name == "torque_bias" else "above zero"
+                needed = "zero or more" if name in MAY_BE_ZERO else "above zero"
                 raise InputError(f"{name} is {rows[name].min():g}; it must be {needed}")
         return rows
 
@@ -206,17 +194,19 @@ class SetPosterior:
         constant, share = self.noise.get(source, (0.0, 0.0))
         if source in OPTIONAL_READINGS and not constant + share:
             return np.full_like(reading, ABSENT_STD)
-        least = 0.0 if name == "torque_bias" else LEAST_STD
+        least = 0.0 if name in MAY_BE_ZERO else LEAST_STD
         return np.maximum(np.hypot(constant, share * np.abs(reading)), least)
 
     def feed(self, rows: Mapping[str, Floats], memory: Memory) -> Feed:
         """All inputs of the graph by name."""
         with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
             feed: Feed = {name: values.astype(np.float32) for name, values in rows.items()}
-        feed |= {n: np.asarray([value], np.float32) for n, value in self.context_values.items()}
+        of_set = self.context_values | self.common_errors
+        feed |= {n: np.asarray([value], np.float32) for n, value in of_set.items()}
         if not self.sets_only:
             feed[SET_SWITCH] = np.ones(1, np.bool_)
-        return feed | dict(zip(MEMORY_INPUTS, (memory.system, memory.counts), strict=True))
+        kept = memory.system.astype(np.float32), memory.counts.astype(np.float32)
+        return feed | dict(zip(MEMORY_INPUTS, kept, strict=True))
 
     def rows_in_range(
         self, session: ort.InferenceSession, rows: Mapping[str, Floats]
@@ -228,16 +218,20 @@ class SetPosterior:
     def update(
         self, session: ort.InferenceSession, rows: Mapping[str, Floats], memory: Memory
     ) -> tuple[list[Any], Memory]:
-        """Outputs of the graph, in the order of `SET_OUTPUTS`, and memory after further rows."""
+        """Outputs of the graph, in the order of `SET_OUTPUTS`, and memory after further rows.
+
+        The memory is not packed.
+        """
         count = len(rows["slip"])
         last = (count - 1) // ROWS_PER_CALL * ROWS_PER_CALL if count else 0
         for first in range(0, last, ROWS_PER_CALL):
             part = {name: v[first : first + ROWS_PER_CALL] for name, v in rows.items()}
-            memory = Memory(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
+            memory = memory.grown(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
         part = {name: values[last:] for name, values in rows.items()}
         names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
-        outputs = session.run(names, self.feed(part, memory.packed()))
-        return outputs[: len(SET_OUTPUTS)], Memory(*outputs[len(SET_OUTPUTS) :])
+        memory = memory.packed()
+        outputs = session.run(names, self.feed(part, memory))
+        return outputs[: len(SET_OUTPUTS)], memory.grown(*outputs[len(SET_OUTPUTS) :])
 
 
 def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -251,9 +245,28 @@ def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
     return {name: values[list(first.values())] for name, values in rows.items()}
 
 
+def _items(name: str, value: Any) -> list[tuple[Any, Any]]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"{name} is a {type(value).__name__}; needed is a dict of names to values")
+    return list(value.items())
+
+
+def _noise_parts(name: Any, value: Any) -> tuple[float, float]:
+    """Constant part and share of a noise; raises `InputError` for anything else."""
+    parts = as_numbers(f"noise of {name}", value)
+    good = parts.shape == (2,) and bool((parts >= 0.0).all()) and bool(np.isfinite(parts).all())
+    if name not in NOISE_NAMES or not good:
+        given = " and ".join(f"{part:g}" for part in parts.flat)
+        raise InputError(
+            f"noise of {name} is {given}; needed are two numbers of zero or more, a constant and a "
+            f"share of the reading, for one of {', '.join(NOISE_NAMES)}"
+        )
+    return float(parts[0]), float(parts[1])
+
+
 def _broadcast(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
     low, high = READABLE.get(name, (0.0, np.inf))
-    array = np.asarray(value, dtype=np.float64)
+    array = as_numbers(name, value)
     try:
         array = np.broadcast_to(array, shape).reshape(-1)
     except ValueError:

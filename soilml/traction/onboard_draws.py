@@ -58,7 +58,8 @@ def onboard_draws(
     estimate = estimator.run(**readings)
     if not estimate.in_range:
         warnings.append(
-            f"the rows are outside the training domain of {estimator.path}: it returns the prior"
+            f"the rows are outside the training domain of {estimator.path}, which returns the "
+            "prior, or no soil explains them, which widens its estimate"
         )
     return free, estimated_draws(free, estimate.mean, estimate.covariance), warnings
 

@@ -80,7 +80,19 @@ def test_sinkage_tells_stiffness_and_torque_and_vibration_tell_friction(leg_scor
     assert friction[3] < friction[:3].min() and stiffness[3] < stiffness[:2].min()
 
 
-@pytest.mark.parametrize("name", ["slip", "slip_torque", "slip_vibration", "leg_soil"])
+SLIP_SPECS = [
+    f"slip_{sensor}{kind}" for sensor in ("torque", "vibration") for kind in ("", "_lssvm")
+]
+
+
+@pytest.mark.parametrize("name", ["slip", *SLIP_SPECS, "leg_soil"])
 def test_packaged_specs_are_found_by_name(name):
     spec = read_spec(name)
     assert spec.per_row == name.startswith("slip") and spec.regressors
+
+
+@pytest.mark.parametrize("name", SLIP_SPECS)
+def test_slip_models_of_one_sensor_are_linear_unless_their_name_says_otherwise(name):
+    """Comin and Saaj 2017, eqs. 18 and 24."""
+    (regressor,) = read_spec(name).regressors
+    assert regressor.model.type_name == ("fixed-size-lssvm" if "lssvm" in name else "linear")

@@ -34,6 +34,8 @@ class Dataset:
         Inputs of the regressors, and true values.
     run : ndarray of int, shape (n,)
         Run number; rows of a run have one soil.
+    row : ndarray of int, shape (n,)
+        Number of the row in the file.
     lower, upper : ndarray, shape (q,)
         Range of the prior of the targets.
     recipe : str
@@ -46,6 +48,7 @@ class Dataset:
     features: Floats
     targets: Floats
     run: NDArray[np.int64]
+    row: NDArray[np.int64]
     feature_names: tuple[str, ...]
     target_names: tuple[str, ...]
     lower: Floats
@@ -64,6 +67,7 @@ class Dataset:
             features=self.features[index],
             targets=self.targets[index],
             run=self.run[index],
+            row=self.row[index],
         )
 
     def limit_rows_per_run(self, most: int = 2) -> Dataset:
@@ -135,6 +139,7 @@ def read_dataset(
         features=compute_features(features, measured),
         targets=truth,
         run=np.unique(kept["run"], return_inverse=True)[1].astype(np.int64),
+        row=np.flatnonzero(usable),
         feature_names=tuple(features),
         target_names=tuple(targets),
         lower=np.asarray([low for low, _ in ends]),

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 
 from soilml import __version__
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
 from soilml.onboard.model_file import FORMAT, write_pooling
+from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
@@ -39,8 +41,11 @@ def export_any_wheel(
     path: str | os.PathLike[str],
 ) -> dict[str, str]:
     """Write the file and return its metadata; its bytes depend on the spec only."""
+    posterior = replace(posterior, noise=spec.noise)
     graph = Graph()
     posterior.add_to(graph)
+    for name, value in posterior.defaults().items():
+        graph.default(name, value)
     prior = prior_summary(posterior.family)
     outputs = []
     for k, (name, axis) in enumerate(zip(SHEAR, posterior.family.axes, strict=False)):
@@ -56,6 +61,7 @@ def export_any_wheel(
         outputs.append(entry | ({"scale": SCALES[name]} if name in SCALES else {}))
     metadata = {
         "soilml_format": FORMAT,
+        "soilml_interface": INTERFACE,
         "soilml_version": __version__,
         "inputs": json.dumps(
             [
@@ -66,7 +72,7 @@ def export_any_wheel(
         "outputs": json.dumps(outputs),
         "gear": json.dumps({"type": "wheel"}),
         "together": json.dumps(write_pooling(NO_POOLING)),
-        "set": json.dumps(metadata_of(posterior, spec.noise, sets_only=True)),
+        "set": json.dumps(metadata_of(posterior, sets_only=True)),
         "probe": json.dumps(probe_of_sets(posterior)),
         "spec": spec.text,
         "spec_sha256": hashlib.sha256(spec.text.encode()).hexdigest(),

@@ -8,11 +8,10 @@ import os
 from pathlib import Path
 from typing import Any
 
-from datagen.recipe import parse_recipe
 from soilml import __version__
 from soilml.onboard.model_file import FORMAT, write_pooling
-from soilml.onboard.set_contract import RESPONSE_CHANNELS
-from soilml.quantities import QUANTITIES, column
+from soilml.onboard.set_contract import INTERFACE
+from soilml.quantities import QUANTITIES
 from training.data.targets import PER_ROW
 from training.onnx_graph.builder import IR_VERSION, OPSET
 from training.set_posterior.graph import SetPosteriorGraph
@@ -54,13 +53,14 @@ def file_metadata(
     ]
     return {
         "soilml_format": FORMAT,
+        "soilml_interface": INTERFACE,
         "soilml_version": __version__,
         "inputs": json.dumps(inputs),
         "outputs": json.dumps(outputs),
         "gear": json.dumps(json.loads(recipe).get("gear", {}), sort_keys=True),
         "together": json.dumps(write_pooling(trained.pooling)),
         "probe": json.dumps(probe),
-        **_set_metadata(trained.set_posterior, recipe),
+        **_set_metadata(trained.set_posterior),
         "spec": spec.text,
         "recipe": recipe,
         "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
@@ -98,17 +98,8 @@ def file_metadata(
     }
 
 
-def _set_metadata(posterior: SetPosteriorGraph | None, recipe: str) -> dict[str, str]:
-    """The entry "set" of a set posterior, with the noise of the recipe as default."""
+def _set_metadata(posterior: SetPosteriorGraph | None) -> dict[str, str]:
+    """The entry "set" of a set posterior."""
     if posterior is None:
         return {}
-    content = parse_recipe(recipe, "recipe of the data")
-    noise = {
-        name: [content.case.noise[column(name)].constant, content.case.noise[column(name)].share]
-        for name in RESPONSE_CHANNELS
-        if column(name) in content.case.noise
-    }
-    bias = content.bias.get(column("torque"))
-    if bias is not None:
-        noise["torque_bias"] = [bias.constant, bias.share]
-    return {"set": json.dumps(metadata_of(posterior, noise, sets_only=False))}
+    return {"set": json.dumps(metadata_of(posterior, sets_only=False))}

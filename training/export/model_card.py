@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from training.calibration.metrics import Metrics
 from training.regressors.feature_subset import FeatureSubset
 from training.set_posterior.metadata import table_of
@@ -24,6 +25,16 @@ POOLED = (
     "Several readings of one soil, pooled (`run`), by the operating conditions that the run "
     "varied, on runs that pooling was not calibrated on. Rows of nearly the same slip and load "
     "count as one; for a run between these patterns, the calibration is interpolated."
+)
+REPEATED = (
+    "Repeated readings of one soil at one slip and load (`soilml.onboard.multi_sensor`). The error "
+    "of the model on this soil is common to them and does not average out. On runs that were not "
+    "used for training or calibration."
+)
+HELD_OUT = (
+    "The file carries its errors on {rows} held-out rows and {runs} averages of repeated readings: "
+    "fused with another file that was trained from the same data, it is weighed by the correlation "
+    "of their errors, and the interval is calibrated for the pair."
 )
 SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
@@ -57,6 +68,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         lines += [SET_POSTERIOR, "", *table_of(trained.set_figures, targets)]
     elif not trained.spec.per_row:
         lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
+    elif trained.pooling.held_out is not None:
+        lines += _repeats(trained.pooling.held_out, trained.repeat_scores, targets)
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
@@ -145,6 +158,22 @@ def _metrics_table(scores: Mapping[str, Metrics], targets: list[str]) -> list[st
         label = f"**{name}**" if name == "estimator" else name
         lines.append(f"| {label} | {' | '.join(values)} |")
     return lines
+
+
+def _repeats(errors: HeldOutErrors, scores: Mapping[int, Metrics], targets: list[str]) -> list[str]:
+    """What the file carries for fusion, and metrics of repeated readings."""
+    lines = [HELD_OUT.format(rows=len(errors.rows), runs=len(errors.average_rows)), ""]
+    if not scores:
+        return [*lines, "The data have no repeated readings: in fusion they count as one.", ""]
+    shares = errors.common_share()
+    common = [f"{t} {share:.2f}" for t, share in zip(targets, shares, strict=True)]
+    lines += [REPEATED, "", f"Share of the error variance in common: {', '.join(common)}.", ""]
+    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
+    lines += [f"| readings | sets | {' | '.join(heads)} |", "|---:|---:|" + "---:|" * len(heads)]
+    for count, metrics in scores.items():
+        values = [f"{v:.3f}" for v in metrics.relative] + [f"{v:.1%}" for v in metrics.cover90]
+        lines.append(f"| {count} | {metrics.rows} | {' | '.join(values)} |")
+    return [*lines, ""]
 
 
 def _pooled_table(scores: Mapping[str, Mapping[int, Metrics]], targets: list[str]) -> list[str]:

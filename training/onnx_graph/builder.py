@@ -4,7 +4,9 @@
 constants, which are numbered as they are added.
 
 The operator set and file version are readable by every onnxruntime since 1.14; the defaults of the
-onnx package are newer than that.
+onnx package are newer than that. Every node has a name of its own: up to release 1.21, onnxruntime
+derives the names of fused nodes from them, and refuses a graph in which two fused nodes get the
+same one.
 """
 
 from __future__ import annotations
@@ -70,9 +72,11 @@ class Graph:
         """Add a node with several outputs, and return their names: new ones, or `outs`."""
         from onnx import helper
 
-        name = out or f"{self._prefix}v{len(self._nodes)}"
+        count_before = len(self._nodes)
+        name = out or f"{self._prefix}v{count_before}"
         names = outs or [name, *[f"{name}_{i}" for i in range(1, count)]]
-        self._nodes.append(helper.make_node(kind, list(inputs), names, **attributes))
+        own = f"{self._prefix}n{count_before}"
+        self._nodes.append(helper.make_node(kind, list(inputs), names, name=own, **attributes))
         return names
 
     def rename_last(self, name: str, new: str) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
+    OPERATING_STD_INPUTS,
     READING_INPUTS,
-    REQUIRED_READINGS,
     ROW_IN_RANGE,
     SET_PREFIX,
     STD_INPUTS,
@@ -21,32 +23,44 @@ from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value, concat
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.response_surface import Response
+from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
 from training.set_posterior.sampler.importance_sampler import add_importance_sampler
-from training.set_posterior.sampler.misfit_test import MisfitLimits
+from training.set_posterior.sampler.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.sampler.posterior_summary import add_posterior_outputs
-from training.set_posterior.sampler.residual_system import add_residual_system, integrate_out_bias
+from training.set_posterior.sampler.residual_system import add_residual_rows
+from training.set_posterior.sampler.sensor_errors import integrate_out_errors
+
+#: Inputs of the graph with a value for each row.
+ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
 
 
 @dataclass(frozen=True)
 class SetPosteriorGraph:
-    """A family of wheels, its response surface, and the largest accepted misfits."""
+    """A family of wheels, its response surface, the largest accepted misfits, the file's noise."""
 
     family: WheelFamily
     response: Response
     limits: MisfitLimits
+    noise: FileNoise = field(default_factory=dict)
+
+    @property
+    def columns(self) -> int:
+        """Columns of the residual system: monomials, and errors that all readings share."""
+        return len(self.response.terms) + len(ERROR_COLUMNS)
 
     @property
     def inputs(self) -> dict[str, list[Any]]:
         """Inputs of the graph and their shapes, all float32."""
-        rows: dict[str, list[Any]] = {name: ["rows"] for name in (*READING_INPUTS, *STD_INPUTS)}
-        context: dict[str, list[Any]] = {name: [1] for name in self.family.inputs()}
-        shapes: tuple[list[Any], ...] = (["kept", len(self.response.terms) + 1], [3])
+        rows: dict[str, list[Any]] = {name: ["rows"] for name in ROW_INPUTS}
+        of_set = (*self.family.inputs(), *COMMON_ERROR_INPUTS)
+        context: dict[str, list[Any]] = {name: [1] for name in of_set}
+        shapes: tuple[list[Any], ...] = (["kept", self.columns], [3])
         return rows | context | dict(zip(MEMORY_INPUTS, shapes, strict=True))
 
     @property
     def outputs(self) -> dict[str, Output]:
         """Outputs of the graph."""
-        q, terms = self.family.targets, len(self.response.terms)
+        q = self.family.targets
         of_set: dict[str, Output] = {
             "mean": (FLOAT, [q]),
             "std": (FLOAT, [q]),
@@ -55,9 +69,10 @@ class SetPosteriorGraph:
             "covariance": (FLOAT, [q, q]),
             "in_range": (BOOL, [1]),
             "abstains": (BOOL, [q]),
+            "at_edge": (BOOL, [q]),
             "misfit": (FLOAT, [1]),
         }
-        memory: tuple[Output, ...] = ((FLOAT, ["kept_out", terms + 1]), (FLOAT, [3]))
+        memory: tuple[Output, ...] = ((FLOAT, ["kept_out", self.columns]), (FLOAT, [3]))
         return {
             **{SET_PREFIX + name: output for name, output in of_set.items()},
             **dict(zip(MEMORY_OUTPUTS, memory, strict=True)),
@@ -65,12 +80,13 @@ class SetPosteriorGraph:
         }
 
     def defaults(self) -> dict[str, Any]:
-        """Values of those inputs that an estimate from single rows does not feed."""
-        one = np.ones(1, np.float32)
-        values = {name: one for name in self.inputs if name not in REQUIRED_READINGS}
-        return values | dict(
-            zip(MEMORY_INPUTS, empty_memory(len(self.response.terms)), strict=True)
-        )
+        """Values of inputs that need not be fed: not measured, the file's noise, usual errors.
+
+        Context inputs have none, and the memory is empty.
+        """
+        errors = self.family.usual_errors()
+        values = default_values() | {k: np.full(1, v, np.float32) for k, v in errors.items()}
+        return values | dict(zip(MEMORY_INPUTS, empty_memory(self.columns), strict=True))
 
     def add_to(self, graph: Graph, prefix: str = "") -> None:
         """Add all nodes to a graph; outputs are named `<prefix><output>`.
@@ -78,14 +94,22 @@ class SetPosteriorGraph:
         The memory is the residual system of earlier rows of the set and three counts. Its
         triangular factor, which has as many rows as columns, is equivalent to it.
         """
-        names = (*READING_INPUTS, *STD_INPUTS, *self.family.inputs())
-        inputs = {name: Value(graph, name) for name in (*names, *MEMORY_INPUTS)}
-        context, rows = add_residual_system(self.family, self.response, inputs)
+        of_set = (*self.family.inputs(), *COMMON_ERROR_INPUTS)
+        names = (*ROW_INPUTS, *of_set, *MEMORY_INPUTS)
+        inputs = {name: Value(graph, name) for name in names}
+        inputs = complete_inputs(inputs, of_set, self.noise)
+        context, rows = add_residual_rows(self.family, self.response, inputs)
         memory, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]
-        system = concat([memory, rows.system], axis=0).named(outputs[0])
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
-        unbiased = integrate_out_bias(system, len(self.response.terms))
-        sample = add_importance_sampler(self.family, self.response, context, unbiased)
-        add_posterior_outputs(self.family, context, sample, counts, self.limits, prefix)
+
+        def system_at(basis: Value | None) -> Value:
+            system = concat([memory, rows.system_at(basis)], axis=0)
+            if basis is not None:
+                system = system.named(outputs[0])
+            return integrate_out_errors(system, len(self.response.terms), len(ERROR_COLUMNS))
+
+        consistency = add_consistency(counts, self.limits, self.family.targets)
+        sample = add_importance_sampler(self.family, self.response, context, system_at, consistency)
+        add_posterior_outputs(self.family, context, sample, consistency, prefix)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS, RESPONSE_CHANNELS
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.sampler.credible_interval import INTERVAL
 from training.set_posterior.validation import SetFigures, graph_outputs, posterior_session
@@ -16,14 +16,13 @@ from training.set_posterior.validation import SetFigures, graph_outputs, posteri
 PROBE_ROWS, PROBE_CANDIDATES, PROBE_SEED = 8, 16, 5
 
 
-def metadata_of(
-    posterior: SetPosteriorGraph, noise: Mapping[str, Any], sets_only: bool
-) -> dict[str, Any]:
-    """The entry `set` of the metadata; the runtime reads terms, noise, context and alone."""
+def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]:
+    """The entry `set` of the metadata; the runtime reads terms to alone."""
     return {
         "terms": len(posterior.response.terms),
-        "noise": dict(noise),
+        "noise": {name: list(parts) for name, parts in posterior.noise.items()},
         "context": posterior.family.limits(),
+        "errors": posterior.family.usual_errors(),
         "alone": sets_only,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),
         "interval": list(INTERVAL),
@@ -53,7 +52,7 @@ def probe_of_sets(posterior: SetPosteriorGraph | None) -> list[dict[str, Any]]:
     return [
         {
             "readings": {name: rows[name].tolist() for name in names},
-            "given": sets.context_of(index),
+            "given": sets.context_of(index) | dict.fromkeys(COMMON_ERROR_INPUTS, 0.0),
             "mean": outputs["set_mean"].tolist(),
             "std": outputs["set_std"].tolist(),
             "in_range": True,

@@ -13,7 +13,7 @@ from scipy.stats import qmc
 
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
-from training.onnx_graph.value import Value, gemm, tanh
+from training.onnx_graph.value import Value, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
@@ -79,28 +79,51 @@ class Response:
         """Channels (n, m, channels) at features (n, f) and coordinates (n, m, p) or (m, p)."""
         return np.asarray(monomials(x, self.terms) @ self.coefficients(features))
 
-    def add_coefficients(self, features: Value) -> Value:
-        """Add the network to a graph: coefficients (channels * rows, terms + 1), float32.
+    def add_to(self, features: Value, directions: Floats) -> ResponseValues:
+        """Add the network to a graph, with its derivatives along directions of the features (d, f).
 
-        Rows are in the order of channels, then of readings; the last column is 0.
+        The derivatives are exact: each layer carries the tangents of its values.
         """
         hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
         pairs = list(zip(self.layers[0::2], self.layers[1::2], strict=True))
+        tangent: Value | Floats = (directions / self.scaling.scale)[:, None]
         for weights, bias in pairs[:-1]:
             hidden = tanh(gemm(hidden, weights, bias))
-        columns = len(self.terms) + 1
-        weights, bias = (_by_channel(layer, columns - 1) for layer in pairs[-1])
-        output = gemm(hidden, weights, bias).reshape(-1, len(RESPONSE_CHANNELS), columns)
-        return output.node("Transpose", perm=[1, 0, 2]).reshape(-1, columns)
+            tangent = tangent @ weights * (1.0 - hidden * hidden)
+        assert isinstance(tangent, Value)
+        channels = len(RESPONSE_CHANNELS)
+        weights, bias = (_by_channel(layer, len(self.terms)) for layer in pairs[-1])
+        output = gemm(hidden, weights, bias).reshape(-1, channels, len(self.terms))
+        coefficients = output.node("Transpose", perm=[1, 0, 2])
+        return ResponseValues(coefficients, tangent, weights.reshape(-1, len(self.terms)))
 
 
-def _by_channel(layer: Floats, count: int) -> Floats:
-    """The last layer with its outputs by channel first, then by term, and a term that is 0."""
-    shape = layer.shape[:-1]
-    by_channel = layer.reshape(*shape, count, -1).swapaxes(-1, -2)
-    return np.concatenate([by_channel, np.zeros_like(by_channel[..., :1])], axis=-1).reshape(
-        *shape, -1
-    )
+@dataclass(frozen=True)
+class ResponseValues:
+    """Graph values of a response surface for rows of readings, float32."""
+
+    coefficients: Value  # (channels, rows, terms)
+    tangent: Value  # (d, rows, hidden) derivatives of the last hidden layer along d directions
+    last_layer: Floats  # (hidden * channels, terms) its weights
+
+    def slopes_at(self, basis: Value | None) -> Value:
+        """Derivatives (d, channels, rows) of the channels at one soil along the directions.
+
+        The soil is given by its monomials (terms, 1); None is the middle of the prior's range.
+        """
+        channels = len(RESPONSE_CHANNELS)
+        if basis is None:
+            by_channel: Value | Floats = self.last_layer[:, 0].reshape(-1, channels)
+        else:
+            last_layer = constant(basis.graph, self.last_layer)
+            by_channel = (last_layer @ basis).reshape(-1, channels)
+        return (self.tangent @ by_channel).node("Transpose", perm=[0, 2, 1])
+
+
+def _by_channel(layer: Floats, terms: int) -> Floats:
+    """The last layer with its outputs by channel first, then by term."""
+    by_channel = layer.reshape(*layer.shape[:-1], terms, -1).swapaxes(-1, -2)
+    return by_channel.reshape(*layer.shape[:-1], -1)
 
 
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:

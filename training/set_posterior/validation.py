@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from soilml.onboard.set_contract import MEMORY_INPUTS, empty_memory
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
+    MEMORY_INPUTS,
+    OPERATING_STD_INPUTS,
+    empty_memory,
+)
 from training.onnx_graph.builder import Graph, session_of
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
@@ -63,13 +69,7 @@ class SetFigures:
 def calibrate_misfit_limits(
     family: WheelFamily, response: Response, progress: Progress
 ) -> SetPosteriorGraph:
-    """The set posterior with misfit limits that refuse one consistent set in a hundred.
-
-    Limits depend on the number of readings, whatever their channels. Rows at one operating
-    condition determine one combination of the unknowns only: the misfit of n readings then follows
-    a chi-squared distribution with n - 1 degrees of freedom, and no limit is below the quantile of
-    that.
-    """
+    """The set posterior with misfit limits that refuse at most one consistent set in a hundred."""
     no_limits = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
     session = posterior_session(SetPosteriorGraph(family, response, no_limits))
     readings, misfit = [], []
@@ -81,17 +81,28 @@ def calibrate_misfit_limits(
             readings.append(outputs["counted_out"][0])
             misfit.append(outputs["set_misfit"][0])
     progress("measuring misfit", len(SET_SIZES), len(SET_SIZES))
-    count, value = np.asarray(readings), np.asarray(misfit)
+    limits = misfit_limits(np.asarray(readings), np.asarray(misfit))
+    return SetPosteriorGraph(family, response, limits)
+
+
+def misfit_limits(readings: Floats, misfit: Floats) -> MisfitLimits:
+    """Limits by number of readings from the misfits (sets,) of consistent sets.
+
+    Limits depend on the number of readings, whatever their channels. Rows at one operating
+    condition determine one combination of the unknowns only: the misfit of n readings then follows
+    a chi-squared distribution with n - 1 degrees of freedom, and no limit is below the quantile of
+    that. A soil in the middle of the prior fits a single reading exactly, one at its end does not:
+    what noise adds to the reading there has one degree of freedom.
+    """
     knots, limits = [], []
     for size in READING_COUNTS:
-        neighbours = (count > size / NEIGHBOUR_FACTOR) & (count < size * NEIGHBOUR_FACTOR)
+        neighbours = (readings > size / NEIGHBOUR_FACTOR) & (readings < size * NEIGHBOUR_FACTOR)
         if neighbours.sum() >= LEAST_NEIGHBOURS:
             knots.append(float(size))
-            one_condition = chi2.ppf(1.0 - FALSE_ALARM_RATE, size - 1) if size > 1 else 0.0
-            quantile = np.quantile(value[neighbours], 1.0 - FALSE_ALARM_RATE)
+            one_condition = chi2.ppf(1.0 - FALSE_ALARM_RATE, max(size - 1, 1))
+            quantile = np.quantile(misfit[neighbours], 1.0 - FALSE_ALARM_RATE)
             limits.append(max(float(quantile), float(one_condition)))
-    rising = np.maximum.accumulate(limits)
-    return SetPosteriorGraph(family, response, MisfitLimits(np.asarray(knots), rising))
+    return MisfitLimits(np.asarray(knots), np.maximum.accumulate(limits))
 
 
 def validate_posterior(posterior: SetPosteriorGraph, progress: Progress) -> dict[int, SetFigures]:
@@ -138,13 +149,26 @@ def posterior_session(posterior: SetPosteriorGraph) -> Any:
 
 
 def graph_outputs(
-    session: Any, response: Response, sets: SimulatedSets, index: int
+    session: Any,
+    response: Response,
+    sets: SimulatedSets,
+    index: int,
+    errors: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """All outputs for one simulated set without memory, by name."""
-    feed = {name: values.astype(np.float32) for name, values in sets.rows(index).items()}
+    """All outputs for one simulated set without memory, by name.
+
+    Slip and load are taken as exact, and `COMMON_ERROR_INPUTS` as 0 where `errors` lacks them.
+    """
+    rows = sets.rows(index)
+    feed = {name: np.zeros(len(rows["slip"]), np.float32) for name in OPERATING_STD_INPUTS}
+    common = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0) | dict(errors or {})
+    feed |= {name: np.asarray([std], np.float32) for name, std in common.items()}
+    feed |= {name: values.astype(np.float32) for name, values in rows.items()}
     feed |= {
         name: np.asarray([value], np.float32) for name, value in sets.context_of(index).items()
     }
-    feed |= dict(zip(MEMORY_INPUTS, empty_memory(len(response.terms)), strict=True))
+    feed |= dict(
+        zip(MEMORY_INPUTS, empty_memory(len(response.terms) + len(ERROR_COLUMNS)), strict=True)
+    )
     names = [output.name for output in session.get_outputs()]
     return dict(zip(names, session.run(names, feed), strict=True))

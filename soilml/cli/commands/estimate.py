@@ -12,20 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.cli.advice_text import advice_after_estimate, median_row, widest_row
-from soilml.cli.joint_readings import channel_note, joint_readings, row_readings
+from soilml.cli.estimate_text import estimate_columns, width_notes
+from soilml.cli.joint_readings import (
+    channel_note,
+    joint_readings,
+    row_readings,
+    unused_std_note,
+)
 from soilml.cli.options import InputFile, add_row_options, read_rows
 from soilml.cli.output import write_columns
-from soilml.cli.wheel_check import apply_case_option, check_table_wheel
+from soilml.cli.wheel_check import apply_case_option, check_table_wheel, describe_file
 from soilml.errors import InputError, TableError
-from soilml.experiment_design import is_identified
 from soilml.io.atomic_files import output_files
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
-from soilml.onboard.estimate import Estimate
+from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
-from soilml.onboard.multi_sensor import ACROSS_FILES, PRIOR_ONCE, fuse_estimates
+from soilml.onboard.fusion.joint_errors import are_comparable
+from soilml.onboard.multi_sensor import ACROSS_FILES, CORRELATED, fuse_estimates
 from soilml.optional_imports import need
 from soilml.quantities import column
 
@@ -37,10 +42,14 @@ DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
 
+  soilml estimate exported/wheel.onnx
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
   soilml estimate exported/any_wheel.onnx RUNS.csv --case MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
+
+Without a table, one line tells what the file is for: wheel, effects and priors.
+--case compares them with those of your model file, and refuses another wheel.
 
 Each row of the table gives mean, standard deviation (_std) and 90 % interval
 (_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
@@ -49,18 +58,19 @@ lie outside the training data; the estimate is then the prior.
 One row gives one equation for three unknowns, so the estimate of a single row
 is close to the prior. --by run pools all rows of a run, which is far more
 accurate; sinkage_m, drawbar_pull_N and <column>_std are used where the table
-has them. The estimate of a run is the prior where no soil explains all its
-rows or where more than a tenth of them is out of range. A row with a blank
-reading, or whose status is not ok, gets a blank estimate. Slip differs from
-row to row and has no --by.
+has them, slip_std and load_N_std included. The estimate of a run is the prior
+where more than a tenth of its rows is out of range, and widened as far as the
+misfit says where no soil explains them all. A row with a blank reading, or
+whose status is not ok, gets a blank estimate. Slip differs from row to row and
+has no --by.
 
 --with fuses, row by row, model files that estimate the same parameters from
-other sensors. Their errors must be independent: files that read the same
-sensors are refused, except with --rule covariance-intersection. A file takes
-no part in a row where its reading is blank or out of range; the column `files`
-counts those that do. Standard error reports which parameters are not
-determined, and the next measurement that would help. Only numpy and
-onnxruntime are needed.
+other sensors: slip files of one data file by the correlation of their errors,
+others as if their errors were independent; files that read the same sensors
+are then refused. A file takes no part in a row where its reading is blank or
+out of range; the column `files` counts those that do. Standard error reports
+which parameters are not determined, and the next measurement that would help.
+Only numpy and onnxruntime are needed.
 """
 
 
@@ -68,7 +78,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="trained model file")
     parser.add_argument(
-        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
+        "runs",
+        nargs="?",
+        type=InputFile,
+        metavar="RUNS.csv",
+        help="measured rows, CSV or Parquet; without it, tell what the file is for",
     )
     parser.add_argument(
         "--by", metavar="COLUMN", help="one estimate for each value of this column, such as run"
@@ -87,7 +101,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--case",
         type=InputFile,
         metavar="MODEL.toml",
-        help="your wheel, soil, priors and noise, for a model file for wheels of any size",
+        help="your wheel and effects, which are compared with those of the model file; for a file "
+        "for wheels of any size, also your soil, priors and noise",
     )
     parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
     add_row_options(parser)
@@ -104,7 +119,14 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
-    estimators[0], case, case_notes = apply_case_option(args, estimators[0])
+    if args.runs is None and args.case is None:
+        print("\n".join(describe_file(estimator) for estimator in estimators))
+        return 0
+    estimators, case, case_notes = apply_case_option(args, estimators)
+    case_notes = [describe_file(estimator) for estimator in estimators] + case_notes
+    if args.runs is None:
+        print("\n".join(case_notes))
+        return 0
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
@@ -117,11 +139,13 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, notes = _row_estimates(estimators, table, usable, args.rule or PRIOR_ONCE, case)
+        columns, notes = _row_estimates(estimators, table, usable, args.rule, case)
     else:
         columns, notes = _group_estimates(estimators[0], table, usable[0], args.by, case)
     write_columns(columns, args.out)
     notes = case_notes + notes
+    if args.by is None or estimators[0].sets is None:
+        notes += unused_std_note(estimators[0], table)
     notes += _excluded(table, ~complete, "lack a reading")
     notes += _excluded(table, complete & ~table.answered, "have a status that is not ok")
     print("\n".join(notes), file=sys.stderr)
@@ -139,11 +163,14 @@ def _excluded(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
+    if args.runs is None and (args.by, args.where, args.out) != (None, None, None):
+        raise InputError("RUNS.csv is missing: --by, --where and --out are for its rows")
     if args.rule is not None and not args.others:
         raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:
         raise InputError("--with fuses single rows; omit --by")
-    if args.rule != COVARIANCE_INTERSECTION:
+    known = are_comparable([e.pooling.held_out for e in estimators])
+    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
         _check_independent(args, estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
@@ -174,7 +201,7 @@ def _row_estimates(
     estimators: list[Estimator],
     table: Table,
     usable: list[NDArray[np.bool_]],
-    rule: str,
+    rule: str | None,
     case: Case | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Columns with a line for every row, blank where no model has all its readings, and notes."""
@@ -187,7 +214,7 @@ def _row_estimates(
     if len(estimators) > 1:
         combined = fuse_estimates(estimates, rule)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
-    for key, values in _columns(estimate).items():
+    for key, values in estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
     columns["in_range"] = answered & estimate.in_range
     hint = "pool rows with --by run"
@@ -195,8 +222,10 @@ def _row_estimates(
         columns["files"] = files
     if estimators[0].per_row:
         hint = "measure with other sensors too, or train for a narrower prior of the soil,"
-    notes = _width_notes(estimate, "a single row", "does", hint)
-    if files is None and estimate.in_range.any():
+    notes = width_notes(estimate, "a single row", "does", hint)
+    if len(estimators) > 1:
+        notes.append(f"fused by the rule {combined.rule}")
+    elif estimate.in_range.any():
         row = median_row(estimate)
         readings = row_readings(estimators[0], table.rows(np.asarray([row])))
         lines = advice_after_estimate(
@@ -223,7 +252,7 @@ def _all_rows(
         if alone:
             readings = joint_readings(estimator, rows, case, together=False)
         estimate = estimator(**readings)
-        for key in ("mean", "std", "covariance", "low", "high", "in_range"):
+        for key in Estimate.ARRAYS:
             getattr(result, key)[usable] = getattr(estimate, key)
     return result
 
@@ -247,11 +276,11 @@ def _group_estimates(
         "rows": np.where(answered, counts[index], 0),
         "rows_in_range": np.where(answered, np.asarray(in_range)[index], 0),
     }
-    for key, values in _columns(estimate).items():
+    for key, values in estimate_columns(estimate).items():
         columns[key] = np.where(answered, values[index], np.nan)
     columns["in_range"] = answered & estimate.in_range[index]
     notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
-    notes += _width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
+    notes += width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
     if estimate.in_range.any():
         name, rows = groups[i := widest_row(estimate)]
         lines = advice_after_estimate(
@@ -260,37 +289,10 @@ def _group_estimates(
         notes += [f"{by} {name}: {line}" for line in lines]
     for (name, rows), inside, one in zip(groups, in_range, estimates, strict=True):
         if not one.in_range:
-            why = f"{len(rows) - inside} of {len(rows)} rows are out of range"
-            if inside >= LEAST_SHARE_IN_RANGE * len(rows):
-                why = "no soil within the prior explains all its rows"
-            notes.append(f"{by} {name}: {why}; the estimate is the prior")
+            why, what = Reason(int(one.reason)).words, "the estimate is the prior"
+            if one.reason == Reason.OUT_OF_RANGE:
+                why = f"{len(rows) - inside} of {len(rows)} rows are out of range"
+            if one.reason == Reason.INCONSISTENT:
+                what = "the estimate is widened as far as the misfit says"
+            notes.append(f"{by} {name}: {why}; {what}")
     return columns, notes
-
-
-def _columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
-    """Mean, std and interval of every parameter, by column name."""
-    columns = {}
-    for i, name in enumerate(estimate.names):
-        key = column(name)
-        columns[key] = estimate.mean[:, i]
-        columns[f"{key}_std"] = estimate.std[:, i]
-        columns[f"{key}_p05"] = estimate.low[:, i]
-        columns[f"{key}_p95"] = estimate.high[:, i]
-    return columns
-
-
-def _width_notes(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:
-    """Median width of the estimates in range over the prior's; parameters not determined."""
-    if not estimate.in_range.any():
-        return []
-    share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
-    names = [name.replace("_", " ") for name in estimate.names]
-    shares = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share, strict=True))
-    notes = [f"posterior width / prior width, {what}: {shares}"]
-    vague = [name for name, ok in zip(names, is_identified(share), strict=True) if not ok]
-    if vague:
-        notes.append(
-            f"{' and '.join(vague)}: the estimate is mostly the prior, {what} {does} not determine "
-            f"{'it' if len(vague) == 1 else 'them'}; {hint} for a better estimate"
-        )
-    return notes

@@ -19,6 +19,7 @@ from soilml.cli.options import (
     parse_names,
 )
 from soilml.cli.output import json_text
+from soilml.cli.progress import progress_bar
 from soilml.config.case import read_case
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, create_folder
@@ -115,18 +116,18 @@ def run(args: argparse.Namespace) -> int:
     effects = available_effects(args)
     case = read_case(args.model, effects)
     table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
-    if sys.stderr.isatty():
-        print(f"analysing {len(table)} rows ...", file=sys.stderr, flush=True)
-    report = gap(
-        case,
-        table,
-        free=parse_names(args.free),
-        holdout=args.holdout,
-        effects=effects,
-        calibration=_calibration(args.checked, effects),
-        costs=parse_costs(args),
-        seed=args.seed,
-    )
+    with progress_bar(f"analysing {len(table)} rows", 100) as done:
+        report = gap(
+            case,
+            table,
+            free=parse_names(args.free),
+            holdout=args.holdout,
+            effects=effects,
+            calibration=_calibration(args.checked, effects),
+            costs=parse_costs(args),
+            seed=args.seed,
+            progress=lambda share: done(round(100 * share)),
+        )
     from soilml.gap.html.page import page
 
     texts = {

@@ -81,8 +81,8 @@ def run_options(
         lighter,
     ]
     if highest <= HIGHEST_SLIP - 0.1:
-        high = drivable_slips(0.2, highest + 0.3)
-        options.append(run("higher slip", "slips up to {highest:g}", high, middle))
+        high = drivable_slips(highest, highest + 0.3)
+        options.append(run("higher slip", f"slips up to {high.max():g}", high, middle))
     low = drivable_slips(0.01, 0.12)
     options.append(run("low slip", "slips close to zero", low, middle))
     if float(slips.min()) >= 0.0:

@@ -32,6 +32,10 @@ SENSOR_CHECKS: dict[str, tuple[str, dict[str, float]]] = {
         "roll the wheel ten turns without slip and measure the distance",
         {"slip-scale": 0.002},
     ),
+    "towed wheel": (
+        "tow the wheel, whose rolling radius is known, unpowered on hard ground and read its slip",
+        {"slip-offset": 0.002},
+    ),
 }
 
 #: Tests of the soil with a bevameter: kind -> (instruction, soil parameter -> standard deviation

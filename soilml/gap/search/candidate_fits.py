@@ -74,24 +74,21 @@ class CandidateFit:
 def fit_candidates(
     problem: FitProblem,
     requests: Sequence[tuple[tuple[str, ...], Mapping[str, float], Floats]],
-    noise_starts: Sequence[Mapping[str, float]] | None = None,
+    noise_start: Mapping[str, float] | None = None,
 ) -> list[CandidateFit]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
     A request has the names of the effects, start coordinates by path, and the amplitudes of the
-    discrepancy by channel to start with. With `noise_starts`, start coordinates of each request,
-    each set is also fitted under noise alone first, and from there beside a discrepancy: beside a
+    discrepancy by channel to start with. With `noise_start`, start coordinates of the soil, each
+    set is also fitted under noise alone first, and from there beside a discrepancy: beside a
     large one, a fit can stay where the effect is not needed. Sets that the model refuses are left
     out.
     """
     starts = [_started(problem, names, start) for names, start, _ in requests]
     found = fit_marginal(problem, [(s, a) for s, (_, _, a) in zip(starts, requests, strict=True)])
     alone: list[GapFit | None] = [None] * len(requests)
-    if noise_starts is not None:
-        from_soil = [
-            _started(problem, names, start)
-            for (names, _, _), start in zip(requests, noise_starts, strict=True)
-        ]
+    if noise_start is not None:
+        from_soil = [_started(problem, names, noise_start) for names, _, _ in requests]
         fits = fit_many(problem, from_soil)
         alone = [None if isinstance(fit, InputError) else fit for fit in fits]
         none = np.zeros(len(problem.readings.channels))

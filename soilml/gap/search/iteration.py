@@ -68,10 +68,11 @@ def analyse(
     calibration: Mapping[str, float],
     seed: int,
     place: Callable[[int], str],
+    progress: Callable[[float], None],
 ) -> Analysis:
     """Search for the effects that explain what the soil alone does not.
 
-    `place` gives the file and line of a row, for messages.
+    `place` gives the file and line of a row, for messages; `progress` is told the share done.
     """
     coordinates = tuple(soil_coordinate(f) for f in free)
     problem = FitProblem(
@@ -85,7 +86,7 @@ def analyse(
         row = int(readings.row[infeasible[0]])
         return Analysis(problem, result, (), f"the model cannot carry the load of {place(row)}")
     best, excluded = soil, []
-    for _ in range(MAX_PASSES):
+    for number in range(MAX_PASSES):
         last = problem.covariance.components
         signatures = result.final_test.signatures
         problem, found = _reestimate_covariance(problem, best, readings, signatures)
@@ -99,11 +100,16 @@ def analyse(
         readings = problem.readings
         soil = problem.fit_soil([soil.x])
         starts = {c.names: c for c in result.candidates}
-        result = search(problem, soil, seed, starts)
+        result = search(problem, soil, seed, starts, _in_pass(number, progress))
         if not result.accepted:
             break
         best = result.accepted[0].fit
     return Analysis(problem, result, tuple(excluded))
+
+
+def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float], None]:
+    """A function of the share of one pass that is done."""
+    return lambda share: progress((number + share) / MAX_PASSES)
 
 
 def _declared_covariance(readings: StackedReadings) -> Covariance:

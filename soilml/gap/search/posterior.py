@@ -16,8 +16,8 @@ REJECTION_THRESHOLD = 14.0
 #: Probability of the soil alone, beside its discrepancy, below which a single explanation is named
 #: and several are stated as a class; a name needs more evidence than a list.
 MAX_CHANCE_NAME, MAX_CHANCE_CLASS = 0.01, 0.2
-#: Probability that the cause of a gap has an effect of the catalogue as its right description,
-#: calibrated on the same sets, a fifth of which have a cause that the catalogue lacks.
+#: Probability that an effect of the catalogue is the right description of a cause that it explains:
+#: the share on the sets that calibrated `TEMPERING`, causes outside the catalogue among them.
 IN_CATALOGUE = 0.9
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
@@ -27,13 +27,19 @@ Names = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Posterior:
-    """Natural logarithms of the posterior probabilities of sets of effects, by names."""
+    """Natural logarithms of the posterior probabilities of sets of effects, by names.
+
+    Sets in `outside` explain the data only by a law or a size that the catalogue does not have:
+    they count as causes outside the catalogue.
+    """
 
     log_weights: dict[Names, float]
+    outside: frozenset[Names] = frozenset()
 
     def probability(self, effect: str) -> float:
         """Probability that an effect is present, causes outside the catalogue included."""
-        return IN_CATALOGUE * float(np.exp(self._log_sum(lambda names: effect in names)))
+        inside = self._log_sum(lambda names: effect in names and names not in self.outside)
+        return IN_CATALOGUE * float(np.exp(inside))
 
     def weight(self, names: Names) -> float:
         """Probability that exactly this set of effects is present."""
@@ -53,10 +59,7 @@ class Posterior:
             if names:
                 smaller = next((n for n in groups if set(n) <= set(names)), names)
                 groups.setdefault(smaller, set()).add(names)
-        odds = {
-            names: self._log_odds(lambda other, group=group: other in group)  # type: ignore[misc]
-            for names, group in groups.items()
-        }
+        odds = {names: self._log_odds(group.__contains__) for names, group in groups.items()}
         return sorted(odds.items(), key=lambda item: (-item[1], item[0]))
 
     def _log_odds(self, holds: Callable[[Names], bool]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,6 @@ from soilml.gap.search.predicted_gains import (
 )
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
-from soilml.gap.statistics.coordinates import SoilCoordinate
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.signatures import Untestable, effect_signatures
 
@@ -45,6 +44,8 @@ WITHIN_REACH = 15.0
 #: Largest number of effects in a candidate; sets that are extended by one effect in each step, and
 #: effects that each of them is extended by.
 MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
+#: Steps of a search: the test for a gap, and the sets of each size.
+STEPS = 1 + MAX_EFFECTS
 #: Upper bound of the improvement by free shapes, in linearised gains; the full fit can exceed the
 #: linearised gain because the size changes with the shape.
 SHAPE_GAIN_FACTOR = 3.0
@@ -102,7 +103,11 @@ class SearchResult:
 
 
 def search(
-    problem: FitProblem, soil: GapFit, seed: int, starts: Starts | None = None
+    problem: FitProblem,
+    soil: GapFit,
+    seed: int,
+    starts: Starts | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> SearchResult:
     """Search for the effects that explain what the soil alone does not.
 
@@ -116,6 +121,8 @@ def search(
         The soil alone, fitted under noise and scatter without discrepancy.
     starts : mapping
         Candidates of an earlier search.
+    progress : callable
+        Called with the share of the search that is done, from 0 to 1.
     """
     starts = starts or {}
     signatures, untestable = effect_signatures(soil.fitted(), problem.readings, problem.effects)
@@ -124,6 +131,7 @@ def search(
         return SearchResult(
             soil, soil_test, (), (), soil_test, {}, Posterior({}), tuple(untestable)
         )
+    progress(1 / STEPS)
     none = _soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
@@ -134,7 +142,8 @@ def search(
         selected += [name for name in ordered if name not in selected]
     level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
-    for _ in range(MAX_EFFECTS - 1):
+    for effects in range(1, MAX_EFFECTS):
+        progress((1 + effects) / STEPS)
         best = min(fitted.values(), key=lambda c: c.objective)
         if best.names and _is_complete(problem, best, seed):
             break
@@ -182,15 +191,14 @@ def _fit_level(
 
     Beside a large discrepancy, single effects are fitted under noise alone first.
     """
-    requests, noise_starts = [], []
-    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    requests = []
     for names, base in sets.items():
-        noise_starts.append(_off_bounds(soil))
-        hidden &= not base.names
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, none.amplitude)
         requests.append((names, base.catalogue_law.fit.start_values(), smaller))
-    fitted = fit_candidates(problem, requests, noise_starts if hidden else None)
+    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    single = all(not base.names for base in sets.values())
+    fitted = fit_candidates(problem, requests, _off_bounds(soil) if hidden and single else None)
     if not fitted:
         return []
     lowest = min(none.objective, *(c.objective for c in fitted))
@@ -206,15 +214,12 @@ def _fit_level(
 
 
 def _off_bounds(soil: GapFit) -> dict[str, float]:
-    """The coordinates of a fit, those of the soil nearer to the middle of their priors.
+    """The coordinates of a fit of the soil, nearer to the middle of their priors.
 
     Where an effect is missing, soil parameters are often at a bound, from which the fit with the
     effect would not move.
     """
-    return {
-        c.path: 0.5 + INWARD * (float(x) - 0.5) if isinstance(c, SoilCoordinate) else float(x)
-        for c, x in zip(soil.coordinates, soil.x, strict=True)
-    }
+    return {path: 0.5 + INWARD * (x - 0.5) for path, x in soil.start_values().items()}
 
 
 def _is_complete(problem: FitProblem, best: CandidateFit, seed: int) -> bool:

@@ -22,8 +22,6 @@ USUAL = Discrepancy(share=0.02)
 #: Eigenfunctions with a smaller fraction of the largest eigenvalue are dropped: at ten times the
 #: usual amplitude they still change the readings by less than a five-hundredth of their range.
 LEAST_EIGENVALUE = 1e-4
-#: Amplitude in place of none, which has no logarithm.
-SMALLEST = 1e-300
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,8 @@ class DiscrepancyProcess:
 
     References
     ----------
-    Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001, eq. 5; Brynjarsdottir and O'Hagan, Inverse
-    Problems 30, 2014.
+    Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2;
+    Brynjarsdottir and O'Hagan, Inverse Problems 30, 2014.
     """
 
     columns: Floats
@@ -77,7 +75,7 @@ def discrepancy_process(
     for i, name in enumerate(readings.channels):
         in_channel = readings.channel == i
         span = range_with_zero(readings.reading[in_channel])
-        usual.append(max(declared.get(column(name), USUAL).amplitude(span), SMALLEST))
+        usual.append(declared.get(column(name), USUAL).amplitude(span))
         own = np.where(in_channel[:, None], functions[readings.row], 0.0)
         columns.append(usual[-1] * own)
         channel.append(np.full(functions.shape[1], i))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.parameters import check
+from soilml.parameters import values as parameter_values
 from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
@@ -61,8 +62,11 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
         Where two cases have the same effects in contrary order.
     """
     effects = _joined_effects([part.case for part in parts])
-    parameters = [_with_effects(part.case, effects).parameters() for part in parts]
+    parameters = [part.case.parameters() for part in parts]
     whole = _with_effects(parts[0].case, effects)
+    neutral: dict[str, Any] = {}
+    for effect in effects.values():
+        neutral |= _neutral_values(effect)
     sets = np.asarray([part.sets for part in parts])
     points = np.asarray([part.points for part in parts])
     set_ends = np.cumsum(sets)
@@ -70,7 +74,7 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     values: dict[str, Any] = {}
     for path, (_, first) in whole.parameters().items():
         own = [
-            part.values.get(path, known[path][1])
+            part.values.get(path, known[path][1] if path in known else neutral[path])
             for part, known in zip(parts, parameters, strict=True)
         ]
         if any(np.ndim(value) or value != first for value in own):
@@ -105,6 +109,11 @@ def _with_effects(case: Case, effects: Mapping[str, type[Effect]]) -> Case:
     own = {effect.name: effect for effect in case.model.effects}
     joined = tuple(own.get(name, effect()) for name, effect in effects.items())
     return replace(case, model=replace(case.model, effects=joined))
+
+
+def _neutral_values(effect: type[Effect]) -> dict[str, Any]:
+    """Parameters by path of an effect that changes nothing."""
+    return {f"{effect.name}.{path}": value for path, value in parameter_values(effect()).items()}
 
 
 def _joined_operating(parts: Sequence[CaseSets]) -> Operating:

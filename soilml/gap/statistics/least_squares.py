@@ -20,6 +20,7 @@ from soilml.gap.statistics.batched_predictions import (
 )
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
 from soilml.gap.statistics.readings_by_gear import readings_by_gear
+from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.nearby_equilibrium import SinkageEstimate
 
 Floats = NDArray[np.float64]
@@ -37,8 +38,6 @@ ENOUGH, SHARE = 0.01, 2e-3
 #: factor after an iteration without improvement, and the bounds.
 FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.01, 1.0, 100.0), 1e3
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
-#: Precision of a fraction of the prior: a uniform distribution from 0 to 1 has variance 1/12.
-UNIFORM_PRECISION = 12.0
 
 
 @dataclass(frozen=True)

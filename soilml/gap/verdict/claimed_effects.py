@@ -29,7 +29,8 @@ def soil_estimates(
     """The soil parameters of a fit, by name.
 
     With `candidates`, each standard deviation includes the spread of their estimates about this
-    one, weighted by their posterior probabilities (Hoeting et al., Statist. Sci. 14, 1999, eq. 3).
+    one, weighted by their posterior probabilities (Hoeting et al., Statist. Sci. 14(4), 1999,
+    section 1).
     """
     values, stds = fit.values(), fit.stds()
     weights = [posterior.weight(c.names) if posterior else 0.0 for c in candidates]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,9 @@ from soilml.gap.verdict.law_difference import law_matters
 #: effect keeps its name: 1.7 sigma for one effect. For several effects the limit is lower, because
 #: several adjustable laws together fit almost any data.
 MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 3.0, 1.0
-
 #: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
 #: nothing: a gain error of 18 % without calibration.
 MAX_SIZE_DEVIATION = 3.0
-
-
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
 #: Why nothing is said where the soil alone is rejected without an alternative.
@@ -96,6 +93,15 @@ def is_left_open(result: SearchResult) -> bool:
     if not result.has_gap or none is None or np.any(none.amplitude > 0.0):
         return False
     return likeliest is None or none.objective <= likeliest.objective
+
+
+def with_refused_outside(result: SearchResult) -> SearchResult:
+    """The result with refused explanations counted as causes outside the catalogue.
+
+    They need an implausible size, or another law than the catalogue's.
+    """
+    refused = frozenset(c.names for c in result.candidates if c.names and _why_not_claimed(c))
+    return replace(result, posterior=replace(result.posterior, outside=refused))
 
 
 def _why_not_claimed(best: CandidateFit) -> str:

@@ -62,14 +62,14 @@ def repeats_that_disagree(problem: FitProblem, fit: GapFit) -> list[str]:
     columns = run_effect_columns(fit.fitted(), readings)
     sentences: dict[str, str] = {}
     agree: set[str] = set()
-    for memory in sorted(
-        {0.0, found.autocorrelation}
-    ):  # rows disagree only if they do with and without
+    # an estimated correlation of neighbouring samples can hide or make a disagreement: rows
+    # disagree only if they do with it and without it
+    for autocorrelation in sorted({0.0, found.autocorrelation}):
         usual = VarianceComponents(
             np.ones(len(readings.channels)),
             RUN_EFFECT_UNITS["friction_angle"] * several,
             RUN_EFFECT_UNITS["bearing"] * several,
-            memory,
+            autocorrelation,
             found.degrees_of_freedom,
         )
         covariance = assemble_covariance(readings, columns, usual).matrix
@@ -95,8 +95,10 @@ def _region(problem: FitProblem, soil: GapFit) -> list[str]:
         part = problem.readings.subset(rest)
         fit = levenberg_marquardt(soil.case, soil.coordinates, part, whiten, soil.x)
         y, derivatives = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
-    except (InputError, np.linalg.LinAlgError):
-        return []
+    except InputError:
+        return [
+            f"the region {name} cannot be predicted: no fit to the other rows carries its loads"
+        ]
     jacobian = derivatives[out]
     residual = (problem.readings.reading - y)[out]
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):

@@ -9,23 +9,31 @@ from soilml.gap.report_parts import RemainingDiscrepancy, decimal
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.least_squares import GapFit
-from soilml.quantities import column
+from soilml.quantities import QUANTITIES, column
 
 Floats = NDArray[np.float64]
 
-
-#: Expected amplitude, in usual ones, below which no discrepancy of a channel is stated.
+#: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
+#: of the soil leaves no residual to tell its amplitude by. It lies between 1.5, with which 90 %
+#: intervals held 86 % on 50 simulated sets with a discrepancy of 2 % (seeds 0 and 7), and 2, with
+#: which they held 93 %; without a discrepancy it changed nothing.
+INTERVAL_FACTOR = 1.75
+#: Amplitude of intervals, in usual ones, below which no discrepancy of a channel is stated.
 LEAST_AMPLITUDE = 0.1
 
 
 def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> GapFit:
     """The fit with intervals under the expected amplitudes of the discrepancy.
 
-    The estimates are those of the most probable amplitudes.
+    The estimates are those of the most probable amplitudes. The amplitudes
+    are enlarged by `INTERVAL_FACTOR`.
     """
-    return marginal.fit.whitened_by(
-        problem.discrepancy.whiten(marginal.evidence.expected_amplitude)
-    )
+    return marginal.fit.whitened_by(problem.discrepancy.whiten(interval_amplitude(marginal)))
+
+
+def interval_amplitude(marginal: MarginalFit) -> Floats:
+    """Amplitude of each channel's discrepancy in intervals, in usual ones, (channels,)."""
+    return INTERVAL_FACTOR * marginal.evidence.expected_amplitude
 
 
 def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
@@ -69,7 +77,7 @@ def _rms(values: Floats) -> float:
 
 
 def _unit(channel: str) -> str:
-    return {"Nm": "N m"}.get(column(channel).rpartition("_")[2], column(channel).rpartition("_")[2])
+    return QUANTITIES[channel].unit
 
 
 def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
@@ -89,7 +97,7 @@ def discrepancy_amplitudes(problem: FitProblem, marginal: MarginalFit) -> dict[s
 
     Channels without a discrepancy are left out.
     """
-    std = marginal.evidence.expected_amplitude * problem.discrepancy.process.usual
+    std = interval_amplitude(marginal) * problem.discrepancy.process.usual
     least = LEAST_AMPLITUDE * problem.discrepancy.process.usual
     return {
         column(name): float(value)

@@ -34,6 +34,7 @@ from soilml.physics.effects.sensors.drawbar_gain import DrawbarGain as DrawbarGa
 from soilml.physics.effects.sensors.sinkage_offset import SinkageOffset as SinkageOffset
 from soilml.physics.effects.sensors.sinkage_gain import SinkageGain as SinkageGain
 from soilml.physics.effects.sensors.slip_scale import SlipScale as SlipScale
+from soilml.physics.effects.sensors.slip_offset import SlipOffset as SlipOffset
 # fmt: on
 
 _CATALOGUE = {

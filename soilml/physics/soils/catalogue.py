@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
@@ -11,6 +10,7 @@ from typing import Any
 
 from soilml.arrays import Real
 from soilml.errors import InputError
+from soilml.optional_imports import tomllib
 from soilml.physics.soils.soil import Soil
 
 

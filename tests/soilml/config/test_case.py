@@ -64,6 +64,18 @@ def test_a_range_may_be_logarithmic(tmp_path):
     assert prior.at(0.5) == pytest.approx(0.01)
 
 
+def test_normal_priors_are_read_and_written(tmp_path):
+    effects = (
+        '[[effect]]\nname = "slip-sinkage"\n[effect.prior]\nn1 = { half-normal = 0.2 }\n'
+        '[[effect]]\nname = "slip-offset"\n[effect.prior]\noffset = { normal = 0.06 }\n'
+    )
+    case = read_case(written(tmp_path, MODEL + effects))
+    assert case.prior["slip-sinkage.n1"] == Prior(0.0, 0.8, normal_std=0.2)
+    assert case.prior["slip-offset.offset"] == Prior(-0.2, 0.2, normal_std=0.06)  # its bounds
+    again = read_case(written(tmp_path, case_as_toml(case)))
+    assert again.prior == case.prior
+
+
 DISCREPANCY = """
 [discrepancy]
 torque_Nm = "2 %"
@@ -108,6 +120,12 @@ MISTAKES = {
     "degrees": ("[soil.prior]", "friction_angle = 34\n[soil.prior]", "write 0.5934"),
     "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml soils"),
     "unknown prior": ("cohesion = [", "cohesoin = [", "did you mean 'cohesion'"),
+    "normal prior of a positive value": (
+        "cohesion = [0.0, 3000.0]",
+        "cohesion = { normal = 500.0 }",
+        "half-normal = 500",
+    ),
+    "normal prior without width": ("[0.0, 3000.0]", "{ normal = 0.0 }", "above zero"),
     "prior upside down": ("[0.0, 3000.0]", "[3000.0, 0.0]", "lower below upper"),
     "prior outside": ("[0.0, 3000.0]", "[-5.0, 3000.0]", "must lie between"),
     "noise without unit": ("torque_Nm", "torque", "did you mean 'torque_Nm'"),

@@ -15,7 +15,7 @@ from soilml.gap.statistics.evidence import (
     _size_prior,
     amplitude_penalty,
 )
-from soilml.gap.statistics.least_squares import UNIFORM_PRECISION
+from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 
 

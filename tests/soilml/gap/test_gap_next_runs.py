@@ -106,6 +106,16 @@ def test_rows_are_ones_that_a_rig_can_drive():
         assert (changed.model(changed.soil, at).status == 0).all()
 
 
+def test_a_run_at_higher_slips_begins_where_the_driven_ones_end():
+    case = case_of()
+    readings = fit_problem(case, driven(case, slips=6)).readings  # slips up to 0.6
+    options = {o.kind: o for o in run_options(readings, case, list(EFFECTS.values()))}
+    higher = options["higher slip"]
+    assert higher.at.slip.min() == pytest.approx(0.6, abs=0.03)
+    assert higher.at.slip.max() == pytest.approx(0.8)
+    assert higher.text.startswith("slips up to 0.8 under ")
+
+
 def test_a_load_that_the_soil_does_not_carry_is_lowered_or_left_out():
     case = case_of()
     soft = case.with_values({"kc": 0.0, "kphi": 5e4})

@@ -13,7 +13,7 @@ from soilml.gap.search.candidate_fits import (
     fit_shapes,
 )
 from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.search.posterior import explanations, posterior
+from soilml.gap.search.posterior import IN_CATALOGUE, Posterior, explanations, posterior
 from soilml.gap.search.predicted_gains import predicted_gains
 from soilml.gap.search.stepwise import search
 from soilml.gap.statistics.evidence import Evidence
@@ -59,6 +59,17 @@ def fitted(problem, soil, *names):
 @pytest.fixture(scope="module")
 def named(dug):
     return fitted(*dug, "slip-sinkage")
+
+
+def test_a_refused_explanation_counts_as_a_cause_outside_the_catalogue():
+    weights = {(): 0.1, ("slope",): 0.6, ("grousers",): 0.1, ("grousers", "slope"): 0.2}
+    logs = {names: float(np.log(w)) for names, w in weights.items()}
+    inside = Posterior(logs)
+    refused = Posterior(logs, frozenset({("slope",)}))
+    assert inside.probability("slope") == pytest.approx(IN_CATALOGUE * 0.8)
+    assert refused.probability("slope") == pytest.approx(IN_CATALOGUE * 0.2)
+    assert refused.probability("grousers") == pytest.approx(inside.probability("grousers"))
+    assert refused.effect_log_odds("slope") == inside.effect_log_odds("slope")
 
 
 def test_the_true_law_needs_no_shape(named):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from bevameter_tables import KC, KPHI, PHI, C, K, N, plates, shear
 
 from soilml import read_case
-from soilml.errors import InputError, TableError
 from soilml.identification.bevameter import bevameter
 from soilml.identification.bevameter.model_file import (
     missing_values,
@@ -12,41 +12,6 @@ from soilml.identification.bevameter.model_file import (
     updated_soil,
 )
 from soilml.io.table import Table
-
-KC, KPHI, N = 5e3, 600e3, 0.9
-C, PHI, K = 800.0, 0.6, 0.012
-
-
-def plates(sizes=(0.05, 0.10), repeats=3, scatter=(0.0, 0.0), seed=0, points=12, **law):
-    """Tests that obey Bekker's law, each with its own relative pressure and exponent."""
-    rng = np.random.default_rng(seed)
-    kc, kphi, n = (law.get(key, value) for key, value in (("kc", KC), ("kphi", KPHI), ("n", N)))
-    z = np.linspace(0.005, 0.08, points)
-    parts = []
-    for size in sizes:
-        for i in range(repeats):
-            level, change = np.asarray(scatter) * rng.standard_normal(2)
-            p = (kc / size + kphi) * 0.06**n * np.exp(level) * (z / 0.06) ** (n + change)
-            parts.append((np.full(points, f"{size:g}_{i}"), np.full(points, size), z, p))
-    test, size, sinkage, pressure = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Table(
-        {"test": test, "plate_radius_m": size, "sinkage_m": sinkage, "pressure_Pa": pressure}
-    )
-
-
-def shear(stresses=(5e3, 10e3, 20e3), repeats=2, scatter=0.0, seed=0, points=15):
-    """Tests that obey Mohr and Coulomb, and Janosi and Hanamoto."""
-    rng = np.random.default_rng(seed)
-    j = np.linspace(0.002, 0.08, points)
-    parts = []
-    for sigma in stresses:
-        for i in range(repeats):
-            factor = np.exp(scatter * rng.standard_normal())
-            tau = (C + sigma * np.tan(PHI)) * factor * -np.expm1(-j / K)
-            parts.append((np.full(points, f"{sigma:g}_{i}"), np.full(points, sigma), j, tau))
-    test, sigma, displacement, stress = (np.concatenate(part) for part in zip(*parts, strict=True))
-    columns = {"test": test, "normal_stress_Pa": sigma}
-    return Table(columns | {"shear_displacement_m": displacement, "shear_stress_Pa": stress})
 
 
 def model_file(tmp_path, radius=0.1, width=0.05, prior="cohesion = [0.0, 2000.0]\nkc = [0.0, 1e4]"):
@@ -268,40 +233,6 @@ def test_the_soil_can_be_written_as_a_model_file(tmp_path):
     assert missing_values(part) == ["cohesion", "friction_angle", "shear_modulus"]
     text = model_file_text(part, None, "plates.csv")
     assert "[gear]" not in text and "[soil.prior]" in text
-
-
-MISTAKES = {
-    "no plate": ("plate_radius_m", None, "the size of the plate is missing"),
-    "no pressure": ("pressure_Pa", None, "pressure_Pa or load_N"),
-    "nothing measured": ("pressure_Pa", np.nan, "more samples with growing sinkage"),
-    "no sinkage": ("sinkage_m", None, "sinkage_m is missing"),
-}
-
-
-@pytest.mark.parametrize(("key", "value", "said"), MISTAKES.values(), ids=MISTAKES)
-def test_plate_tables_without_a_curve_are_refused(key, value, said):
-    columns = dict(plates().columns)
-    if value is None:
-        del columns[key]
-    else:
-        columns[key] = np.full(len(columns[key]), value)
-    with pytest.raises(TableError, match=said):
-        bevameter(Table(columns))
-
-
-def test_shear_tables_without_a_curve_are_refused():
-    columns = shear().columns
-    with pytest.raises(TableError, match="column normal_stress_Pa is missing"):
-        bevameter(shear=Table({k: v for k, v in columns.items() if k != "normal_stress_Pa"}))
-    with pytest.raises(TableError, match="column shear_displacement_m is missing"):
-        bevameter(shear=Table({k: v for k, v in columns.items() if k != "shear_displacement_m"}))
-    blank = np.full(len(columns["test"]), np.nan)
-    with pytest.raises(TableError, match="samples with a displacement and a shear"):
-        bevameter(shear=Table(columns | {"shear_stress_Pa": blank}))
-    with pytest.raises(TableError, match="no normal stress above zero"):
-        bevameter(shear=Table(columns | {"normal_stress_Pa": blank}))
-    with pytest.raises(InputError, match="no tests"):
-        bevameter()
 
 
 def test_odd_units_are_remarked_on():

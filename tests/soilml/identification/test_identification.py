@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import MODEL
 
 from soilml import LinearWheel, Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
@@ -246,3 +247,34 @@ def test_json_holds_what_is_promised(case):
     assert content["parameters"]["cohesion"]["unit"] == "Pa"
     assert -1.0 <= content["correlation"]["cohesion"]["friction_angle"] <= 1.0
     assert content["rows_used"] == 18
+
+
+OFFSET = """[[effect]]
+name = "slip-offset"
+[effect.prior]
+offset = { normal = 0.015 }
+"""
+
+
+@pytest.mark.parametrize("method", ["nonlinear", "posterior"])
+def test_a_slip_that_is_off_is_integrated_out_by_its_normal_prior(case, tmp_path, method):
+    file = tmp_path / "model.toml"
+    file.write_text(MODEL + OFFSET)
+    uncertain = read_case(file)
+    table = measured(uncertain, TRUTH | {"slip-offset.offset": 0.025}, SLIPS, LOADS, noise=0.01)
+    exact = replace(case, noise=uncertain.noise)
+    wrong, found = identify(exact, table, method=method), identify(uncertain, table, method=method)
+    assert (np.abs(wrong.values - list(TRUTH.values())) > 3.0 * wrong.std).any()
+    for name, value in TRUTH.items():
+        assert abs(found[name] - value) < 2.5 * found.std[found.names.index(name)]
+
+
+def test_what_no_row_tells_keeps_its_normal_prior(case, tmp_path):
+    file = tmp_path / "model.toml"
+    file.write_text(
+        MODEL + OFFSET.replace("slip-offset", "sinkage-offset").replace("0.015", "0.001")
+    )
+    fit = identify(read_case(file), measured(case, TRUTH, SLIPS, LOADS))  # torque alone
+    assert fit["sinkage-offset.offset"] == pytest.approx(0.0, abs=1e-9)
+    assert fit.std[fit.names.index("sinkage-offset.offset")] == pytest.approx(0.001, rel=0.01)
+    assert fit.remaining_fraction["sinkage-offset.offset"] == pytest.approx(1.0, rel=0.01)

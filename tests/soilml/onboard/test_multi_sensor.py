@@ -74,7 +74,7 @@ def test_whatever_errors_have_in_common_covariance_intersection_is_not_too_sure(
     assert fuse_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
 
 
-@pytest.mark.parametrize("rule", ACROSS_FILES)
+@pytest.mark.parametrize("rule", [rule for rule in ACROSS_FILES if rule != "correlated"])
 def test_what_is_out_of_range_takes_no_part(rule):
     flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
     slips = np.full(4, 0.30)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_contract import ABSENT_STD
+from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
 from training.benchmark.bayes_limit_file import BayesLimit
 from training.benchmark.sets.posterior_comparison import GaussianEstimates, PosteriorComparison
 from training.benchmark.sets.reference_sets import PROCESSES, ReferenceSet
@@ -54,7 +54,10 @@ def compare_with_exact(
 def _run_file(
     path: str, group: Sequence[ReferenceSet]
 ) -> tuple[GaussianEstimates, list[RankedPosterior]]:
-    """Estimates of the file for sets of one design, and the posteriors that its memory defines."""
+    """Estimates of the file for sets of one design, and the posteriors that its memory defines.
+
+    The sensors of reference sets have no common errors but the bias of torque.
+    """
     estimator = Estimator.load(path)
     estimates, posteriors = [], []
     for reference in group:
@@ -62,7 +65,8 @@ def _run_file(
         rows = sets.rows(0)
         for name in ("sinkage", "drawbar_pull"):
             rows[name] = np.where(rows[f"{name}_std"] < ABSENT_STD, rows[name], np.nan)
-        configured = estimator.on(None, **sets.context_of(0)) if sets.context else estimator
+        exact = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+        configured = estimator.on(None, **sets.context_of(0), **exact)
         estimate, memory = configured.step(configured.start(), **rows)
         estimates.append(estimate)
         system = memory.system.astype(np.float64)

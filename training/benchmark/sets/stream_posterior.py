@@ -20,20 +20,26 @@ def response_terms(family: WheelFamily) -> Terms:
 def posterior_of_memory(
     family: WheelFamily, system: Floats, sets: SimulatedSets, index: int
 ) -> RankedPosterior:
-    r"""The posterior of a linear system (m, terms + 1), as in `SetPosterior`, well sampled.
+    r"""The posterior of a linear system (m, terms + errors), as in `SetPosterior`, well sampled.
 
-    .. math:: \log p(y | x) = -\tfrac12 | S^{-1} A b(x) |^2 + const, \qquad I + g g^T = S S^T
+    .. math:: \log p(y | x) = -\tfrac12 | S^{-1} A b(x) |^2 + const, \qquad I + G G^T = S S^T
 
-    with the last column g the effect of the sensor's bias. The estimate of a file differs from it
+    with the last columns G the effects of errors that all readings share. They are integrated out
+    by the update of Andrews (AIAA Journal 6(6), 1968), with the Cholesky factor
+    :math:`I + G^T G = L L^T`:
+
+    .. math:: A' = A - G (L + I)^{-T} L^{-1} G^T A
+
+    The estimate of a file differs from it
     by the Monte Carlo error of its short sampling alone. Its difference from the exact posterior is
     the error of the learned response, and of a likelihood that is normal in the logarithm of a
     reading.
     """
     these = response_terms(family)
-    a, g = system[:, :-1], system[:, -1]
-    size = float(g @ g)
-    if size > 0.0:
-        a = a - (1.0 - (1.0 + size) ** -0.5) / size * np.outer(g, g @ a)
+    a, g = np.split(system, [len(these)], axis=1)
+    identity = np.eye(g.shape[1])
+    factor = np.linalg.cholesky(identity + g.T @ g)
+    a = a - g @ np.linalg.solve((factor + identity).T, np.linalg.solve(factor, g.T @ a))
 
     def log_likelihood(x: Floats) -> Floats:
         return np.asarray(-0.5 * ((monomials(x, these) @ a.T) ** 2).sum(axis=1))

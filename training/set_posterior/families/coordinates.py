@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 
 Floats = NDArray[np.float64]
@@ -53,6 +54,10 @@ class Coordinate:
     @staticmethod
     def of(name: str, prior: Prior) -> Coordinate:
         """The coordinate for a prior, uniform in the value or in its logarithm."""
+        if prior.normal_std is not None:
+            raise InputError(
+                f"the prior of {name} is normal; a set posterior needs a range, [lower, upper]"
+            )
         lower, upper = prior.lower, prior.upper
         if prior.log or (
             lower > 0.0 and upper / lower > LOGARITHMIC_RATIO and lower > ZERO_SHARE * upper

@@ -34,6 +34,7 @@ from training.set_posterior.families.dimensionless_sets import simulate_sets
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
+    USUAL_ERRORS,
     ContextValues,
     SimulatedSets,
     add_log_torque,
@@ -199,10 +200,15 @@ class DimensionlessFamily:
             "shear_modulus_max": list(shear),
         }
 
+    def usual_errors(self) -> dict[str, float]:
+        """See `WheelFamily`; none of drawbar pull, as loads differ by a factor of a thousand."""
+        return USUAL_ERRORS
+
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`; features are linear in the logarithms of the inputs."""
         graph, radius, n = readings["slip"].graph, readings["wheel_radius"], readings["n"]
-        normal_std = maximum(readings["bearing_std"] / BEARING_RANGE, LEAST_NORMAL_STD)
+        most = MOST_BEARING_STD / BEARING_RANGE
+        normal_std = (readings["bearing_std"] / BEARING_RANGE).clip(LEAST_NORMAL_STD, most)
         one = constant(graph, np.ones(1))
         scales = ("cohesion_max", "shear_modulus_max")
         context = ("wheel_radius", "wheel_width", "bearing_modulus", *scales)
@@ -223,8 +229,10 @@ class DimensionlessFamily:
         target_scale = concat([readings[scales[0]], one, readings[scales[1]]], axis=0)
         return ContextValues(
             features=features,
+            feature_slopes=of_operating,
             torque=torque,
             torque_slope=torque_slope,
+            torque_by_load=1.0,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
             target_scale=target_scale.reshape(-1, 1),

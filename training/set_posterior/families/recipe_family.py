@@ -13,7 +13,12 @@ from scipy.stats import qmc
 from datagen.recipe import Recipe
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import (
+    ABSENT_READING,
+    ABSENT_STD,
+    OPERATING_NOISE,
+    RESPONSE_CHANNELS,
+)
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
@@ -21,7 +26,9 @@ from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.run_patterns import run_patterns
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
+    PULL_OFFSET_SHARE,
     SMALLEST,
+    USUAL_ERRORS,
     ContextValues,
     Origin,
     SimulatedSets,
@@ -136,6 +143,11 @@ class RecipeFamily:
         """None, as there are no context inputs."""
         return {}
 
+    def usual_errors(self) -> dict[str, float]:
+        """See `WheelFamily`."""
+        load = float(self.recipe.load.at(np.asarray(0.5)))
+        return USUAL_ERRORS | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
+
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
         operating = concat([readings["slip"], readings["load"]], axis=0)
@@ -144,8 +156,10 @@ class RecipeFamily:
         torque, torque_slope = self._torque(readings, length)
         return ContextValues(
             features=log_operating.reshape(2, -1).node("Transpose"),
+            feature_slopes=np.eye(2),
             torque=torque,
             torque_slope=torque_slope,
+            torque_by_load=0.0 if self.linear_torque else 1.0,
             most_torque_noise=ANY_NOISE if self.linear_torque else MOST_RELATIVE_NOISE,
             length=length,
             target_scale=constant(operating.graph, np.ones((self.targets, 1))),
@@ -204,6 +218,13 @@ class RecipeFamily:
             for name, noise in (named | {"torque_bias": bias}).items()
             if noise
         }
+
+    def declared_noise(self) -> dict[str, list[float]]:
+        """Noise of the recipe as the file's own: constant part and share, by channel, and bias."""
+        channels = (*RESPONSE_CHANNELS, *OPERATING_NOISE)
+        named = {name: self.recipe.case.noise.get(column(name)) for name in channels}
+        named["torque_bias"] = self.recipe.bias.get(column("torque"))
+        return {name: [noise.constant, noise.share] for name, noise in named.items() if noise}
 
     def metadata(self) -> dict[str, Any]:
         """See `WheelFamily`."""

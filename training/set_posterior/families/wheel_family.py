@@ -21,6 +21,18 @@ SMALLEST = LEAST_STD
 #: taken: the logarithm of a normal variable that may be negative is not normal (zero is 3 sigma
 #: away here).
 MOST_RELATIVE_NOISE = 1.0 / 3.0
+#: Standard deviations of errors that the readings of a drive usually have in common: wheel speed
+#: over ground speed, effective radius and gear ratios, current to torque, mass and load transfer,
+#: the height at which the wheel touches the ground (m).
+USUAL_ERRORS = {
+    "slip_bias": 0.015,
+    "load_gain": 0.01,
+    "torque_gain": 0.03,
+    "sinkage_bias": 0.0005,
+    "drawbar_pull_bias": 0.0,
+}
+#: Usual offset of a sensor of drawbar pull as a share of a typical load.
+PULL_OFFSET_SHARE = 0.01
 #: Largest correction of the logarithm's bias, that of 20 % noise: its series in the noise holds
 #: there.
 MOST_LOG_CORRECTION = 0.02
@@ -31,8 +43,10 @@ class ContextValues:
     """Graph values that a family computes from its inputs, float32."""
 
     features: Value  # (rows, f) inputs of the response surface
+    feature_slopes: Floats  # (2, f) derivatives of the features by log slip and log load
     torque: Value  # (rows,) the torque reading on the scale of the response
     torque_slope: Value  # (rows,) derivative of that scale by torque, 1 / (N m)
+    torque_by_load: float  # derivative of the torque scale by log load, with its sign changed
     most_torque_noise: float  # readings with more noise on that scale are left out
     length: Value  # unit of sinkage, and of torque over load, m
     target_scale: Value  # (q, 1) factors of the values of the estimated axes
@@ -160,6 +174,10 @@ class WheelFamily(Protocol):
 
     def limits(self) -> dict[str, list[float]]:
         """Least and largest value of each context input."""
+        ...
+
+    def usual_errors(self) -> dict[str, float]:
+        """Usual standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
         ...
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from training.onnx_graph.cholesky import cholesky_columns
-from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, tanh
+from training.onnx_graph.value import (
+    Value,
+    concat,
+    constant,
+    floor,
+    gemm,
+    log,
+    maximum,
+    minimum,
+    softmax,
+    sqrt,
+    tanh,
+    where,
+)
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.response_surface import Response
 from training.set_posterior.sampler.importance_weights import (
     WeightedRound,
     sample_round,
-    tempered_weights,
-    tempering_power,
     weights_by_effective_size,
 )
+from training.set_posterior.sampler.misfit_test import Consistency
 from training.set_posterior.sampler.polynomial_residuals import (
+    NearlyKnown,
     PolynomialResiduals,
     gauss_newton,
-    standardised_system,
 )
 from training.set_posterior.sampler.proposals import (
     ProposalDraws,
@@ -38,6 +51,11 @@ LARGEST_TANH = 1.0 - 1e-6
 VARIANCE_FLOOR = 1e-6
 
 
+#: The system (m, terms) of residuals whose errors in slip and load are linear at a soil, given by
+#: its monomials (terms, 1), or at the middle of the prior's range.
+SystemAt = Callable[[Value | None], Value]
+
+
 @dataclass(frozen=True)
 class WeightedSample:
     """Weighted samples of a posterior.
@@ -53,7 +71,11 @@ class WeightedSample:
 
 
 def add_importance_sampler(
-    family: WheelFamily, response: Response, context: ContextValues, system: Value
+    family: WheelFamily,
+    response: Response,
+    context: ContextValues,
+    system_at: SystemAt,
+    consistency: Consistency,
 ) -> WeightedSample:
     r"""Weighted samples of the posterior of a system (m, terms) of residuals.
 
@@ -67,7 +89,9 @@ def add_importance_sampler(
     1. In the first round the other unknowns are drawn from the prior.
     2. In each adapted round their inverse hyperbolic tangents, which are unbounded, are drawn from
        a t distribution with the mean and covariance of the previous round. These moments are those
-       of the highest power of the density that enough samples share (`tempering_power`).
+       of the highest power of the density that enough samples share (`tempering_power`). Before
+       the last round, the noise is enlarged if no soil explains the readings (`excess_variance`),
+       and the moments are then those of the first round.
     3. Rounds are pooled in proportion to their effective sample sizes.
 
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
@@ -79,8 +103,8 @@ def add_importance_sampler(
         Axes with their priors, and the monomials of the system.
     context : ContextValues
         Standard deviations of nearly known axes.
-    system : Value
-        Residuals (m, terms) with the bias of the torque sensor integrated out.
+    system_at : callable
+        Residuals (m, terms) with errors of sensors integrated out.
 
     References
     ----------
@@ -88,45 +112,88 @@ def add_importance_sampler(
     Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the others);
     Kish, Survey Sampling, 1965 (effective sample size).
     """
-    graph, unknowns = system.graph, len(family.axes)
+    unknowns = len(family.axes)
     sizes = sample_sizes(unknowns)
-    residuals = PolynomialResiduals.of(
-        family, response, standardised_system(family, response, context, system)
-    )
-    variance_floor = constant(graph, np.diag([0.0, *[VARIANCE_FLOOR] * unknowns]))
+    nearly_known = NearlyKnown.of(family, response, context)
+    residuals = PolynomialResiduals.of(family, response, nearly_known, system_at(None))
+    graph = residuals.system.graph
     draws = adapted_draws(unknowns, sizes.adapted)
     prior = prior_draws(family, residuals.order, sizes.prior)
     current = _prior_round(family, residuals, prior)
+    basis = _mean_basis(residuals, current)
+    soil = basis if nearly_known is None else basis * nearly_known.factors.node("Transpose")
+    residuals = PolynomialResiduals.of(family, response, nearly_known, system_at(soil))
+    current = current.reweighed(residuals)
     bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
     unbounded = constant(graph, np.arctanh(bounded))
-    count, rounds, pooled_weights = sizes.prior, [current], []
-    for _ in range(sizes.rounds):
-        power = tempering_power(current.boxed_log_weight)
-        weights = tempered_weights(current.log_weight, power)
-        pooled_weights.append(weights_by_effective_size(weights, power))
-        solved = current.points.take([unknowns], axis=0)
-        samples = concat([constant(graph, np.ones((1, count))), unbounded, solved], axis=0)
-        moments = gemm(samples * weights, samples, variance_floor, transpose_b=True)
-        proposal = cholesky_columns(moments, unknowns) @ draws.others
+    rounds, count = [current], sizes.prior
+    one = constant(graph, np.ones(1))
+    variance = one
+    samples = first_samples = _with_ones(unbounded, current, unknowns, count)
+    for number in range(sizes.rounds):
+        moments = _moments(samples, rounds[-1].tempered_weights()[0])
+        if number == sizes.rounds - 1:
+            variance = excess_variance(least_misfit(rounds), consistency, family.targets)
+            residuals = residuals.divided_by(sqrt(variance))
+            spread = softmax(rounds[0].misfit * -0.5 / variance, axis=1)
+            moments = where(variance > one, _moments(first_samples, spread), moments)
+        floored = moments + np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
+        proposal = cholesky_columns(floored, unknowns) @ draws.others
         unbounded, current = _adapted_round(family, residuals, proposal, draws)
-        count = sizes.adapted
         rounds.append(current)
-    # The last round keeps its weight even if it had to be tempered: too wide an interval is safer
-    # than one that rests on a few samples.
-    power = tempering_power(current.boxed_log_weight)
-    weights = tempered_weights(current.log_weight, power)
-    pooled_weights.append(weights_by_effective_size(weights))
-    pooled = concat(pooled_weights, axis=1)
+        samples = _with_ones(unbounded, current, unknowns, sizes.adapted)
+        count += sizes.adapted
     points = concat([r.points for r in rounds], axis=1)
-    normalised = pooled / pooled.sum(keepdims=True)
+    misfit = minimum(least_misfit(rounds[:-1]), least_misfit(rounds[-1:]) * variance)
+    # the rounds before the last are samples of the posterior with the noise as it was given
+    weights = pooled_weights(rounds, floor(one / variance))
+    return WeightedSample(points, weights, misfit, count, residuals.order)
+
+
+def _with_ones(unbounded: Value, current: WeightedRound, unknowns: int, count: int) -> Value:
+    """1, the unbounded other coordinates and the solved one of a round, (1 + p, n)."""
+    solved = current.points.take([unknowns], axis=0)
+    ones = constant(unbounded.graph, np.ones((1, count)))
+    return concat([ones, unbounded, solved], axis=0)
+
+
+def _moments(samples: Value, weights: Value) -> Value:
+    """Second moments (1 + p, 1 + p) of weighted samples."""
+    return gemm(samples * weights, samples, transpose_b=True)
+
+
+def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:
+    """Weights (1, n) of the points of all rounds, in proportion to effective sample sizes, sum 1.
+
+    The last round keeps its weight even if it had to be tempered: too wide an interval is safer
+    than one that rests on a few samples. Weights of the others are multiplied by `of_earlier`.
+    """
+    parts = []
+    for earlier in rounds[:-1]:
+        weights, power = earlier.tempered_weights()
+        parts.append(weights_by_effective_size(weights, power) * of_earlier)
+    parts.append(weights_by_effective_size(rounds[-1].tempered_weights()[0]))
+    pooled = concat(parts, axis=1)
+    return pooled / pooled.sum(keepdims=True)
+
+
+def least_misfit(rounds: list[WeightedRound]) -> Value:
+    """The least sum of squared residuals of all points, (1,)."""
     misfits = concat([r.misfit for r in rounds], axis=1)
-    return WeightedSample(
-        points,
-        normalised,
-        misfits.reduce("ReduceMin", keepdims=False).reshape(1),
-        sizes.prior + sizes.rounds * sizes.adapted,
-        residuals.order,
-    )
+    return misfits.reduce("ReduceMin", keepdims=False).reshape(1)
+
+
+def excess_variance(misfit: Value, consistency: Consistency, unknowns: int) -> Value:
+    r"""Variance of the residuals over that of the noise: 1 if the misfit is within its limit, (1,).
+
+    .. math:: \tau = \chi^2 / q
+
+    beyond the limit, with q unknowns. What no soil explains is an error of the model or of a
+    sensor, which neighbouring rows have in common: it does not average out. The error that the
+    soil did explain, in q directions, is assumed to be as large as the one that is left.
+    """
+    one = constant(misfit.graph, np.ones(1))
+    return where(misfit > consistency.limit, misfit / float(unknowns), one)
 
 
 def _prior_round(
@@ -139,6 +206,12 @@ def _prior_round(
     for _ in range(PRIOR_STEPS - 1):
         mode, precision = residuals.step(others, mode, len(draws.t))
     return sample_round(residuals, family.axes, others, (mode, precision), draws)
+
+
+def _mean_basis(residuals: PolynomialResiduals, first: WeightedRound) -> Value:
+    """Monomials (terms, 1) of the mean of a round, in standardised coordinates."""
+    weights, _ = first.tempered_weights()
+    return residuals.basis(gemm(first.points, weights, transpose_b=True))
 
 
 def _adapted_round(

@@ -40,6 +40,19 @@ class WeightedRound:
     boxed_log_weight: Value  # (1, n) of the points as limited to the box
     log_weight: Value  # (1, n) vanishing weight for samples outside of the box
     misfit: Value  # (1, n) sum of squared residuals
+    basis: Value  # (terms, n) monomials of the points
+
+    def tempered_weights(self) -> tuple[Value, Value]:
+        """Weights (1, n) of a power of the density that several samples share, and that power."""
+        power = tempering_power(self.boxed_log_weight)
+        return tempered_weights(self.log_weight, power), power
+
+    def reweighed(self, residuals: PolynomialResiduals) -> WeightedRound:
+        """The same points with the weights of another system of residuals."""
+        misfit = residuals.squared_norm(self.basis)
+        change = (self.misfit - misfit) * 0.5
+        boxed = self.boxed_log_weight + change
+        return WeightedRound(self.points, boxed, self.log_weight + change, misfit, self.basis)
 
 
 def sample_round(
@@ -80,7 +93,8 @@ def sample_round(
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
     unlimited = concat([ones, others, proposed], axis=0)
     points = within_box(unlimited)
-    misfit = residuals.squared_norm(points)
+    basis = residuals.basis(points)
+    misfit = residuals.squared_norm(basis)
     distance = (unlimited - points).reduce("ReduceL1", axis=0, keepdims=True)
     # one matrix product adds up the parts of the log weight, with these coefficients
     parts = [
@@ -98,7 +112,7 @@ def sample_round(
         -draws.log_density,
     )
     boxed_log_weight, log_weight = both.split(2, axis=0)
-    return WeightedRound(points, boxed_log_weight, log_weight, misfit)
+    return WeightedRound(points, boxed_log_weight, log_weight, misfit, basis)
 
 
 def tempering_power(log_weight: Value) -> Value:

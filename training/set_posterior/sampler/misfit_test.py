@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.sampler.importance_sampler import WeightedSample
 
 Floats = NDArray[np.float64]
 
@@ -29,20 +28,28 @@ class MisfitLimits:
     misfit: Floats
 
 
-def add_consistency_test(sample: WeightedSample, counts: Value, limits: MisfitLimits) -> Value:
-    """Whether the set is in range, and one soil explains its readings, (1, 1).
+@dataclass(frozen=True)
+class Consistency:
+    """Limits of a set's misfit, and what must hold of its rows, each (1,)."""
 
-    The least misfit of the samples is compared with a limit, which is linear in the logarithm of
-    the number of readings between the calibrated numbers.
+    limit: Value  # largest misfit of sound sets
+    degrees: Value  # degrees of freedom of the misfit
+    enough: Value  # bool: whether there are readings, and few rows out of range
+
+
+def add_consistency(counts: Value, limits: MisfitLimits, unknowns: int) -> Consistency:
+    """What a set of so many readings must satisfy.
+
+    The limit is linear in the logarithm of the number of readings between the calibrated numbers.
 
     Parameters
     ----------
-    sample : WeightedSample
-        The sample with its least misfit.
     counts : Value
         Readings in the system, rows, and rows in range, (3,).
     limits : MisfitLimits
         The limits.
+    unknowns : int
+        Number of estimated unknowns.
     """
     readings, rows, rows_in_range = counts.split([1, 1, 1], axis=0)
     knots = np.log(limits.readings)
@@ -53,7 +60,7 @@ def add_consistency_test(sample: WeightedSample, counts: Value, limits: MisfitLi
     interpolated = (passed * slopes).sum(keepdims=False).reshape(1) + limits.misfit[:1]
     beyond = maximum(readings - limits.readings[-1], 0.0)
     limit: Value = interpolated + beyond * (1.0 + CHI_SQUARED_MARGIN / np.sqrt(limits.readings[-1]))
-    fits: Value = sample.misfit <= limit
     enough_in_range = rows_in_range >= rows * LEAST_SHARE_IN_RANGE
     any_reading = readings > 0.5  # a count in float32
-    return (fits & enough_in_range & any_reading).reshape(1, 1)
+    degrees = maximum(readings - float(unknowns), 1.0)
+    return Consistency(limit, degrees, enough_in_range & any_reading)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import mul
 
@@ -37,12 +37,19 @@ class PolynomialResiduals:
     order: tuple[int, ...]
 
     @staticmethod
-    def of(family: WheelFamily, response: Response, system: Value) -> PolynomialResiduals:
-        """Of a system of standardised coordinates; solved for the friction angle if it is unknown.
+    def of(
+        family: WheelFamily,
+        response: Response,
+        nearly_known: NearlyKnown | None,
+        system: Value,
+    ) -> PolynomialResiduals:
+        """Of a system (m, terms); solved for the friction angle if it is unknown.
 
         Torque follows the friction angle almost linearly, so that one Gauss-Newton step comes
         close.
         """
+        if nearly_known is not None:
+            system = nearly_known.standardised(system)
         names = [axis.name for axis in family.axes]
         solved = names.index("friction_angle") if "friction_angle" in names else 0
         order = (*(i for i in range(len(names)) if i != solved), solved)
@@ -50,9 +57,13 @@ class PolynomialResiduals:
         with_derivative = system @ np.stack([np.eye(len(slope)), slope])
         return PolynomialResiduals(system, with_derivative, response.terms, order)
 
-    def squared_norm(self, points: Value) -> Value:
-        """The misfit |A b(x)|^2 (1, n), which is -2 log likelihood up to a constant."""
-        return (self.system @ self._basis(points)).sum_of_squares(axis=0, keepdims=True)
+    def divided_by(self, std: Value) -> PolynomialResiduals:
+        """The same residuals for noise whose standard deviation is larger by a factor (1,)."""
+        return replace(self, system=self.system / std, with_derivative=self.with_derivative / std)
+
+    def squared_norm(self, basis: Value) -> Value:
+        """The misfit |A b|^2 (1, n), which is -2 log likelihood up to a constant."""
+        return (self.system @ basis).sum_of_squares(axis=0, keepdims=True)
 
     def at_fixed_points(self, points: Floats) -> tuple[Value, Value]:
         """Residuals and their derivative (1, m, n) at fixed coordinates (p, n), in this order."""
@@ -64,10 +75,10 @@ class PolynomialResiduals:
         """The solved coordinate after a Gauss-Newton step, and its precision, (1, n) each."""
         ones = constant(solved.graph, np.ones((1, count)))
         points = within_box(concat([ones, others, solved], axis=0))
-        residual, slope = (self.with_derivative @ self._basis(points)).split(2, axis=0)
+        residual, slope = (self.with_derivative @ self.basis(points)).split(2, axis=0)
         return gauss_newton(solved, residual, slope)
 
-    def _basis(self, points: Value) -> Value:
+    def basis(self, points: Value) -> Value:
         """Monomials (terms, n) at points (1 + p, n), as products of pairs of coordinates."""
         row_of = [0, *(1 + self.order.index(i) for i in range(len(self.order)))]
         factors = pair_factors(self.terms)
@@ -104,23 +115,36 @@ def within_box(x: Value) -> Value:
     return x.clip(-1.0, 1.0)
 
 
-def standardised_system(
-    family: WheelFamily, response: Response, context: ContextValues, system: Value
-) -> Value:
-    r"""The system (m, terms) in standardised coordinates, with their normal prior as further rows.
+@dataclass(frozen=True)
+class NearlyKnown:
+    r"""Standardised coordinates of nearly known unknowns, which have a normal prior.
 
     With :math:`z = x / (c \sigma)`, c the truncation in standard deviations, the coefficient of a
     monomial is multiplied by :math:`(c \sigma)^k` for its power k of the coordinate, and the prior
     is the residual :math:`c z`. All coordinates then lie between -1 and 1.
     """
-    unknowns, free, terms = len(family.axes), family.free, response.terms
-    if free == unknowns:
-        return system
-    powers = np.asarray([[term.count(axis) for term in terms] for axis in range(1, unknowns + 1)])
-    powers[:free] = 0
-    log_std = log(context.axis_std * NORMAL_TRUNCATION)
-    factors = exp(gemm(log_std, powers, transpose_a=True))
-    padding = (0,) * (len(terms[0]) - 1)
-    linear = [terms.index((*padding, axis)) for axis in range(free + 1, unknowns + 1)]
-    prior = constant(system.graph, NORMAL_TRUNCATION * np.eye(len(terms))[linear])
-    return concat([system * factors, prior], axis=0)
+
+    factors: Value  # (1, terms)
+    prior: Floats  # (nearly known unknowns, terms) residuals
+
+    @staticmethod
+    def of(family: WheelFamily, response: Response, context: ContextValues) -> NearlyKnown | None:
+        """Of a family; None where nothing is nearly known."""
+        unknowns, free, terms = len(family.axes), family.free, response.terms
+        if free == unknowns:
+            return None
+        powers = np.asarray(
+            [[term.count(axis) for term in terms] for axis in range(1, unknowns + 1)]
+        )
+        powers[:free] = 0
+        log_std = log(context.axis_std * NORMAL_TRUNCATION)
+        padding = (0,) * (len(terms[0]) - 1)
+        linear = [terms.index((*padding, axis)) for axis in range(free + 1, unknowns + 1)]
+        return NearlyKnown(
+            exp(gemm(log_std, powers, transpose_a=True)),
+            NORMAL_TRUNCATION * np.eye(len(terms))[linear],
+        )
+
+    def standardised(self, system: Value) -> Value:
+        """A system (m, terms) in standardised coordinates, with the prior as further rows."""
+        return concat([system * self.factors, constant(system.graph, self.prior)], axis=0)

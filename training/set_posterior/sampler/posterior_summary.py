@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.onboard.estimate import EDGE_STDS
 from soilml.onboard.set_contract import SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, sqrt, where
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.sampler.credible_interval import INTERVAL, add_standardised_quantiles
 from training.set_posterior.sampler.importance_sampler import WeightedSample
-from training.set_posterior.sampler.misfit_test import MisfitLimits, add_consistency_test
+from training.set_posterior.sampler.misfit_test import Consistency
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +26,7 @@ def add_posterior_outputs(
     family: WheelFamily,
     context: ContextValues,
     sample: WeightedSample,
-    counts: Value,
-    limits: MisfitLimits,
+    consistency: Consistency,
     prefix: str,
 ) -> None:
     r"""Add the outputs, each named `<prefix>set_<name>`, from the moments of the weighted sample.
@@ -34,7 +34,8 @@ def add_posterior_outputs(
     .. math:: \mu = \sum_i w_i \theta_i, \qquad
         \Sigma = \sum_i w_i (\theta_i - \mu) (\theta_i - \mu)^T
 
-    A set that is not in range, or whose readings no soil explains, gets the prior.
+    A set without enough rows in range gets the prior. Of a set that no soil explains, the sample
+    is that with the noise that explains it, and the flag is false.
     """
     q = family.targets
     value = _parameters(family, sample)
@@ -45,21 +46,31 @@ def add_posterior_outputs(
     std = sqrt(variance)
     quantiles = add_standardised_quantiles(deviation / std, sample.weights, sample.count)
     interval = mean + std * quantiles
-    consistent = add_consistency_test(sample, counts, limits)
+    enough = consistency.enough.reshape(1, 1)
+    consistent = enough & (sample.misfit <= consistency.limit).reshape(1, 1)
     prior = prior_summary(family)
     names = ("mean", "std", "low", "high")
     estimated = concat([mean, std, interval], axis=1)  # (q, 4)
     fallback = np.stack([prior[name] for name in names], axis=1)
-    chosen = where(consistent, estimated, fallback) * context.target_scale
+    chosen = where(enough, estimated, fallback) * context.target_scale
     for name, column in zip(names, chosen.split(4, axis=1), strict=True):
         column.reshape(q).named(f"{prefix}{SET_PREFIX}{name}")
     scales = gemm(context.target_scale, context.target_scale, transpose_b=True)
-    chosen = where(consistent, covariance, np.diag(prior["std"] ** 2))
+    chosen = where(enough, covariance, np.diag(prior["std"] ** 2))
     (chosen * scales).named(f"{prefix}{SET_PREFIX}covariance")
     consistent.reshape(1).named(f"{prefix}{SET_PREFIX}in_range")
+    _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]
     (vague | ~consistent).reshape(q).named(f"{prefix}{SET_PREFIX}abstains")
     sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
+
+
+def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
+    """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
+    ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
+    margin = std * EDGE_STDS
+    low, high = mean - margin < ends[:, :1], mean + margin > ends[:, 1:]
+    return (low | high).reshape(family.targets)
 
 
 def prior_summary(family: WheelFamily) -> dict[str, Floats]:

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from soilml.onboard.set_contract import (
+    ERROR_COLUMNS,
+    OPERATING_NOISE,
+    OPERATING_STD_INPUTS,
+    RESPONSE_CHANNELS,
+)
 from training.onnx_graph.value import Value, absolute, concat, constant, gemm, log, maximum, sqrt
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
@@ -15,31 +20,63 @@ from training.set_posterior.families.wheel_family import (
     WheelFamily,
 )
 from training.set_posterior.response_surface import Response
+from training.set_posterior.sampler.sensor_errors import (
+    SensorErrors,
+    add_sensor_errors,
+    whiten_rows,
+)
 
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
 BOX_TOLERANCE = 1e-3
+#: Rows that are out of range by up to so many standard deviations of slip or load are left out, but
+#: do not count against the set.
+NOISE_MARGIN = 3.0
 #: Drawbar pull over load, which has no logarithm, may have any noise; absent readings have far
 #: more.
 MOST_PULL_NOISE = 1e3
 
 
 @dataclass(frozen=True)
-class ResidualSystem:
+class ResidualRows:
     """Residuals of a set's readings, linear in the monomials of the unknowns.
 
-    A row of the system is (a w, w g): the coefficients a of a channel's polynomial less the
-    reading, over the standard deviation 1 / w of the noise, and the change of that residual with
-    one standard deviation of the torque sensor's bias.
+    A row of the system is (w a, w g): the coefficients a of a channel's polynomial less the
+    reading, over the standard deviation 1 / w of the noise, and the changes g of that residual with
+    one standard deviation of each error that all rows share, in the order of `ERROR_COLUMNS`.
     """
 
-    system: Value  # (readings, terms + 1)
+    terms: int
+    residuals: Value  # (channels, rows, terms) without weights
+    weight: Value  # (channels, rows, 1), 0 for readings that are left out
+    used: Value  # (channels * rows,) whether a reading takes part
+    errors: SensorErrors
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
-    counts: Value  # (3,) float32: readings in the system, rows, rows in range
+    counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
+
+    def system_at(self, basis: Value | None) -> Value:
+        r"""The system (readings, terms + errors), with errors of slip and load linear at one soil.
+
+        Errors of a row's slip and load are part of all its channels. With d the changes of its
+        weighted residuals with one standard deviation of such an error, their covariance is
+        :math:`I + \sum d d^T`, by which the row is whitened.
+
+        Parameters
+        ----------
+        basis : Value or None
+            Monomials (terms, 1) of the soil at which the residuals' derivatives by slip and load
+            are taken; None is the middle of the prior's range.
+        """
+        common, of_row = self.errors.columns_at(basis)
+        system = concat([self.residuals, common, of_row], axis=2) * self.weight
+        columns = self.terms + len(ERROR_COLUMNS)
+        of_each = len(OPERATING_STD_INPUTS)
+        whitened = whiten_rows(system, columns + of_each, of_each)
+        return whitened.reshape(-1, columns).node("Compress", self.used, axis=0)
 
 
-def add_residual_system(
+def add_residual_rows(
     family: WheelFamily, response: Response, readings: dict[str, Value]
-) -> tuple[ContextValues, ResidualSystem]:
+) -> tuple[ContextValues, ResidualRows]:
     r"""Residuals of the three channels of each row, as polynomials of the unknowns.
 
     .. math:: e_k(x) = \frac{\sum_j a_{kj} b_j(x) - y_k}{\sqrt{\sigma_k^2 + \epsilon_k^2}}
@@ -62,56 +99,56 @@ def add_residual_system(
     used = (noise < most_noise) & in_range
     used_float = used.astype(np.float32)
     weight = used_float / sqrt(noise * noise + response.error[:, None] ** 2)
-    torque_only = np.asarray([[1.0], [0.0], [0.0]])
-    bias = readings["torque_bias"] * context.torque_slope * torque_only
-    # -y is added to the constant term, the first; the bias fills the last column, which is 0
-    y_and_bias = concat([y, bias], axis=0).reshape(2, -1)
-    columns = np.zeros((2, len(response.terms) + 1))
-    columns[0, 0], columns[1, -1] = -1.0, 1.0
-    coefficients = response.add_coefficients(context.features)
-    residuals = gemm(y_and_bias, columns, coefficients, transpose_a=True)
-    weighted = residuals * weight.reshape(-1, 1)
-    system = weighted.node("Compress", used.reshape(-1), axis=0)
+    values = response.add_to(context.features, context.feature_slopes)
+    # -y is added to the constant term, the first
+    first = np.zeros(len(response.terms))
+    first[0] = 1.0
+    channels = len(RESPONSE_CHANNELS)
+    residuals = values.coefficients - y.reshape(channels, -1, 1) * first
     counts = [
         used_float.sum().reshape(1),
         in_range.node("Shape").astype(np.float32),
-        in_range.astype(np.float32).sum(),
+        _within_noise(response, context, readings).astype(np.float32).sum(),
     ]
-    return context, ResidualSystem(system, in_range, concat(counts, axis=0))
+    return context, ResidualRows(
+        len(response.terms),
+        residuals,
+        weight.reshape(channels, -1, 1),
+        used.reshape(-1),
+        add_sensor_errors(context, values, readings, slope, y),
+        in_range,
+        concat(counts, axis=0),
+    )
 
 
-def _in_range(response: Response, features: Value) -> Value:
-    """Whether features (rows, f) lie in the box of the designs of the response surface, (rows,)."""
+def _in_range(response: Response, features: Value, margin: Value | float = 0.0) -> Value:
+    """Whether features (rows, f) lie in the box of the designs of the response surface, (rows,).
+
+    Features that are not numbers, of a wheel without size, do not. The box is enlarged by a margin
+    (rows, f) on each side.
+    """
     tolerance = BOX_TOLERANCE * (response.upper - response.lower)
     middle = 0.5 * (response.upper + response.lower)
     half_width = 0.5 * (response.upper - response.lower)
-    outside = absolute(features - middle) > half_width + tolerance
-    any_outside = outside.astype(np.int32).reduce("ReduceMax", axis=1, keepdims=False)
-    return ~any_outside.astype(np.bool_)
+    inside = absolute(features - middle) - margin <= half_width + tolerance
+    all_inside = inside.astype(np.int32).reduce("ReduceMin", axis=1, keepdims=False)
+    return all_inside.astype(np.bool_)
 
 
-def integrate_out_bias(system: Value, terms: int) -> Value:
-    r"""The system (m, terms) with the bias of the torque sensor integrated out.
+def _within_noise(response: Response, context: ContextValues, readings: dict[str, Value]) -> Value:
+    """Whether rows are in range, or out of it by no more than the noise of slip and load, (rows,).
 
-    The bias has a normal prior with standard deviation 1 in units of g, so that the covariance of
-    the residuals is I + g g^T. The system is whitened by its symmetric square root S:
-
-    .. math:: I + g g^T = S S^T, \qquad A' = S^{-1} A = A - \frac{g}{\kappa} (g^T A), \qquad
-        \kappa = 1 + g^T g + (1 + g^T g)^{1/2}
-
-    Parameters
-    ----------
-    system : Value
-        Rows (a w, w g), (m, terms + 1).
-    terms : int
-        Number of monomials.
+    Readings of a slip at the end of the range are out of it in half of all cases.
     """
-    one = constant(system.graph, 1.0)
-    a, g = system.split([terms, 1], axis=1)
-    determinant = g.sum_of_squares(keepdims=True) + one
-    kappa = determinant + sqrt(determinant)
-    projection = gemm(g, a, transpose_a=True)
-    return gemm(g / kappa, projection, a, alpha=-1.0)
+    noise = concat(
+        [
+            readings[std] / maximum(readings[name], SMALLEST)
+            for std, name in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True)
+        ],
+        axis=0,
+    ).reshape(len(OPERATING_STD_INPUTS), -1)
+    margin = gemm(noise, NOISE_MARGIN * np.abs(context.feature_slopes), transpose_a=True)
+    return _in_range(response, context.features, margin)
 
 
 def _channel_rows(values: list[Value]) -> Value:

@@ -10,7 +10,6 @@ import pytest
 
 from soilml import Model, Wheel, soil
 from soilml.config.case import Case
-from soilml.gap.html import formatting
 from soilml.gap.html.page import page
 from soilml.gap.html.prediction_curves import MOST_RUNS, select_runs
 from soilml.gap.report_parts import (
@@ -290,24 +289,3 @@ def test_shown_runs_cover_all_loads():
     assert many[0].load == 40.0 and many[-1].load == 190.0
     assert len({run.colour for run in many}) == MOST_RUNS
     assert len(select_runs(curves(runs=1))) == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "std", "text"),
-    [
-        (1406.28, 11.8, "1406 ± 12"),
-        (-0.0071228, 2.9e-5, "(−7.123 ± 0.029) × 10⁻³"),
-        (1343631.0, 170762.0, "(1.34 ± 0.17) × 10⁶"),
-        (0.5, 0.0, "0.5000"),
-    ],
-)
-def test_values_are_rounded_to_their_standard_deviation(value, std, text):
-    assert formatting.format_with_std(value, std) == text
-
-
-@pytest.mark.parametrize(
-    ("x", "text"),
-    [(320.18, "320"), (0.0, "0.00"), (3311.0, "3311"), (1.2e7, "1.20 × 10⁷"), (-0.05, "−0.0500")],
-)
-def test_numbers_have_three_significant_digits(x, text):
-    assert formatting.format_number(x) == text

@@ -98,8 +98,18 @@ def test_slip_from_a_wrong_speed_is_mended(error):
 def test_mended_slip_stays_a_slip(error):
     most = 1.0 - 1e-9
     at = Operating(slip=np.asarray([-most, most]), load=60.0)
-    mended = EFFECTS["slip-scale"](error=error).on_operating(at, None)
-    assert (np.abs(mended.slip) <= most).all()
+    for effect in (EFFECTS["slip-scale"](error=error), EFFECTS["slip-offset"](offset=error)):
+        assert (np.abs(effect.on_operating(at, None).slip) <= most).all()
+
+
+def test_a_slip_that_is_off_by_a_constant_is_mended():
+    true, off = np.asarray([-0.4, 0.0, 0.1, 0.8]), 0.03
+    reported = Operating(slip=true + off, load=60.0)
+    model = WHEEL + EFFECTS["slip-offset"](offset=off)
+    expected = WHEEL(SAND, Operating(slip=true, load=60.0))
+    found = model(SAND, reported)
+    for channel in CHANNELS:
+        np.testing.assert_allclose(getattr(found, channel), getattr(expected, channel), rtol=1e-12)
 
 
 def test_stresses_are_those_of_the_true_sinkage_whatever_the_sensor_says():

@@ -1,0 +1,191 @@
+"""Exported C files beside onnxruntime: memory, latency, differences of the answers."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from board import OUTPUTS, _reading, _readings, _timed
+from compiled_c import COMPILERS, ROOT, CompiledModel, compile_library
+from simulated_rows import context_of, rows_of
+
+from datagen.recipe import read_recipe
+from soilml import Estimator
+from soilml.cli import main
+from soilml.identification.trained_estimator import for_simulated_case
+from soilml.onboard.set_contract import MEMORY_OUTPUTS, SET_OUTPUTS, SET_PREFIX
+
+FILES = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel", "kls1_wheel")
+FLAGS = ("-O3", "-march=native")
+CALLS, SETS, STREAMS = 2000, 1000, 20
+NAMES = ("mean", "std", "low", "high")
+
+
+def c_export(folder: Path) -> str:
+    """Tables of memory, latency and differences; one line where there is no C compiler."""
+    if not COMPILERS:
+        return "No C compiler on this machine."
+    models = {name: exported(name, folder) for name in FILES}
+    version = subprocess.run([COMPILERS[0], "--version"], capture_output=True, text=True).stdout
+    head = f"Compiled by {version.splitlines()[0]}, `{' '.join(FLAGS)}`."
+    return "\n\n".join(
+        [head, memory_table(models), latency_table(models), differences_table(models)]
+    )
+
+
+def exported(name: str, folder: Path) -> CompiledModel:
+    """A released file as compiled C."""
+    source = folder / f"{name}.c"
+    if main(["export-c", str(ROOT / "exported" / f"{name}.onnx"), str(source)]):
+        sys.exit(f"{name}.onnx cannot be exported")
+    library = compile_library(source, folder / f"{name}.so", COMPILERS[0], *FLAGS)
+    return CompiledModel(folder / f"{name}.h", library)
+
+
+def memory_table(models: dict[str, CompiledModel]) -> str:
+    """Bytes that a program needs, as the headers state them."""
+    lines = [
+        "| file | constants, kB | memory of a set, kB | working memory of a call, kB |",
+        "|---|---:|---:|---:|",
+    ]
+    for name, model in models.items():
+        parts = (model.numbers.get(f"{name.upper()}_{part}_BYTES") for part in
+                 ("CONSTANT", "MEMORY", "WORK"))  # fmt: skip
+        cells = ("" if part is None else f"{part / 1e3:.1f}" for part in parts)
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def latency_table(models: dict[str, CompiledModel]) -> str:
+    """Median and 99th percentile (us) of the same work in onnxruntime and in C."""
+    lines = [
+        "Microseconds, median and 99th percentile. *Step*: one more row and the answer, by the "
+        "rows in the memory. C is called through ctypes, which adds about one microsecond.",
+        "",
+        "| file | what | onnxruntime | p99 | C | p99 |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    case = read_recipe("wheel").case
+    for name, model in models.items():
+        estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), case)
+        for what, by_runtime, by_c in _tasks(name, model, estimator):
+            times = (*_timed(by_runtime, CALLS), *_timed(by_c, CALLS))
+            lines.append(f"| {name} | {what} | {' | '.join(f'{t:.0f}' for t in times)} |")
+    return "\n".join(lines)
+
+
+def _tasks(name, model, estimator):  # type: ignore[no-untyped-def]
+    """What is timed: a name, a call of onnxruntime, and a call of the C library."""
+    library, reference = model.library, ctypes.byref
+    session, work = estimator.session, reference(model.work)
+    sets = estimator.sets
+    if not (sets and sets.sets_only):
+        feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
+        row, estimate = model.row(**_reading()), model.new("estimate")
+        single = getattr(library, f"{name}_single")
+        arguments = reference(row), reference(estimate), work
+        yield "one reading", lambda: session.run(OUTPUTS, feed), lambda: single(*arguments)
+    if sets is None or name == "kls1_wheel":  # the rows are of another wheel
+        return
+    names = [*(SET_PREFIX + output for output in SET_OUTPUTS), *MEMORY_OUTPUTS]
+    update = getattr(library, f"{name}_set_update")
+    found, many = model.new("set_estimate"), _readings()
+    for what, before, count in (("set of 16", 0, 16), ("step at 8", 8, 1), ("step at 200", 200, 1)):
+        rows = {k: np.resize(v, before + count).astype(np.float32) for k, v in many.items()}
+        own, memory = model.start(**sets.context_values), estimator.start()
+        for first in range(0, before, 16):
+            part = {k: v[first : min(first + 16, before)] for k, v in rows.items()}
+            model.step(own, model.rows(**part))
+            _, memory = estimator.step(memory, **part)
+        new = {k: v[before:] for k, v in rows.items()}
+        feed = sets.feed(sets.rows(new), memory.packed())
+        given, kept = model.rows(**new), bytes(own)
+
+        def by_c(own=own, given=given, kept=kept, count=count):  # type: ignore[no-untyped-def]
+            ctypes.memmove(reference(own), kept, len(kept))
+            update(reference(own), given, count, None, reference(found), work)
+
+        yield what, lambda feed=feed: session.run(names, feed), by_c
+
+
+def differences_table(models: dict[str, CompiledModel]) -> str:
+    """Differences of answers: C from onnxruntime, and onnxruntime from itself in another order."""
+    lines = [
+        "Differences in standard deviations of the answer, largest of the three quantities: sets "
+        f"of 1 to 32 rows with absent channels ({SETS} sets), and streams of 300 rows in steps of "
+        f"1 to 32 ({STREAMS} streams). Beside them those of onnxruntime from itself, with the rows "
+        "in another order: rounding alone. *Flags*: sets whose `in_range` differs.",
+        "",
+        "| file | rows | of | median | 99 of 100 | largest | flags | rounding: median | 99 of 100 "
+        "| largest |",
+        "|---|---|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name in ("wheel", "any_wheel"):
+        for kind, compare, count in (("sets", _one_set, SETS), ("streams", _one_stream, STREAMS)):
+            rng = np.random.default_rng(11)
+            plain = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+            found = [compare(name, models[name], plain, rng) for _ in range(count)]
+            parts = [part for part in found if part is not None]
+            flags = sum(part[2] for part in parts)
+            for what, columns in (("mean, std", slice(0, 2)), ("ends", slice(2, 4))):
+                sides = [np.array([part[side][columns].max() for part in parts]) for side in (0, 1)]
+                cells = [f"{np.quantile(s, q):.0e}" for s in sides for q in (0.5, 0.99, 1.0)]
+                lines.append(
+                    f"| {name} | {kind} | {what} | {' | '.join(cells[:3])} | {flags} "
+                    f"| {' | '.join(cells[3:])} |"
+                )
+    return "\n".join(lines)
+
+
+def _simulated(name, rng, count):  # type: ignore[no-untyped-def]
+    context = context_of(rng) if name == "any_wheel" else {}
+    rows = rows_of(rng, count, context or None)
+    good = all(np.isfinite(rows[k]).all() for k in ("slip", "torque", "load"))
+    return context, rows if good else None
+
+
+def _one_set(name, model, plain, rng):  # type: ignore[no-untyped-def]
+    """Differences of C and of another order, (4,) each, and whether flags differ."""
+    context, rows = _simulated(name, rng, int(rng.integers(1, 33)))
+    if rows is None:
+        return None
+    estimator = plain.on(**context) if context else plain
+    order = rng.permutation(len(rows["slip"]))
+    expected, _ = estimator.step(estimator.start(), **rows)
+    other, _ = estimator.step(estimator.start(), **{k: v[order] for k, v in rows.items()})
+    own = model.start(**context)
+    model.step(own, model.rows(**rows))
+    _, answer = model.answer(own)
+    rounding = _difference({k: getattr(other, k) for k in NAMES}, expected)
+    return _difference(answer, expected), rounding, answer["in_range"] != bool(expected.in_range)
+
+
+def _one_stream(name, model, plain, rng):  # type: ignore[no-untyped-def]
+    """The same for a stream, whose other order is the whole stream reversed."""
+    context, rows = _simulated(name, rng, 300)
+    if rows is None:
+        return None
+    estimator = plain.on(**context) if context else plain
+    own, memory, first = model.start(**context), estimator.start(), 0
+    while first < 300:
+        count = int(rng.integers(1, 33))
+        part = {k: v[first : first + count] for k, v in rows.items()}
+        expected, memory = estimator.step(memory, **part)
+        model.step(own, model.rows(**part))
+        first += count
+    _, answer = model.answer(own)
+    other, _ = estimator.step(estimator.start(), **{k: v[::-1] for k, v in rows.items()})
+    rounding = _difference({k: getattr(other, k) for k in NAMES}, expected)
+    return _difference(answer, expected), rounding, answer["in_range"] != bool(expected.in_range)
+
+
+def _difference(answer, expected):  # type: ignore[no-untyped-def]
+    return np.array(
+        [np.max(np.abs(answer[k] - getattr(expected, k)) / expected.std) for k in NAMES]
+    )

@@ -1,0 +1,199 @@
+"""Intervals of a model file where sensors and model are wrong: `python bench/run.py model-errors`.
+
+`python bench/model_errors.py [FILE]` prints the tables of one file for the wheel of the recipe
+`wheel`. Sets are simulated by the reference wheel of blind sets, which shares no code with the
+package that the file was trained with.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from benchmarks_file import ROOT
+from wrong_worlds import (
+    NOISE_OF_LOAD,
+    NOISE_OF_SLIP,
+    WORLDS,
+    SimulatedDrives,
+    World,
+    simulate,
+)
+
+from soilml import Estimator
+from soilml.onboard.estimate import Estimate
+from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: Soils of each line, rows of each set, and the seed of both.
+SETS, ROWS, SEED = 100, 16, 1
+#: Sensors that are exact, as files took them before they knew of errors.
+EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+#: Nominal coverage of the intervals.
+COVERAGE = 0.9
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Answers to the sets of one line: intervals (sets, q) in widths of the prior."""
+
+    covered: Floats
+    width: Floats
+    score: Floats
+    error: Floats
+    refused: Floats  # (sets,) bool
+
+    @staticmethod
+    def of(estimates: Sequence[Estimate], truth: Floats) -> Scores:
+        r"""Scores of estimates.
+
+        The score of an interval (l, u) for a value x, which is least in expectation for the
+        quantiles of the true distribution, is
+
+        .. math:: (u - l) + \frac{2}{\alpha} \left[(l - x)_+ + (x - u)_+\right], \qquad
+            \alpha = 0.1
+
+        Source: Gneiting and Raftery, J. American Statistical Association 102, 2007, section 6.2.
+        """
+        prior_std = estimates[0].prior_std
+        low, high, mean = (
+            np.stack([getattr(e, key) for e in estimates]) for key in ("low", "high", "mean")
+        )
+        outside = np.maximum(low - truth, 0.0) + np.maximum(truth - high, 0.0)
+        return Scores(
+            covered=((truth >= low) & (truth <= high)).astype(float),
+            width=(high - low) / prior_std,
+            score=(high - low + 2.0 / (1.0 - COVERAGE) * outside) / prior_std,
+            error=(mean - truth) / prior_std,
+            refused=np.asarray([not e.in_range for e in estimates]),
+        )
+
+
+def answers(
+    estimator: Estimator, drives: SimulatedDrives, channels: Sequence[str], declared: World | None
+) -> list[Estimate]:
+    """Estimates of all sets; `declared` is the world whose noise of slip and load is known."""
+    found = []
+    for index in range(len(drives.truth)):
+        rows = {key: drives.readings[key][index] for key in ("slip", "load", *channels)}
+        if declared is not None:
+            rows["slip_std"] = np.full(ROWS, declared.slip_std)
+            rows["load_std"] = declared.load_std * rows["load"]
+        found.append(estimator.run(**rows))
+    return found
+
+
+def with_prior(estimates: Sequence[Estimate], estimator: Estimator) -> list[Estimate]:
+    """The estimates with the prior in the place of those that were refused."""
+    return [e if e.in_range else estimator.prior_estimate() for e in estimates]
+
+
+def lines_of(estimator: Estimator, world: World, channels: Sequence[str]) -> tuple[Scores, ...]:
+    """Scores with exact sensors and the prior for refused sets, and as the file answers."""
+    drives = simulate(world, SETS, ROWS, SEED)
+    before = with_prior(answers(estimator.on(**EXACT), drives, channels, None), estimator)
+    after = answers(estimator, drives, channels, world)
+    return Scores.of(before, drives.truth), Scores.of(after, drives.truth)
+
+
+def coverage_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
+    """A line for each world: coverage, refusals, interval score."""
+    lines = [
+        "| what is wrong | refused | 90 % of c, phi, K | score | now refused | 90 % | score |",
+        "|---|---:|---|---:|---:|---|---:|",
+    ]
+    for world in worlds:
+        cells = []
+        for scores in lines_of(estimator, world, channels):
+            covered = " / ".join(f"{100 * share:.0f}" for share in scores.covered.mean(axis=0))
+            cells.append(f"{scores.refused.mean():.0%} | {covered} | {scores.score.mean():.2f}")
+        lines.append(f"| {world.name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def refused_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
+    """Of the sets that are refused: coverage, error and width, beside those of the prior."""
+    lines = [
+        "| what is wrong | refused | 90 % of c, phi, K | rms error | width | rms error of prior |",
+        "|---|---:|---|---|---|---|",
+    ]
+    for world in worlds:
+        drives = simulate(world, SETS, ROWS, SEED)
+        found = answers(estimator, drives, channels, None)
+        refused = np.flatnonzero([not e.in_range for e in found])
+        if not len(refused):
+            lines.append(f"| {world.name} | 0 | | | | |")
+            continue
+        truth = drives.truth[refused]
+        prior = Scores.of([estimator.prior_estimate()] * len(refused), truth)
+        own = Scores.of([found[i] for i in refused], truth)
+        covered = " / ".join(f"{100 * share:.0f}" for share in own.covered.mean(axis=0))
+        cells = [_rms(own.error), _each(own.width.mean(axis=0) / prior.width.mean(axis=0))]
+        cells.append(_rms(prior.error))
+        lines.append(f"| {world.name} | {len(refused)} | {covered} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def price_table(estimator: Estimator) -> str:
+    """Width of the intervals of sound sets with usual errors over that with exact sensors."""
+    drives = simulate(WORLDS[0], SETS, ROWS, SEED)
+    lines = ["| what may be wrong | torque: c, phi, K | all channels: c, phi, K |", "|---|---|---|"]
+    usual = estimator.sets.common_errors if estimator.sets else {}
+    cases = {f"{name} {std:g}": EXACT | {name: std} for name, std in usual.items()}
+    cases |= {"all of them": dict(usual)}
+    known = {c: _widths(estimator.on(**EXACT), drives, CHANNELS[c]) for c in CHANNELS}
+    for name, errors in cases.items():
+        given = estimator.on(**errors)
+        cells = [_each(_widths(given, drives, CHANNELS[c]) / known[c]) for c in CHANNELS]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+#: Channels that are measured.
+CHANNELS = {"torque": ("torque",), "all channels": ("torque", "sinkage", "drawbar_pull")}
+
+
+def _widths(estimator: Estimator, drives: SimulatedDrives, channels: Sequence[str]) -> Floats:
+    found = Scores.of(answers(estimator, drives, channels, None), drives.truth)
+    return np.asarray(found.width.mean(axis=0))
+
+
+def _rms(values: Floats) -> str:
+    return _each(np.sqrt(np.mean(values**2, axis=0)))
+
+
+def _each(values: Floats) -> str:
+    return " / ".join(f"{value:.2f}" for value in values)
+
+
+def tables(file: Path) -> str:
+    """All tables of a model file."""
+    estimator = Estimator.load(file)
+    parts = [
+        "### Width of sound sets with usual errors, over that with exact sensors",
+        price_table(estimator),
+    ]
+    for label, channels in CHANNELS.items():
+        parts += [
+            f"### Coverage and interval score, {label}",
+            coverage_table(estimator, WORLDS, channels),
+            f"### Refused sets, {label}",
+            refused_table(estimator, WORLDS[1:], channels),
+        ]
+    parts += [
+        "### Noise of slip and load that is declared, torque",
+        coverage_table(estimator, (*NOISE_OF_SLIP, *NOISE_OF_LOAD), CHANNELS["torque"]),
+    ]
+    return "\n\n".join(parts)
+
+
+if __name__ == "__main__":
+    print(tables(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "exported" / "wheel.onnx"))

@@ -1,0 +1,108 @@
+"""Drives of a wheel whose sensors or soil are not as its model file assumes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from datagen.blind_sets.catalogue import MECHANISMS
+from datagen.blind_sets.reference_wheel import solve_equilibrium
+from datagen.blind_sets.wheel_state import WheelState
+from datagen.recipe import read_recipe
+from soilml.quantities import SHEAR, column
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: Loads (N) of the drives; slips fill the range of the recipe.
+LOADS = (40.0, 70.0, 100.0)
+#: Least true slip, and least reported slip: what a wheel that hardly slips reports.
+LEAST_SLIP = 0.003
+
+
+@dataclass(frozen=True)
+class World:
+    """What differs from the model file's assumptions; errors are those of the reported values.
+
+    `mechanism` names a mechanism of tier A of the blind sets, with its size.
+    """
+
+    name: str
+    mechanism: tuple[str, float] | None = None
+    bearing: float = 1.0  # true bearing pressure over that assumed
+    slip_offset: float = 0.0
+    load_gain: float = 0.0
+    torque_gain: float = 0.0
+    slip_std: float = 0.0
+    load_std: float = 0.0  # share of the load
+
+
+@dataclass(frozen=True)
+class SimulatedDrives:
+    """Readings (sets, rows) by name, and the soils (sets, 3)."""
+
+    readings: dict[str, Floats]
+    truth: Floats
+
+
+#: Worlds with errors of sensors, and all worlds, of which the first is sound.
+SENSOR_WORLDS = (
+    World("slip + 0.03", slip_offset=0.03),
+    World("slip - 0.03", slip_offset=-0.03),
+    World("torque gain 5 %", torque_gain=0.05),
+    World("load gain 2 %", load_gain=0.02),
+)
+WORLDS = (
+    World("nothing"),
+    *SENSOR_WORLDS,
+    World("slip-sinkage, n1 0.3", mechanism=("slip-sinkage", 0.3)),
+    World("exit angle, kappa 0.25", mechanism=("exit-angle", 0.25)),
+    World("lugs of 10 mm", mechanism=("grousers", 0.01)),
+    World("bearing pressure x 2", bearing=2.0),
+)
+#: Worlds whose noise of slip or load is declared.
+NOISE_OF_SLIP = tuple(World(f"slip std {s:g}", slip_std=s) for s in (0.01, 0.02, 0.04, 0.06))
+NOISE_OF_LOAD = tuple(World(f"load std {s:.0%}", load_std=s) for s in (0.02, 0.05))
+
+
+def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
+    """Drives on soils of the recipe's prior, with its noise; the same soils for every world."""
+    recipe = read_recipe("wheel")
+    case, rng = recipe.case, np.random.default_rng(seed)
+    truth = np.stack([case.prior[name].at(rng.random(sets)) for name in SHEAR], axis=1)
+    slip = recipe.slip.at(rng.random((sets, rows)))
+    load = rng.choice(LOADS, (sets, rows))
+    gear: Any = case.model.gear
+    fixed = {name: getattr(case.soil, name) for name in ("n", "a0", "a1", "unit_weight")}
+    fixed |= {name: world.bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
+    fixed |= {"radius": gear.radius, "width": gear.width}
+    fixed |= {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
+    of_soil = {name: truth[:, i, None] for i, name in enumerate(SHEAR)}
+    driven = {
+        "slip": np.maximum(slip - world.slip_offset, LEAST_SLIP),
+        "load": load / (1.0 + world.load_gain),
+    }
+    state = WheelState(
+        **{
+            name: np.broadcast_to(np.asarray(value, float), slip.shape).reshape(-1)
+            for name, value in (fixed | of_soil | driven).items()
+        }
+    )
+    name, size = world.mechanism or ("", 0.0)
+    active = ((MECHANISMS["A"][name], size),) if name else ()
+    found = solve_equilibrium(state, active)
+    true = {
+        "torque": (1.0 + world.torque_gain) * found.torque.reshape(slip.shape),
+        "sinkage": found.sinkage.reshape(slip.shape),
+        "drawbar_pull": found.pull.reshape(slip.shape),
+    }
+    readings = {
+        key: value + case.noise[column(key)].std(value) * rng.standard_normal(slip.shape)
+        for key, value in true.items()
+    }
+    readings["slip"] = np.maximum(
+        slip + world.slip_std * rng.standard_normal(slip.shape), LEAST_SLIP
+    )
+    readings["load"] = load * (1.0 + world.load_std * rng.standard_normal(slip.shape))
+    return SimulatedDrives(readings, truth)

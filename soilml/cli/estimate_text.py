@@ -1,0 +1,39 @@
+"""Estimates as columns of a table, and what `estimate` says about them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.experiment_design import is_identified
+from soilml.onboard.estimate import Estimate
+from soilml.quantities import column
+
+
+def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
+    """Mean, std and interval of every parameter, by column name."""
+    columns = {}
+    for i, name in enumerate(estimate.names):
+        key = column(name)
+        columns[key] = estimate.mean[:, i]
+        columns[f"{key}_std"] = estimate.std[:, i]
+        columns[f"{key}_p05"] = estimate.low[:, i]
+        columns[f"{key}_p95"] = estimate.high[:, i]
+    return columns
+
+
+def width_notes(estimate: Estimate, what: str, does: str, hint: str) -> list[str]:
+    """Median width of the estimates in range over the prior's; parameters not determined."""
+    if not estimate.in_range.any():
+        return []
+    share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
+    names = [name.replace("_", " ") for name in estimate.names]
+    shares = ", ".join(f"{name} {s:.0%}" for name, s in zip(names, share, strict=True))
+    notes = [f"posterior width / prior width, {what}: {shares}"]
+    vague = [name for name, ok in zip(names, is_identified(share), strict=True) if not ok]
+    if vague:
+        notes.append(
+            f"{' and '.join(vague)}: the estimate is mostly the prior, {what} {does} not determine "
+            f"{'it' if len(vague) == 1 else 'them'}; {hint} for a better estimate"
+        )
+    return notes

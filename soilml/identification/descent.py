@@ -1,0 +1,194 @@
+"""Weighted least squares of the full model: problem, optimum, and descents from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import FitError, MissingLibraryError
+from soilml.identification.data.observations import Observations
+from soilml.identification.free_parameters import FreeParameter, values_at
+from soilml.identification.predictions import (
+    linearise,
+    noise_at_prediction,
+    predict_channels,
+    propagated_input_noise,
+    stack_channels,
+)
+from soilml.numerics.noise_and_process import Whitener
+from soilml.numerics.prior import UNIFORM_PRECISION
+
+Floats = NDArray[np.float64]
+
+#: Sobol points of the prior that are evaluated, and how many of the best are descended from.
+SOBOL_POINTS = 64
+STARTS = 4
+#: Two descents that end this close, as fractions of the priors, found the same optimum.
+SAME_OPTIMUM = 1e-4
+#: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
+#: likelihood.
+EQUAL_COST = 0.02
+#: Residual, in standard deviations, of a row that has no equilibrium at a trial.
+NO_EQUILIBRIUM = 1e3
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A local optimum."""
+
+    u: Floats  # (p,) fractions of the priors
+    residual: Floats  # (k,) of unit covariance
+    jacobian: Floats  # (k, p)
+    prior_cost: float  # squared deviations from normal priors
+
+    @property
+    def cost(self) -> float:
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True)
+class LeastSquaresProblem:
+    """Readings, their noise and the model that is fitted to them."""
+
+    case: Case
+    data: Observations
+    free: Sequence[FreeParameter]
+    reading: Floats  # (k,)
+    std: Floats  # (k,)
+    columns: Floats  # (k, q) of the model discrepancy
+
+    @cached_property
+    def whitener(self) -> Whitener:
+        """Inverse root of the covariance of noise and discrepancy."""
+        return Whitener.of(self.std, self.columns)
+
+    @cached_property
+    def normal(self) -> NDArray[np.bool_]:
+        """Which parameters have a normal prior, (p,)."""
+        return np.asarray([f.prior.normal_std is not None for f in self.free])
+
+    @cached_property
+    def prior_precision(self) -> Floats:
+        """Precision (p,) of each prior, in fractions."""
+        return np.asarray([f.prior.fraction_precision for f in self.free])
+
+    def normal_deviation(self, u: Floats) -> tuple[Floats, Floats]:
+        """Values over the standard deviations of normal priors, and derivatives by u; (p,) each.
+
+        Zero where the prior is uniform.
+        """
+        values, rates = values_at(self.free, u)
+        scale = np.asarray([1.0 / (f.prior.normal_std or np.inf) for f in self.free])
+        return values * scale, rates * scale
+
+    def predict(self, u: Floats) -> Floats:
+        """Predictions (sets, k) at u (sets, p)."""
+        return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
+
+    def whitened(self, prediction: Floats) -> Floats:
+        """Residuals of unit covariance: in standard deviations, where there is no discrepancy."""
+        return self.whitener(self.residual(prediction))
+
+    def residual(self, prediction: Floats) -> Floats:
+        """Residuals in the units of the readings."""
+        residual = prediction - self.reading
+        return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
+
+    def linearised(self, u: Floats) -> tuple[Floats, Floats]:
+        """Whitened residuals (k,) and Jacobian (k, p)."""
+        prediction, jacobian = linearise(self.case, self.data, self.free, u)
+        return self.whitened(prediction), self.whitener(np.nan_to_num(jacobian).T).T
+
+    def with_noise_at(self, optimum: Optimum) -> LeastSquaresProblem:
+        """The same problem, noise taken at the optimum's predictions or from its residuals."""
+        case, data, free = self.case, self.data, self.free
+        prediction = self.predict(optimum.u[None, :])
+        declared = noise_at_prediction(case, data, prediction)[0]
+        slip_std, load_std = data.slip_std, data.load_std
+        from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
+        total = np.hypot(declared, stack_channels(data, from_inputs)[0])
+        estimated = _residual_noise(data, self.reading, self.residual(prediction)[0], len(free))
+        return replace(self, std=np.where(np.isfinite(total), total, estimated))
+
+
+def global_optimum(problem: LeastSquaresProblem) -> Optimum:
+    """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
+    try:
+        from scipy.stats import qmc
+    except ImportError:
+        raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
+    free = problem.free
+    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
+    sobol = qmc.Sobol(len(free), scramble=True, rng=7).random(SOBOL_POINTS)
+    starts = np.vstack([nominal, sobol])
+    prediction = problem.predict(starts)
+    if np.isnan(prediction).any(axis=1).all():
+        raise FitError(
+            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
+        )
+    order = np.argsort((problem.whitened(prediction) ** 2).sum(axis=1), kind="stable")
+    found: list[Optimum] = []
+    for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):  # the nominal point too
+        found.append(descend(problem, starts[i]))
+        if len(found) == 2 and np.abs(found[0].u - found[1].u).max() < SAME_OPTIMUM:
+            break
+    lowest = min(optimum.cost + optimum.prior_cost for optimum in found)
+    equal = [o for o in found if o.cost + o.prior_cost <= lowest + EQUAL_COST]
+    return min(equal, key=lambda optimum: float(np.sum((optimum.u - 0.5) ** 2)))
+
+
+def descend(problem: LeastSquaresProblem, start: Floats, *, with_prior: bool = False) -> Optimum:
+    """The local optimum from a start, normal priors included.
+
+    With `with_prior`, uniform priors are included too, as Gaussian ones of the same variance about
+    their middle.
+    """
+    from scipy.optimize import least_squares
+
+    latest: dict[bytes, tuple[Floats, Floats]] = {}  # scipy asks for residual and Jacobian apart
+
+    def linearised(u: Floats) -> tuple[Floats, Floats]:
+        key = u.tobytes()
+        if key not in latest:
+            latest.clear()
+            latest[key] = problem.linearised(u)
+        return latest[key]
+
+    uniform_root = np.where(problem.normal, 0.0, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0))
+
+    def prior(u: Floats) -> tuple[Floats, Floats]:
+        """Deviations (p,) from the priors in standard deviations, and their derivatives (p,)."""
+        z, rate = problem.normal_deviation(u)
+        return z + uniform_root * (u - 0.5), rate + uniform_root
+
+    found = least_squares(
+        lambda u: np.append(linearised(u)[0], prior(u)[0]),
+        np.clip(start, 1e-6, 1.0 - 1e-6),
+        jac=lambda u: np.vstack([linearised(u)[1], np.diag(prior(u)[1])]),
+        bounds=(0.0, 1.0),
+        ftol=1e-10,
+        xtol=1e-9,
+        gtol=1e-10,
+    )
+    residual, jacobian = linearised(found.x)
+    from_prior = problem.normal_deviation(found.x)[0]
+    return Optimum(found.x, residual, jacobian, float(from_prior @ from_prior))
+
+
+def _residual_noise(data: Observations, reading: Floats, residual: Floats, p: int) -> Floats:
+    """Noise of each channel (k,) from its residuals, p parameters shared among all readings."""
+    start, parts = 0, []
+    for channel in data.channels:
+        size = int(np.isfinite(channel.reading).sum())
+        own = residual[start : start + size]
+        freedom = max(size - p * size / reading.size, 1.0)
+        rms = float(np.sqrt(np.mean(reading[start : start + size] ** 2)))
+        std = max(float(np.sqrt(own @ own / freedom)), 1e-6 * rms + 1e-15)
+        parts.append(np.full(size, std))
+        start += size
+    return np.concatenate(parts)

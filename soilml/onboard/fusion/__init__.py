@@ -1,0 +1,1 @@
+"""Fusion of estimates whose errors are known from common held-out rows."""

@@ -1,0 +1,234 @@
+"""How the errors of several model files belong together, from their common held-out rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.numerics.estimate_fusion import best_linear
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+
+Floats = NDArray[np.float64]
+
+#: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
+LEAST_COMMON_ROWS, LEAST_AVERAGES = 200, 100
+#: Intervals are calibrated by the fused mean, in so many bins of equal numbers of rows.
+BINS = 6
+#: Estimates that differ by more than this many standard deviations of their difference widen the
+#: fused one in proportion: Birge's ratio, from which it would start at 1.
+DISAGREEMENT = 2.0
+#: Least eigenvalue of a correlation matrix.
+LEAST_EIGENVALUE = 1e-3
+
+
+@dataclass(frozen=True)
+class JointErrors:
+    r"""Rule for one quantity that m files estimate, measured on rows held out by all of them.
+
+    .. math:: \min_w w^T S w, \quad S = D R D, \quad \sum_i w_i = 1, \quad w_i \ge 0
+
+    where D holds the standard deviations of the row and R the correlation of the files'
+    standardised errors. What a common soil does to two sensors, and the common prior, are part of
+    these errors.
+
+    Attributes
+    ----------
+    correlation : ndarray, shape (m, m)
+        R, about zero.
+    alone : int or None
+        The file that is better alone than the combination; None where the combination is better.
+    centre, gain : float
+        The combination's distance from the centre is multiplied by the gain: each estimate is drawn
+        towards the mean of the prior, and the combination of two is drawn too far.
+    std_scale : float
+        Factor on the fused standard deviation, so that squared standardised errors average to 1.
+    middles, low, high : ndarray, shape (bins,)
+        Fused means, and the 5 % and 95 % quantiles of true value minus mean there, in fused
+        standard deviations.
+    repeats, repeat_std, repeat_interval : float
+        Number of repeated readings of each sensor, and the factors that their averages need on the
+        fused standard deviation and on the interval; between 1 and this number the factors are
+        interpolated in its logarithm. 1 where the data have no repeated readings.
+
+    References
+    ----------
+    Comin and Saaj 2017, eq. 26, is the case of independent errors. Bates and Granger, J. Oper.
+    Res. Soc. 20(4), 1969. Birge, Phys. Rev. 40(2), 1932.
+    """
+
+    correlation: Floats
+    alone: int | None
+    centre: float
+    gain: float
+    std_scale: float
+    middles: Floats
+    low: Floats
+    high: Floats
+    repeats: float = 1.0
+    repeat_std: float = 1.0
+    repeat_interval: float = 1.0
+
+    def fuse(
+        self, mean: Floats, std: Floats, ratio: Floats, count: float = 1.0
+    ) -> tuple[Floats, Floats, Floats]:
+        """Fused mean and standard deviation, and disagreement, (n,), of estimates (m, n).
+
+        Parameters
+        ----------
+        mean, std : ndarray, shape (m, n)
+            Estimates, or averages of the estimates of repeated readings.
+        ratio : ndarray, shape (m,)
+            Standard deviation of each over that of a single reading: what independent noise loses
+            by repetition, the correlation of the rest gains.
+        count : float
+            Number of readings in an average; the geometric mean where it differs.
+        """
+        correlation = self.correlation
+        if (ratio != 1.0).any():
+            correlation = _positive(correlation / np.outer(ratio, ratio))
+        disagreement = _disagreement(mean, std, correlation)
+        if self.alone is None:
+            fused = best_linear(mean, std, correlation)
+            centre, spread = self.centre + self.gain * (fused.mean - self.centre), fused.std
+        else:
+            centre, spread = mean[self.alone], std[self.alone]
+        widening = np.maximum(1.0, disagreement / DISAGREEMENT)
+        scale = self.std_scale * self._between(self.repeat_std, count)
+        return centre, scale * widening * spread, disagreement
+
+    def interval(self, mean: Floats, std: Floats, count: float = 1.0) -> tuple[Floats, Floats]:
+        """Ends (n,) of the 90 % interval of fused means and standard deviations (n,)."""
+        low, high = (np.interp(mean, self.middles, end) for end in (self.low, self.high))
+        reach = self._between(self.repeat_interval, count) * std
+        return mean + low * reach, mean + high * reach
+
+    def _between(self, factor: float, count: float) -> float:
+        """The factor for a number of repeated readings, interpolated in its logarithm."""
+        if self.repeats == 1.0:
+            return 1.0
+        share = float(np.log(count) / np.log(self.repeats))
+        return 1.0 + (factor - 1.0) * min(share, 1.0)
+
+
+@lru_cache(maxsize=64)
+def joint_errors(files: tuple[HeldOutErrors, ...]) -> tuple[JointErrors, ...] | None:
+    """Measure the rule for each quantity (q) of several files; None for too few common rows.
+
+    Rows are common where number and true value agree.
+    """
+    single = _common_rows(files, "")
+    if single is None or len(single[0]) < LEAST_COMMON_ROWS:
+        return None
+    rules = tuple(_measure(*(part[..., k] for part in single)) for k in range(single[0].shape[1]))
+    average, repeats = _common_rows(files, "average_"), float(files[0].repeats[-1])
+    same = all(file.repeats[-1] == repeats for file in files)
+    if average is None or not same or len(average[0]) < LEAST_AVERAGES:
+        return rules
+    ratio = np.stack([file.repeat_std[-1] for file in files])
+    return tuple(
+        _with_repeats(rule, repeats, ratio[:, k], *(part[..., k] for part in average))
+        for k, rule in enumerate(rules)
+    )
+
+
+def _common_rows(
+    files: tuple[HeldOutErrors, ...], kind: str
+) -> tuple[Floats, Floats, Floats] | None:
+    """True values (n, q), means and standard deviations (m, n, q) of the files' common rows.
+
+    None where the files have different numbers of quantities.
+    """
+    rows = [getattr(file, kind + "rows") for file in files]
+    common = rows[0]
+    for other in rows[1:]:
+        common = np.intersect1d(common, other)
+    at = [np.searchsorted(own, common) for own in rows]
+    truth, mean, std = (
+        [getattr(file, kind + key)[i] for file, i in zip(files, at, strict=True)]
+        for key in ("truth", "mean", "std")
+    )
+    if any(values.shape != truth[0].shape for values in truth):
+        return None
+    same = np.logical_and.reduce([(values == truth[0]).all(axis=1) for values in truth])
+    return truth[0][same], np.stack(mean)[:, same], np.stack(std)[:, same]
+
+
+def are_comparable(files: Sequence[HeldOutErrors | None]) -> bool:
+    """Whether the correlation of the files' errors is known: one file, or enough common rows."""
+    known = tuple(dict.fromkeys(file for file in files if file is not None))
+    return None not in files and (len(known) == 1 or joint_errors(known) is not None)
+
+
+def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
+    """The rule from true values (n,) and estimates (m, n)."""
+    z = (truth - mean) / std
+    moments = z @ z.T / len(truth)
+    size = np.sqrt(np.diag(moments))
+    centre, none = float(truth.mean()), np.zeros(0)
+    plain = JointErrors(
+        _positive(moments / np.outer(size, size)), None, centre, 1.0, 1.0, none, none, none
+    )
+    ratio = np.ones(len(mean))
+    away = plain.fuse(mean, std, ratio)[0] - centre
+    together = replace(plain, gain=float(away @ (truth - centre) / (away @ away)))
+    candidates = [together, *(replace(plain, alone=i) for i in range(len(mean)))]
+    error = [np.mean((c.fuse(mean, std, ratio)[0] - truth) ** 2) for c in candidates]
+    best = candidates[int(np.argmin(error))]
+    fused, spread, _ = best.fuse(mean, std, ratio)
+    scale = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
+    residual = (truth - fused) / (scale * spread)
+    pieces = np.array_split(np.argsort(fused, kind="stable"), BINS)
+    rule = replace(
+        best,
+        std_scale=scale,
+        middles=np.asarray([fused[piece].mean() for piece in pieces]),
+        low=np.asarray([min(_quantile(residual[piece], 0.05), 0.0) for piece in pieces]),
+        high=np.asarray([max(_quantile(residual[piece], 0.95), 0.0) for piece in pieces]),
+    )
+    # an interval that holds its mean, and is interpolated between bins, holds more than 90 %
+    factor = _reach(rule, truth, fused, scale * spread)
+    return replace(rule, low=factor * rule.low, high=factor * rule.high)
+
+
+def _with_repeats(
+    rule: JointErrors, repeats: float, ratio: Floats, truth: Floats, mean: Floats, std: Floats
+) -> JointErrors:
+    """The rule with its factors for averages (m, n) of repeated readings of true values (n,)."""
+    fused, spread, _ = rule.fuse(mean, std * ratio[:, None], ratio)
+    size = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
+    reach = _reach(rule, truth, fused, size * spread)
+    return replace(rule, repeats=repeats, repeat_std=size, repeat_interval=reach)
+
+
+def _reach(rule: JointErrors, truth: Floats, mean: Floats, std: Floats) -> float:
+    """Factor on a rule's interval with which it holds 90 % of the true values (n,)."""
+    low, high = rule.interval(mean, std)
+    side = np.where(truth < mean, mean - low, high - mean)
+    return _quantile(np.abs(truth - mean) / np.maximum(side, 1e-9 * std), 0.9)
+
+
+def _disagreement(mean: Floats, std: Floats, correlation: Floats) -> Floats:
+    """Largest difference (n,) of two of m estimates, in standard deviations of the difference."""
+    largest = np.zeros(mean.shape[1])
+    for i in range(len(mean)):
+        for j in range(i):
+            variance = std[i] ** 2 + std[j] ** 2 - 2.0 * correlation[i, j] * std[i] * std[j]
+            largest = np.maximum(largest, np.abs(mean[i] - mean[j]) / np.sqrt(variance))
+    return largest
+
+
+def _quantile(values: Floats, level: float) -> float:
+    """The quantile whose expected coverage of a further value is `level` (Weibull's)."""
+    return float(np.quantile(values, level, method="weibull"))
+
+
+def _positive(correlation: Floats) -> Floats:
+    """The correlation matrix (m, m) with eigenvalues above zero and ones on its diagonal."""
+    values, vectors = np.linalg.eigh(correlation)
+    repaired = (vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T
+    size = np.sqrt(np.diag(repaired))
+    return np.asarray(repaired / np.outer(size, size))

@@ -1,0 +1,263 @@
+"""Estimates along a drive whose soil changes and whose sensors fail at times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, final
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.onboard.estimator import Estimator
+from soilml.onboard.features import READABLE, as_number
+from soilml.onboard.memory import Memory
+from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
+from soilml.onboard.tracking.joint_fit import JointFit, Rows, fit_memory, fit_rows
+from soilml.onboard.tracking.misfit_limits import (
+    ERROR_DEGREES,
+    chi_squared_limit,
+    excess_noise,
+    over_median,
+    usual_excess,
+)
+from soilml.onboard.tracking.row_window import RowWindow
+from soilml.onboard.tracking.rows_in_question import GIVE_UP_AFTER
+from soilml.onboard.tracking.tracker_memory import Arrays, TrackerMemory
+from soilml.onboard.tracking.tracker_state import Event, TrackerState
+
+#: Blocks of recent rows that are compared with all earlier ones, one number after another.
+RECENT_BLOCKS = (2, 4, 8)
+#: Rows that a tracker remembers unless told otherwise.
+USUAL_LENGTH = 100
+
+
+@final
+class SoilTracker:
+    """The soil along a drive: rows one by one, each checked against those before.
+
+    A row whose misfit with the rows remembered is not chance is set aside. Where several such rows
+    agree with each other, the soil has changed, and the tracker begins anew with them; where the
+    next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
+    taken together are a drift; the earlier ones are forgotten. Of the others, the last `length`
+    are remembered. Memory and time per row are bounded: at most three calls of the graph, and one
+    more where rows are forgotten.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        With a set posterior; for a file for many wheels, after `Estimator.on`.
+    length : int
+        Rows that are remembered, 16 or more; up to a sixteenth more are.
+
+    Attributes
+    ----------
+    state : TrackerState
+        The last answer.
+
+    Raises `InputError` for a length that is too small, or an estimator without a set posterior.
+
+    Examples
+    --------
+    >>> from soilml import Estimator, SoilTracker
+    >>> tracker = SoilTracker(Estimator.load("exported/wheel.onnx"))
+    >>> for slip, torque in [(0.1, 1.6), (0.2, 2.3), (0.3, 2.7), (0.5, 3.2), (0.4, 5.9)]:
+    ...     state = tracker.read(slip=slip, torque=torque, load=60.0)
+    >>> state.event.name, state.rows_remembered, state.rows_in_question
+    ('SET_ASIDE', 4, 1)
+    """
+
+    estimator: Estimator
+    length: int
+    state: TrackerState
+    _empty: Memory
+    _memory: TrackerMemory
+    _fit: JointFit
+
+    def __init__(self, estimator: Estimator, length: int = USUAL_LENGTH) -> None:
+        if isinstance(length, bool) or not isinstance(length, int | np.integer) or length < 16:
+            raise InputError(f"length is {length!r}; needed is a whole number of 16 or more rows")
+        self.estimator = estimator
+        self.length = int(length)
+        self._empty = estimator.start()
+        self._begin(TrackerMemory(RowWindow.empty(self._empty, self.length)))
+
+    def read(self, **measured: float) -> TrackerState:
+        """The state after one more row.
+
+        Parameters
+        ----------
+        **measured : float
+            Slip, torque, load and the further inputs of `Estimator.step`, in SI units. A value that
+            is not finite or impossible makes the row unusable; it raises no error.
+
+        Raises `InputError` for a reading that is missing or unknown, or is not one number, and for
+        standard deviations that are not possible.
+        """
+        row = self._row(measured)
+        if isinstance(row, str):
+            return self._answer(Event.UNUSABLE, row)
+        repeated = self._memory.repeated
+        if repeated.repeats(row):
+            return self._answer(Event.REPEATED, "all readings are those of the row before")
+        self._memory = replace(self._memory, repeated=repeated.with_row(row))
+        if stuck := self._memory.repeated.stuck:
+            question = self._memory.question.without_reading(stuck, float(row[stuck][0]))
+            self._memory = replace(self._memory, question=question)
+            words = f"{stuck} repeats {row[stuck][0]:g} while slip or load change: not used"
+            return self._answer(Event.STUCK, words)
+        return self._check(row)
+
+    def restart(self) -> TrackerState:
+        """Forget all rows, because the soil is known to be another one."""
+        self._begin(TrackerMemory(RowWindow.empty(self._empty, self.length)))
+        return self.state
+
+    def save(self) -> Arrays:
+        """All that is remembered as arrays, for `numpy.savez`; see `restore`."""
+        return self._memory.as_arrays(self.estimator.memory_id)
+
+    @staticmethod
+    def restore(
+        estimator: Estimator, arrays: Mapping[str, Any], length: int = USUAL_LENGTH
+    ) -> SoilTracker:
+        """The tracker that `save` wrote, also in another process.
+
+        Raises `InputError` for arrays of another file, wheel, prior or version, or damaged ones.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from soilml import Estimator, SoilTracker
+        >>> estimator = Estimator.load("exported/wheel.onnx")
+        >>> arrays = SoilTracker(estimator).save()
+        >>> tracker = SoilTracker.restore(estimator, arrays)
+        >>> tracker.state.rows_remembered
+        0
+        """
+        tracker = SoilTracker(estimator, length)
+        memory = TrackerMemory.from_arrays(arrays, estimator.memory_id, tracker._empty)
+        if memory.window.rows_per_block != tracker._memory.window.rows_per_block:
+            raise InputError(
+                f"length is {length}, but this state of a tracker has blocks of "
+                f"{memory.window.rows_per_block} rows: give the length that it was made with"
+            )
+        tracker._begin(memory)
+        return tracker
+
+    def _begin(self, memory: TrackerMemory) -> None:
+        """Continue from a memory."""
+        self._memory = memory
+        self._fit = fit_memory(self.estimator, memory.window.memory)
+        self._answer(Event.ACCEPTED, "no row was read since the start")
+
+    def _row(self, measured: Mapping[str, Any]) -> Rows | str:
+        """Inputs of the graph for a row, or why it cannot be used."""
+        numbers = {name: as_number(name, value) for name, value in measured.items()}
+        for name, value in numbers.items():
+            low, high = READABLE.get(name, (-np.inf, np.inf))
+            absent = name in OPTIONAL_READINGS and np.isnan(value)
+            if name in READABLE and not (low < value < high or absent):
+                return f"{name} is {value:g}, which is not possible: not used"
+        missing = [name for name in REQUIRED_READINGS if name not in numbers]
+        if missing:
+            raise InputError(f"{missing[0]} is missing; a row needs {', '.join(REQUIRED_READINGS)}")
+        assert self.estimator.sets is not None
+        return self.estimator.sets.rows({name: [value] for name, value in numbers.items()})
+
+    def _check(self, row: Rows) -> TrackerState:
+        """Compare a row with those remembered."""
+        before, window = self._fit, self._memory.window
+        fit = fit_rows(self.estimator, row, window.memory)
+        readings = fit.readings - before.readings
+        if readings < 0.5:
+            words = "slip, load or noise are out of the range of the file: not used"
+            return self._answer(Event.UNUSABLE, words)
+        misfit = fit.misfit - before.misfit
+        limit = self._excess(before.misfit, before.readings) * chi_squared_limit(readings)
+        memory = self._memory.with_increase(over_median(misfit, readings))
+        if misfit > limit and window.blocks:
+            question = memory.question.with_row(row, True)
+            self._memory = replace(memory, question=question)
+            return self._other_soil(f"its misfit {misfit:.0f} is above {limit:.0f}")
+        question = memory.question.with_row(row, False) if memory.question.rows else memory.question
+        since_drift = memory.rows_since_drift
+        self._memory = replace(
+            memory,
+            window=window.with_rows(fit.memory),
+            question=question,
+            rows_since_change=memory.rows_since_change + 1,
+            rows_since_drift=since_drift + 1 if 0 <= since_drift < self.length else -1,
+        )
+        self._fit = fit
+        return self._look_for_drift()
+
+    def _other_soil(self, words: str) -> TrackerState:
+        """Whether the rows in question are of another soil."""
+        question = self._memory.question
+        for rows in question.candidates():
+            fit = fit_rows(self.estimator, rows, self._empty)
+            degrees = max(fit.readings - len(self.estimator.names), 1.0)
+            excess = self._excess(self._fit.misfit, self._fit.readings)
+            agree = fit.misfit <= excess * chi_squared_limit(degrees)
+            if agree or question.in_succession >= GIVE_UP_AFTER:
+                return self._begin_with(rows, fit, agree)
+        return self._answer(
+            Event.SET_ASIDE, f"disagrees with the rows before, as {words}: not used"
+        )
+
+    def _begin_with(self, rows: Rows, fit: JointFit, agree: bool) -> TrackerState:
+        """Forget all but some rows in question."""
+        count, earlier = len(rows["slip"]), self._memory.window.memory.rows
+        window = RowWindow.empty(self._empty, self.length).with_rows(fit.memory)
+        self._memory = self._memory.of_another_soil(window)
+        self._fit = fit
+        each_other = "agree" if agree else "do not agree either"
+        words = f"the last {count} rows {each_other} with each other, and not with {earlier} before"
+        return self._answer(Event.SOIL_CHANGED, f"{words}: these are forgotten")
+
+    def _look_for_drift(self) -> TrackerState:
+        """Compare recent rows with earlier ones, and forget what is too old."""
+        memory, words = self._memory, "agrees with the rows before"
+        window, blocks = memory.window, len(memory.window.blocks)
+        splits = [count for count in RECENT_BLOCKS if count < blocks]
+        if splits and not memory.question.rows:
+            first = blocks - splits[memory.rows_since_change % len(splits)]
+            recent = window.since(first)
+            old = fit_memory(self.estimator, window.before(first))
+            new = fit_memory(self.estimator, recent.memory)
+            apart = old.misfit + new.misfit
+            unknowns = len(self.estimator.names)
+            excess = self._excess(apart, self._fit.readings, 2 * unknowns)
+            limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES)
+            if self._fit.misfit - apart > limit:
+                self._memory = replace(memory, window=recent, rows_since_drift=0)
+                self._fit = new
+                words = (
+                    f"the last {recent.memory.rows} rows together differ from {old.memory.rows} "
+                    "before, so that soil or sensors drift: these are forgotten"
+                )
+                return self._answer(Event.DRIFT, words)
+        if window.is_full:
+            self._memory = replace(memory, window=window.since(1))
+            self._fit = fit_memory(self.estimator, self._memory.window.memory)
+        return self._answer(Event.ACCEPTED, words)
+
+    def _excess(self, misfit: float, readings: float, unknowns: int | None = None) -> float:
+        """Variance of residuals over that of the stated noise, 1 or more: of a fit, or of rows."""
+        unknowns = len(self.estimator.names) if unknowns is None else unknowns
+        usual = usual_excess(self._memory.increases)
+        return max(excess_noise(misfit, readings, unknowns), usual)
+
+    def _answer(self, event: Event, words: str) -> TrackerState:
+        memory = self._memory
+        self.state = TrackerState(
+            estimate=self._fit.estimate,
+            event=event,
+            words=words,
+            rows_since_change=memory.rows_since_change,
+            rows_remembered=memory.window.memory.rows,
+            rows_in_question=memory.question.count,
+            drifting=memory.rows_since_drift >= 0,
+        )
+        return self.state

@@ -1,0 +1,101 @@
+"""What a model file is for, and whether it is for the wheel of a case and of a table."""
+
+from pathlib import Path
+
+import pytest
+from conftest import MODEL
+
+from soilml.cli import main
+
+EXPORTED = Path(__file__).parents[2] / "exported"
+WHEEL, ANY_WHEEL = (str(EXPORTED / f"{name}.onnx") for name in ("wheel", "any_wheel"))
+KLS1 = str(EXPORTED / "kls1_wheel.onnx")
+RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n"
+SLIP_SINKAGE = '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n'
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "effect.toml").write_text(MODEL + SLIP_SINKAGE)
+    (tmp_path / "small.toml").write_text(MODEL.replace("radius = 0.15", "radius = 0.12"))
+    (tmp_path / "runs.csv").write_text(RUNS)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def one_line(text):
+    assert text.count("\n") == 1 and text.endswith("\n"), text
+    return text
+
+
+def test_a_file_alone_is_described_in_one_line(folder, capsys):
+    for file, size in (
+        (WHEEL, "radius 0.15 m, width 0.12 m"),
+        (KLS1, "radius 0.085 m, width 0.08"),
+    ):
+        assert main(["estimate", file]) == 0
+        said = one_line(capsys.readouterr().out)
+        assert f"{file}: for a wheel of {size}" in said and "without effects" in said
+    assert "cohesion 0 to 3000 Pa, friction angle 0.3 to 0.9 rad" in said
+    assert main(["estimate", ANY_WHEEL]) == 0
+    said = one_line(capsys.readouterr().out)
+    assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
+
+
+def test_the_description_precedes_the_other_notes(folder, capsys):
+    assert main(["estimate", WHEEL, "runs.csv"]) == 0
+    first = capsys.readouterr().err.splitlines()[0]
+    assert first.startswith(f"{WHEEL}: for a wheel of radius 0.15 m")
+    assert main(["estimate", ANY_WHEEL, "runs.csv", "--case", "small.toml"]) == 0
+    first = capsys.readouterr().err.splitlines()[0]
+    assert "radius 0.12 m" in first and "cohesion 0 to 3000 Pa" in first
+
+
+@pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])
+def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
+    assert main(["estimate", file, "runs.csv", "--by", "run", "--case", "model.toml"]) == 0
+    assert "gear" not in capsys.readouterr().err
+    assert main(["estimate", file, "--case", "model.toml"]) == 0
+    assert "radius 0.15 m" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("file", "case", "said"),
+    [
+        (WHEEL, "small.toml", "gear.radius 0.15, small.toml has 0.12"),
+        (KLS1, "model.toml", "gear.radius 0.085, model.toml has 0.15"),
+        (WHEEL, "effect.toml", "effects none, effect.toml has slip-sinkage"),
+        (ANY_WHEEL, "effect.toml", "has no effects, the model has slip-sinkage"),
+    ],
+)
+def test_another_wheel_is_refused_in_one_line(folder, capsys, file, case, said):
+    for rest in (["runs.csv"], []):
+        assert main(["estimate", file, *rest, "--case", case]) == 2
+        captured = capsys.readouterr()
+        assert said in one_line(captured.err) and not captured.out
+
+
+def test_what_a_file_of_one_wheel_ignores_of_the_case_is_said(folder, capsys):
+    other = MODEL.replace('torque_Nm = "2 %"', 'torque_Nm = "7 %"').replace("3000.0", "2000.0")
+    (folder / "other.toml").write_text(other + '[discrepancy]\ntorque_Nm = "2 %"\n')
+    assert main(["estimate", WHEEL, "runs.csv", "--case", "other.toml"]) == 0
+    said = capsys.readouterr().err
+    assert "prior [0.0, 3000.0] of cohesion, other.toml has [0.0, 2000.0], which is ignored" in said
+    assert "noise of torque_Nm as in its recipe, other.toml has another one" in said
+    assert "ignores the [discrepancy] of torque_Nm" in said
+
+
+@pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])
+def test_a_table_of_another_wheel_is_refused(folder, capsys, file, case):
+    text = RUNS.replace("torque_Nm", "torque_Nm,wheel_radius_m")
+    (folder / "other.csv").write_text(text.replace("1.5", "1.5,0.15").replace("3.0", "3.0,0.12"))
+    command = ["estimate", file, "other.csv", *(["--case", case] if case else [])]
+    assert main(command) == 2
+    said = one_line(capsys.readouterr().err)
+    assert "other.csv line 3, column wheel_radius_m: 0.12 given" in said and "0.15" in said
+
+
+def test_options_of_rows_need_rows(folder, capsys):
+    assert main(["estimate", WHEEL, "--by", "run"]) == 2
+    assert "RUNS.csv is missing" in one_line(capsys.readouterr().err)

@@ -1,0 +1,212 @@
+"""Fusion by the correlation of the errors that files carry, on simulated errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.fusion.joint_errors import are_comparable, joint_errors
+from soilml.onboard.multi_sensor import fuse_estimates
+
+PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.2]), np.asarray([-0.9]), np.asarray([1.5]))
+ROWS, REPEATS = 2000, 8
+
+
+class Sensors:
+    """Sensors of common and own errors: truth, mean and std of single readings and averages.
+
+    Each reading's std is drawn; its error has the correlation `common` with the other sensor's and
+    the share `soil` of its variance in common with other readings of the same sensor.
+    """
+
+    def __init__(self, common=0.6, soil=0.9, sizes=(0.05, 0.08), seed=0):
+        self.common, self.soil, self.sizes = common, soil, sizes
+        self.rng = np.random.default_rng(seed)
+
+    def draw(self, rows, repeats=1):
+        """Truth (rows,), mean and std (sensors, repeats, rows)."""
+        rng, m = self.rng, len(self.sizes)
+        truth = rng.normal(0.3, 0.2, rows)
+        shared = rng.normal(size=(1, rows))
+        own = rng.normal(size=(m, rows))
+        part = self.common / self.soil
+        of_soil = np.sqrt(part) * shared + np.sqrt(1.0 - part) * own
+        noise = rng.normal(size=(m, repeats, rows))
+        error = np.sqrt(self.soil) * of_soil[:, None] + np.sqrt(1.0 - self.soil) * noise
+        std = np.asarray(self.sizes)[:, None, None] * rng.uniform(0.7, 1.4, (m, 1, rows))
+        std = np.repeat(std, repeats, axis=1)
+        return truth, truth + std * error, std
+
+    def files(self):
+        """Held-out errors of each sensor, with repeated readings."""
+        truth, mean, std = self.draw(ROWS)
+        same, many, spread = self.draw(700, REPEATS)
+        ratio = np.sqrt(self.soil + (1.0 - self.soil) / REPEATS)
+        return [
+            HeldOutErrors.of(
+                {
+                    "rows": range(ROWS),
+                    "truth": truth,
+                    "mean": mean[i, 0],
+                    "std": std[i, 0],
+                    "average_rows": range(700),
+                    "average_truth": same,
+                    "average_mean": many[i].mean(axis=0),
+                    "average_std": spread[i].mean(axis=0),
+                    "repeats": [1, REPEATS],
+                    "repeat_std": [[1.0], [ratio]],
+                    "repeat_coverage_factor": [[1.645], [1.645]],
+                }
+            )
+            for i in range(len(self.sizes))
+        ]
+
+
+def estimate(mean, std, errors):
+    mean, std = (np.broadcast_to(x, np.shape(mean))[..., None] for x in (mean, std))
+    return Estimate(
+        names=("slip",),
+        units=("1",),
+        mean=mean,
+        std=std,
+        covariance=std[..., None] ** 2,
+        low=mean - 1.645 * std,
+        high=mean + 1.645 * std,
+        in_range=np.ones(mean.shape[:-1], dtype=bool),
+        prior=PRIOR,
+        errors=errors,
+    )
+
+
+def rmse(found, truth):
+    return np.sqrt(np.mean((found.mean[:, 0] - truth) ** 2))
+
+
+def cover(found, truth):
+    return np.mean((found.low[:, 0] <= truth) & (truth <= found.high[:, 0]))
+
+
+def z_rms(found, truth):
+    return np.sqrt(np.mean(((found.mean[:, 0] - truth) / found.std[:, 0]) ** 2))
+
+
+@pytest.mark.parametrize("common", [0.0, 0.4, 0.8])
+def test_fused_estimates_are_calibrated_whatever_the_correlation(common):
+    sensors = Sensors(common)
+    files = sensors.files()
+    assert joint_errors(tuple(files))[0].correlation[0, 1] == pytest.approx(common, abs=0.05)
+    truth, mean, std = sensors.draw(20000)
+    each = [estimate(mean[i, 0], std[i, 0], files[i]) for i in range(2)]
+    fused = fuse_estimates(each)
+    assert fused.rule == "correlated"
+    assert rmse(fused.estimate, truth) < 1.002 * min(rmse(e, truth) for e in each)
+    assert cover(fused.estimate, truth) == pytest.approx(0.9, abs=0.015)
+    assert z_rms(fused.estimate, truth) == pytest.approx(1.0, abs=0.04)
+    assert np.mean(fused.disagreement**2) == pytest.approx(1.0, abs=0.1)
+    if common > 0.3:  # taken for independent they are too certain
+        assert cover(fuse_estimates(each, "inverse-variance").estimate, truth) < 0.87
+
+
+@pytest.mark.parametrize("count", [2, 4, 8, 16])
+def test_repeated_readings_share_the_error_of_the_soil(count):
+    sensors = Sensors(soil=0.8)
+    file = sensors.files()[0]
+    assert file.common_share()[0] == pytest.approx(0.8, abs=1e-3)
+    truth, mean, std = sensors.draw(20000, count)
+    each = [estimate(mean[0, k], std[0, k], file) for k in range(count)]
+    fused = fuse_estimates(each).estimate
+    assert rmse(fused, truth) < rmse(each[0], truth)
+    # between the measured numbers, 1 and 8, it is interpolated; beyond them it is constant
+    assert cover(fused, truth) == pytest.approx(0.9, abs=0.015)
+    assert z_rms(fused, truth) == pytest.approx(1.0, abs=0.05)
+    assert cover(fuse_estimates(each, "prior-once").estimate, truth) < 0.82
+
+
+def test_repeated_readings_of_both_sensors():
+    sensors = Sensors(common=0.4, soil=0.6)
+    files = sensors.files()
+    truth, mean, std = sensors.draw(20000, 8)
+    once = [estimate(mean[i, 0], std[i, 0], files[i]) for i in range(2)]
+    eight = [estimate(mean[i, k], std[i, k], files[i]) for i in range(2) for k in range(8)]
+    fused = fuse_estimates(eight).estimate
+    assert rmse(fused, truth) < 0.95 * rmse(fuse_estimates(once).estimate, truth)
+    assert cover(fused, truth) == pytest.approx(0.9, abs=0.02)
+    assert z_rms(fused, truth) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_sensor_that_only_harms_is_not_used():
+    """Its std claims far more than its errors allow: weights by variance would follow it."""
+    sensors = Sensors(common=0.0, sizes=(0.05, 0.4))
+    files = sensors.files()
+    boastful = replace(files[1], std=files[1].std / 10.0, key="boastful")
+    assert joint_errors((files[0], boastful))[0].alone == 0
+    _, mean, std = sensors.draw(5000)
+    each = [
+        estimate(mean[0, 0], std[0, 0], files[0]),
+        estimate(mean[1, 0], std[1, 0] / 10.0, boastful),
+    ]
+    fused = fuse_estimates(each)
+    kept = fused.used.all(axis=0)
+    np.testing.assert_array_equal(fused.estimate.mean[kept], each[0].mean[kept])
+
+
+def test_shrunk_estimates_are_not_shrunk_twice():
+    """Two posterior means, each drawn halfway to the prior, with independent noise."""
+    rng = np.random.default_rng(3)
+
+    def readings(rows):
+        truth = rng.normal(0.3, 0.2, rows)
+        noisy = truth + 0.2 * rng.normal(size=(2, rows))
+        return truth, 0.3 + 0.5 * (noisy - 0.3), np.full((2, rows), 0.2 / np.sqrt(2.0))
+
+    truth, mean, std = readings(ROWS)
+    head = Sensors().files()[0].entry()
+    files = [
+        HeldOutErrors.of(head | {"truth": truth, "mean": mean[i], "std": std[i]}) for i in range(2)
+    ]
+    assert joint_errors(tuple(files))[0].gain == pytest.approx(4.0 / 3.0, abs=0.05)
+    truth, mean, std = readings(20000)
+    each = [estimate(mean[i], std[i], files[i]) for i in range(2)]
+    exact = (0.2**-2 + 2.0 * 0.2**-2) ** -0.5
+    assert rmse(fuse_estimates(each).estimate, truth) == pytest.approx(exact, rel=0.02)
+
+
+def test_readings_that_disagree_widen_the_estimate():
+    files = Sensors().files()
+    near, far = (
+        fuse_estimates([estimate([0.3], 0.05, files[0]), estimate([0.3 + d], 0.05, files[1])])
+        for d in (0.05, 0.2)
+    )
+    assert far.disagreement[0] == pytest.approx(4.0 * near.disagreement[0])
+    assert far.disagreement[0] > 3.0
+    widening = far.estimate.std[0, 0] / near.estimate.std[0, 0]
+    assert widening == pytest.approx(far.disagreement[0] / 2.0, rel=0.01)
+
+
+def test_files_of_other_data_are_fused_as_before():
+    one, other = Sensors().files()[0], Sensors(seed=5).files()[1]
+    assert not are_comparable([one, other])
+    pair = [estimate([0.3], 0.05, one), estimate([0.34], 0.05, other)]
+    assert fuse_estimates(pair).rule == "prior-once"
+    with pytest.raises(InputError, match="do not carry their errors on common rows"):
+        fuse_estimates(pair, "correlated")
+    assert not are_comparable([one, None]) and are_comparable([one, one])
+
+
+def test_what_a_file_carries_is_read_back_as_it_was_written():
+    file = Sensors().files()[0]
+    again = HeldOutErrors.of(file.entry())
+    assert HeldOutErrors.of(again.entry()) == again
+    np.testing.assert_allclose(again.std, file.std, rtol=1e-3)
+    without = file.entry() | {
+        "average_rows": [], "average_truth": [], "average_mean": [], "average_std": [],
+        "repeats": [1], "repeat_std": [[1.0]], "repeat_coverage_factor": [[1.6]],
+    }  # fmt: skip
+    alone = HeldOutErrors.of(without)
+    assert alone.common_share()[0] == 1.0 and alone.repeated(8)[0][0] == 1.0
+    for damage in ({"std": file.std - 1.0}, {"truth": [0.1]}, {"repeats": [2, 8]}):
+        with pytest.raises(ValueError):
+            HeldOutErrors.of(file.entry() | damage)

@@ -1,0 +1,212 @@
+"""Rows of a drive, one by one: glitches, another soil, stuck sensors, drift, a stored state."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[4] / "bench"))
+
+from conftest import simulated_run
+from driven_days import SLIP_STD, Kind, simulate_day
+
+from soilml import Estimator, SoilTracker
+from soilml.errors import InputError
+from soilml.onboard.tracking import Event
+
+
+@pytest.fixture(scope="module")
+def estimator(wheel_set_file):
+    return Estimator.load(wheel_set_file)
+
+
+def rows_of(posterior, count, seed=0, x=(0.2, -0.3, 0.1)):
+    run, _ = simulated_run(posterior, count, seed, x)
+    return [{name: float(values[i]) for name, values in run.items()} for i in range(count)]
+
+
+def driven(tracker, rows):
+    return [tracker.read(**row) for row in rows]
+
+
+@pytest.fixture
+def settled(estimator, wheel_posterior):
+    """A tracker after 40 rows of one soil."""
+    tracker = SoilTracker(estimator)
+    states = driven(tracker, rows_of(wheel_posterior, 40))
+    assert {state.event for state in states} == {Event.ACCEPTED}
+    return tracker
+
+
+def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 40)
+    together = estimator.run(**run)
+    assert settled.state.estimate.mean == pytest.approx(together.mean, rel=0.02)
+    assert settled.state.estimate.std == pytest.approx(together.std, rel=0.1)
+    assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5, 0.0])
+def test_a_glitch_leaves_the_estimate_as_it_is(settled, wheel_posterior, factor):
+    before = settled.state.estimate
+    good, *more = rows_of(wheel_posterior, 12, seed=1)
+    glitch = settled.read(**good | {"torque": factor * good["torque"]})
+    assert glitch.event in (Event.SET_ASIDE, Event.UNUSABLE)
+    assert np.array_equal(glitch.estimate.mean, before.mean)
+    states = driven(settled, more)
+    assert {state.event for state in states} == {Event.ACCEPTED}
+    assert states[-1].rows_in_question == 0 and states[-1].rows_since_change == 51
+
+
+def test_another_soil_is_told_and_the_rows_before_are_forgotten(settled, wheel_posterior):
+    x = (-0.5, 0.6, -0.4)
+    states = driven(settled, rows_of(wheel_posterior, 20, seed=2, x=x))
+    events = [state.event for state in states]
+    at = events.index(Event.SOIL_CHANGED)
+    assert at <= 6 and events.count(Event.SOIL_CHANGED) == 1
+    assert set(events[:at]) <= {Event.SET_ASIDE, Event.ACCEPTED}
+    assert states[at].rows_remembered == states[at].rows_since_change <= at + 1
+    axes = wheel_posterior.family.axes
+    truth = np.asarray([axis.value(np.asarray(v)) for axis, v in zip(axes, x, strict=True)])
+    found = states[-1].estimate
+    assert found.in_range and (np.abs(found.mean - truth) < 3.0 * found.std).all()
+
+
+def test_a_small_change_is_flagged_as_drift(settled, wheel_posterior):
+    states = driven(settled, rows_of(wheel_posterior, 60, seed=3, x=(0.2, -0.12, 0.1)))
+    flags = [state.drifting for state in states]
+    assert Event.DRIFT in [state.event for state in states] and flags[-1]
+    assert states[flags.index(True)].rows_remembered < 60
+
+
+def test_a_stuck_torque_is_told_and_sound_rows_are_used_again(settled, wheel_posterior):
+    rows = rows_of(wheel_posterior, 16, seed=4)
+    last = rows[0]["torque"]
+    stuck = [settled.read(**row | {"torque": last}) for row in rows[:10]]
+    assert [state.event for state in stuck[2:]] == [Event.STUCK] * 8
+    assert "torque repeats" in stuck[-1].words
+    assert {state.event for state in driven(settled, rows[10:])} == {Event.ACCEPTED}
+
+
+def test_the_same_row_again_counts_once(settled, wheel_posterior):
+    row = rows_of(wheel_posterior, 1, seed=5)[0]
+    count = settled.read(**row).rows_remembered
+    again = driven(settled, [row] * 5)
+    assert {state.event for state in again} == {Event.REPEATED}
+    assert again[-1].rows_remembered == count
+
+
+@pytest.mark.parametrize(
+    "bad", [{"torque": np.nan}, {"load": -1.0}, {"slip": 1.0}, {"slip": 0.0}, {"load": 1e6}]
+)
+def test_rows_that_cannot_be_used_do_not_stop_a_drive(settled, wheel_posterior, bad):
+    row = rows_of(wheel_posterior, 1, seed=6)[0]
+    state = settled.read(**row | bad)
+    assert state.event is Event.UNUSABLE and "not used" in state.words
+    assert settled.read(**row).event is Event.ACCEPTED
+
+
+def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
+    with pytest.raises(InputError, match="load is missing; a row needs slip, torque, load"):
+        settled.read(slip=0.3, torque=2.0)
+    with pytest.raises(InputError, match="'speed' is not read by this model"):
+        settled.read(slip=0.3, torque=2.0, load=60.0, speed=1.0)
+    with pytest.raises(InputError, match="torque has 2 elements; needed is one number"):
+        settled.read(slip=0.3, torque=[2.0, 2.1], load=60.0)
+    with pytest.raises(InputError, match="length is 5; needed is a whole number of 16 or more"):
+        SoilTracker(estimator, length=5)
+
+
+def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):
+    tracker = SoilTracker(estimator, length=32)
+    rows = rows_of(wheel_posterior, 150)
+    sizes = []
+    for row in rows:
+        state = tracker.read(**row)
+        sizes.append(sum(array.nbytes for array in tracker.save().values()))
+    assert max(sizes[75:]) <= max(sizes[:75])
+    assert 32 <= state.rows_remembered <= 34 and state.rows_since_change == 150
+
+
+def test_a_stored_state_continues_where_it_stopped(settled, estimator, wheel_posterior, tmp_path):
+    rows = rows_of(wheel_posterior, 30, seed=7, x=(-0.5, 0.6, -0.4))
+    driven(settled, rows[:2])
+    assert settled.state.rows_in_question > 0
+    np.savez(tmp_path / "state.npz", **settled.save())
+    with np.load(tmp_path / "state.npz", allow_pickle=False) as arrays:
+        other = SoilTracker.restore(estimator, arrays)
+    for row in rows[2:]:
+        ours, theirs = settled.read(**row), other.read(**row)
+        assert ours.event is theirs.event and ours.words == theirs.words
+        assert theirs.estimate.mean == pytest.approx(ours.estimate.mean, rel=1e-3)
+
+
+def test_a_state_before_the_first_row_can_be_stored(estimator, wheel_posterior):
+    row = rows_of(wheel_posterior, 1)[0]
+    tracker = SoilTracker.restore(estimator, SoilTracker(estimator).save())
+    assert tracker.state.rows_remembered == 0
+    assert tracker.read(**row).rows_remembered == 1
+    tracker.restart()
+    assert SoilTracker.restore(estimator, tracker.save()).state.rows_remembered == 0
+
+
+def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator):
+    arrays = settled.save()
+    other = replace(estimator, metadata=estimator.metadata | {"graph_sha256": "0" * 64})
+    with pytest.raises(InputError, match="which is another file, wheel, prior"):
+        SoilTracker.restore(other, arrays)
+    for name in arrays:
+        with pytest.raises(InputError, match="this state of a tracker is damaged"):
+            SoilTracker.restore(estimator, {k: v for k, v in arrays.items() if k != name})
+    with pytest.raises(InputError, match="its system has shape"):
+        SoilTracker.restore(estimator, arrays | {"system": arrays["system"][:-1]})
+    with pytest.raises(InputError, match="has format 0"):
+        SoilTracker.restore(estimator, arrays | {"format": np.asarray(0)})
+    with pytest.raises(InputError, match="give the length that it was made with"):
+        SoilTracker.restore(estimator, arrays, length=1000)
+
+
+def test_restart_forgets_the_soil(settled):
+    state = settled.restart()
+    assert (state.rows_remembered, state.rows_since_change) == (0, 0)
+    assert not state.estimate.in_range
+
+
+@pytest.mark.parametrize("drift", ["friction", "zero"])
+def test_a_simulated_day(estimator, drift):
+    day = simulate_day(7, drift)
+    configured = estimator.on(noise={"slip": (SLIP_STD, 0.0)})
+    tracker, memory, plain = SoilTracker(configured), configured.start(), []
+    states = []
+    for i in range(len(day.kinds)):
+        states.append(tracker.read(**day.row(i)))
+        found, memory = configured.step(memory, **day.row(i))
+        plain.append(bool(found.in_range))
+    events = [state.event for state in states]
+    # each change is told within so many rows, and nothing else is taken for one
+    told = [i for i, event in enumerate(events) if event is Event.SOIL_CHANGED]
+    first_drifting = day.kinds.index(Kind.DRIFTING)
+    changes = [row for row, _ in day.changes]
+    assert all(any(row <= i < row + 10 for i in told) for row in changes)
+    assert len([i for i in told if i < first_drifting]) == len(changes)
+    of_kind = {
+        kind: [e for e, k in zip(events, day.kinds, strict=True) if k is kind] for kind in Kind
+    }
+    assert set(of_kind[Kind.GLITCH]) <= {Event.SET_ASIDE, Event.UNUSABLE}
+    assert of_kind[Kind.STUCK][2:] == [Event.STUCK] * (len(of_kind[Kind.STUCK]) - 2)
+    assert set(of_kind[Kind.PAUSED]) <= {Event.REPEATED, Event.UNUSABLE}
+    sound = [i for i, k in enumerate(day.kinds) if k is Kind.SOUND]
+    steady = [i for i in sound if i % 100 >= 20]
+    assert np.mean([events[i] is Event.ACCEPTED for i in steady]) > 0.98
+    held = [
+        (state.estimate.low <= day.soils[i]) & (day.soils[i] <= state.estimate.high)
+        for i, state in enumerate(states)
+        if i in steady
+    ]
+    assert np.mean(held) > 0.7
+    assert np.mean([bool(states[i].estimate.in_range) for i in steady]) > 0.95
+    assert Event.DRIFT in events[first_drifting : first_drifting + 110]
+    # all rows in one memory: refused from the first glitch or change on
+    assert not np.mean([plain[i] for i in steady]) > 0.5

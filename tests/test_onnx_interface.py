@@ -1,0 +1,166 @@
+"""The interface control document of the exported files, against their signatures."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime as ort
+import pytest
+from onnx import numpy_helper
+
+from soilml.onboard import Estimator, Reason
+from soilml.onboard.memory import MEMORY_FORMAT
+from soilml.onboard.model_file import FORMAT
+from soilml.onboard.set_contract import INTERFACE
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "onnx-interface.md").read_text()
+RELEASED = {
+    "wheel": "whole",
+    "kls1_wheel": "whole",
+    "any_wheel": "set",
+    "wheel_lssvm": "single",
+    "wheel_mlp": "single",
+    "wheel_linear": "single",
+}
+TYPES = {"float32": "tensor(float)", "bool": "tensor(bool)"}
+DEFAULTS = {"zeros": np.zeros(3), "false": np.zeros(1, bool)}
+
+
+def table(heading, first):
+    """Rows of the table below a heading whose first column has this name, as dicts."""
+    section = PAGE.split(f"## {heading}\n")[1].split("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")]
+    cells = [[cell.strip(" `") for cell in line[1:-1].split("|")] for line in lines]
+    head, _, *rows = cells
+    assert head[0] == first
+    return [dict(zip(head, row, strict=True)) for row in rows]
+
+
+INPUTS, OUTPUTS = table("Inputs", "input"), table("Outputs", "output")
+
+
+def of_kind(rows, kind):
+    return {next(iter(row.values())): row for row in rows if kind in row["kinds"].split(", ")}
+
+
+@pytest.fixture(scope="module")
+def files(whole_file, any_set_file, small_model):
+    return {"whole": whole_file, "set": any_set_file, "single": small_model}
+
+
+def rank(row):
+    return len(row["shape"].strip("()").split(","))
+
+
+@pytest.mark.parametrize("kind", ["single", "whole", "set"])
+def test_inputs_and_outputs_are_those_of_the_files(files, kind):
+    session = ort.InferenceSession(files[kind], providers=["CPUExecutionProvider"])
+    inputs = session.get_inputs() + session.get_overridable_initializers()
+    for documented, found in (
+        (of_kind(INPUTS, kind), inputs),
+        (of_kind(OUTPUTS, kind), session.get_outputs()),
+    ):
+        assert set(documented) == {value.name for value in found}
+        for value in found:
+            row = documented[value.name]
+            assert value.type == TYPES[row["type"]], value.name
+            assert len(value.shape) == rank(row), value.name
+    required = {name for name, row in of_kind(INPUTS, kind).items() if row["default"] == "required"}
+    assert required == {value.name for value in session.get_inputs()}
+
+
+@pytest.mark.parametrize("kind", ["whole", "set"])
+def test_defaults_are_those_of_the_files(files, kind):
+    graph = onnx.load(files[kind]).graph
+    found = {entry.name: numpy_helper.to_array(entry) for entry in graph.initializer}
+    for name, row in of_kind(INPUTS, kind).items():
+        if row["default"] == "required":
+            assert name not in found
+        elif row["default"] == "of the file":
+            errors = json.loads(Estimator.load(files[kind]).metadata["set"])["errors"]
+            assert found[name] == pytest.approx(errors[name])
+        elif row["default"] == "0 rows":
+            assert len(found[name]) == 0
+        else:
+            expected = DEFAULTS.get(row["default"])
+            expected = np.asarray([float(row["default"])]) if expected is None else expected
+            np.testing.assert_allclose(found[name], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["whole", "set"])
+def test_outputs_have_the_shapes_of_the_page(files, kind):
+    session = ort.InferenceSession(files[kind], providers=["CPUExecutionProvider"])
+    feed = {"slip": [0.1, 0.3], "torque": [1.3, 3.1], "load": [40.0, 60.0]}
+    if kind == "set":
+        context = json.loads(Estimator.load(files[kind]).metadata["set"])["context"]
+        feed |= {name: [np.sqrt(ends[0] * ends[1])] for name, ends in context.items()}
+    feed = {name: np.asarray(values, np.float32) for name, values in feed.items()}
+    branches = (
+        [{"joint": np.asarray([joint])} for joint in (True, False)] if kind == "whole" else [{}]
+    )
+    documented = of_kind(OUTPUTS, kind)
+    seen = set()
+    for branch in branches:
+        sizes = {"rows": 2, "q": 3, "terms + 6": _terms(files[kind]) + 6, "kept_out": 2}
+        for name, value in zip(
+            documented, session.run(list(documented), feed | branch), strict=True
+        ):
+            if value.size:
+                shape = documented[name]["shape"].strip("()").split(", ")
+                known = [sizes.get(part, part) for part in shape]
+                assert list(value.shape) == [int(part) for part in known], name
+                seen.add(name)
+    rows_may_be_out = {"memory_out"} if kind == "set" else set()
+    assert seen | rows_may_be_out == set(documented)
+
+
+def _terms(file):
+    return json.loads(Estimator.load(file).metadata["set"])["terms"]
+
+
+@pytest.mark.parametrize("name", RELEASED)
+def test_released_files_have_documented_inputs_and_outputs_only(name):
+    session = ort.InferenceSession(
+        ROOT / "exported" / f"{name}.onnx", providers=["CPUExecutionProvider"]
+    )
+    kind = RELEASED[name]
+    inputs = session.get_inputs() + session.get_overridable_initializers()
+    assert {value.name for value in inputs} <= set(of_kind(INPUTS, kind))
+    lacking = set(of_kind(OUTPUTS, kind)) - {value.name for value in session.get_outputs()}
+    assert lacking <= {"set_at_edge"}  # files of interface 1
+    assert {value.name for value in session.get_outputs()} <= set(of_kind(OUTPUTS, kind))
+
+
+def test_reasons_and_versions_are_those_of_the_code(small_model):
+    reasons = table("Reasons", "code")
+    assert [(int(row["code"]), row["name"]) for row in reasons] == [
+        (reason.value, reason.name) for reason in Reason
+    ]
+    versions = {
+        row["entry of the metadata"]: row["now"]
+        for row in table("Versions", "entry of the metadata")
+    }
+    assert versions["soilml_format"] == FORMAT and versions["soilml_interface"] == INTERFACE
+    metadata = Estimator.load(small_model).metadata
+    assert metadata["soilml_format"] == FORMAT and metadata["soilml_interface"] == INTERFACE
+    assert f"`format`, now {MEMORY_FORMAT}" in " ".join(PAGE.split())
+
+
+def test_the_page_names_the_files_of_each_kind():
+    for row in table("Kinds of file", "kind"):
+        for file in re.findall(r"(\w+)\.onnx", row["files"]):
+            assert RELEASED[file] == row["kind"]
+
+
+def test_the_minimal_call_is_that_of_the_estimator(whole_file):
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
+    names: dict = {}
+    exec(block.replace("exported/wheel.onnx", str(whole_file)), names)
+    rows = {name: names["feed"][name] for name in ("slip", "torque", "load")}
+    expected = Estimator.load(whole_file).run(**rows)
+    assert names["in_range"][0] == expected.in_range
+    np.testing.assert_allclose(names["mean"], expected.mean, rtol=1e-4)
+    np.testing.assert_allclose(names["std"], expected.std, rtol=1e-4)

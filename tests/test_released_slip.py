@@ -1,0 +1,97 @@
+"""Slip by the released linear files: fused and repeated, on data that they were not trained on."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datagen.generate import simulate_pieces
+from datagen.recipe import Block, read_recipe
+from soilml import Estimator
+from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.quantities import column
+
+ROOT = Path(__file__).parents[1]
+SENSORS = ("torque", "vibration")
+SOILS = {"unknown": ("wheel_leg", ""), "known": ("wheel_leg_known", "_known")}
+
+
+def files(soil):
+    folder = ROOT / "exported"
+    return [Estimator.load(folder / f"slip_{s}{SOILS[soil][1]}.onnx") for s in SENSORS]
+
+
+def rows(soil, count, block):
+    """Columns of answered rows of a seed that no file was trained on."""
+    recipe = replace(read_recipe(SOILS[soil][0]), blocks=(block,)).sized(count, seed=60606)
+    parts = list(simulate_pieces(recipe))
+    names = ("slip", "load_N", *(column(s) for s in SENSORS), "status")
+    columns = {k: np.concatenate([p[k] for p in parts]) for k in names}
+    answered = columns.pop("status") == "ok"
+    return {k: v[answered] for k, v in columns.items()}
+
+
+def estimates(soil, columns):
+    return [f(**{n: columns[column(n)] for n in f.inputs}) for f in files(soil)]
+
+
+def error_and_cover(found, slip):
+    inside = (found.low[:, 0] <= slip) & (slip <= found.high[:, 0])
+    return np.sqrt(np.mean((found.mean[:, 0] - slip) ** 2)), inside.mean()
+
+
+@pytest.mark.parametrize("soil", SOILS)
+def test_the_files_of_both_sensors_have_the_same_held_out_rows(soil):
+    one, other = (f.pooling.held_out for f in files(soil))
+    assert len(np.intersect1d(one.rows, other.rows)) > 1900
+    assert one.common_share()[0] > 0.9  # the model's error on a soil, not the sensor's noise
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("soil", SOILS)
+def test_fused_slip_is_better_than_either_sensors_and_its_intervals_hold(soil):
+    columns = rows(soil, 8000, Block(1, 1.0))
+    each = estimates(soil, columns)
+    fused = fuse_estimates(each)
+    assert fused.rule == "correlated"
+    error, held = error_and_cover(fused.estimate, columns["slip"])
+    assert error < 0.97 * min(error_and_cover(e, columns["slip"])[0] for e in each)
+    assert 0.88 <= held <= 0.92
+    # by the rules that take the errors for independent it does not
+    assert (
+        error_and_cover(fuse_estimates(each, "inverse-variance").estimate, columns["slip"])[1]
+        < 0.85
+    )
+    assert error < error_and_cover(fuse_estimates(each, "prior-once").estimate, columns["slip"])[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("soil", SOILS)
+def test_eight_readings_of_one_soil_are_not_taken_for_independent(soil):
+    columns = rows(soil, 8 * 1000, Block(8, 1.0, ("slip", "load_N")))
+    runs = {k: v[: len(v) // 8 * 8].reshape(-1, 8) for k, v in columns.items()}
+    assert np.ptp(runs["slip"], axis=1).max() == 0.0
+    slip = runs["slip"][:, 0]
+    by_time = [estimates(soil, {k: v[:, i] for k, v in runs.items()}) for i in range(8)]
+    one = [error_and_cover(e, slip)[0] for e in by_time[0]]
+    for sensor in range(2):
+        repeated = [each[sensor] for each in by_time]
+        error, held = error_and_cover(fuse_estimates(repeated).estimate, slip)
+        assert error < 1.01 * one[sensor]
+        assert 0.88 <= held <= 0.92
+        assert error_and_cover(fuse_estimates(repeated, "prior-once").estimate, slip)[1] < 0.6
+    both = fuse_estimates([e for each in by_time for e in each]).estimate
+    error, held = error_and_cover(both, slip)
+    assert error < min(one)
+    assert 0.88 <= held <= 0.92
+
+
+def test_a_missing_sensor_leaves_the_other_ones_estimate():
+    by_torque, by_vibration = files("unknown")
+    torque = by_torque(torque=[2.0, 2.5], load=25.0)
+    fused = fuse_estimates([torque, by_vibration.prior_estimate(2)])
+    assert fused.rule == "correlated"
+    np.testing.assert_array_equal(fused.estimate.mean, torque.mean)
+    np.testing.assert_array_equal(fused.estimate.low, torque.low)
+    assert fused.used.tolist() == [[True, True], [False, False]]

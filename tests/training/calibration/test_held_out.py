@@ -1,0 +1,95 @@
+"""What files of slip carry of their errors: rows, averages of repeats, the share in common."""
+
+import numpy as np
+import pytest
+
+from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.gaussian_pooling import RunConditions
+from training.calibration.held_out import MOST_ROWS, carry_errors, measure_held_out, steady_runs
+from training.calibration.row_pooling import calibrate_single_rows
+from training.data.dataset import Dataset
+
+CONDITIONS = RunConditions(
+    ("load",), np.asarray([10.0]), np.asarray([40.0]), np.asarray([30.0 / np.sqrt(12.0)])
+)
+FACTOR = np.asarray([1.645])
+
+
+def rows(lengths, steady, seed=0):
+    """Runs of these lengths; slip and load are constant in each where `steady`."""
+    rng = np.random.default_rng(seed)
+    run = np.repeat(np.arange(len(lengths)), lengths)
+    n = len(run)
+    pick = run if steady else np.arange(n)
+    slip, load = rng.uniform(0.0, 0.6, n)[pick], rng.uniform(10.0, 40.0, n)[pick]
+    soil, noise = rng.normal(size=n)[run], rng.normal(size=n)
+    return Dataset(
+        measured={"torque": 0.1 * load, "load": load},
+        features=np.column_stack([slip, soil, noise]),
+        targets=slip[:, None],
+        run=run,
+        row=np.arange(n) * 3 + 5,
+        feature_names=("slip", "soil", "noise"),
+        target_names=("slip",),
+        lower=np.asarray([0.0]),
+        upper=np.asarray([0.6]),
+        recipe="{}",
+        dropped=0,
+    )
+
+
+def sensor(share, inside=lambda features: np.ones(len(features), dtype=bool)):
+    """Estimates of std 0.1, of which this share of the error variance is the soil's."""
+
+    def predict(features):
+        error = np.sqrt(share) * features[:, 1] + np.sqrt(1.0 - share) * features[:, 2]
+        mean = features[:, :1] + 0.1 * error[:, None]
+        return mean, np.full_like(mean, 0.1), inside(features)
+
+    return predict
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
+def test_the_share_of_error_in_common_is_found(share):
+    found = measure_held_out(sensor(share), rows([8] * 1000, True), CONDITIONS, FACTOR)
+    assert found.repeats.tolist() == [1, 2, 4, 8]
+    assert found.common_share()[0] == pytest.approx(share, abs=0.06)
+    np.testing.assert_allclose(found.repeat_coverage_factor, 1.645, rtol=0.06)
+    assert len(found.rows) == len(found.average_rows) == 1000
+    np.testing.assert_allclose(
+        np.std(found.average_mean - found.average_truth), 0.1 * found.repeat_std[-1, 0], rtol=0.05
+    )
+
+
+def test_runs_at_several_slips_are_no_repeats():
+    data = rows([8] * 300, False)
+    assert steady_runs(data, CONDITIONS) == []
+    found = measure_held_out(sensor(0.5), data, CONDITIONS, FACTOR)
+    assert found.repeats.tolist() == [1] and len(found.average_rows) == 0
+    assert found.common_share()[0] == 1.0  # repeated readings then count as one
+
+
+def test_files_choose_the_same_rows_whatever_each_has_in_range():
+    data = rows([1] * (MOST_ROWS + 1500), False)
+    narrow = sensor(0.5, lambda features: features[:, 0] < 0.5)
+    one = measure_held_out(sensor(0.5), data, CONDITIONS, FACTOR)
+    other = measure_held_out(narrow, data, CONDITIONS, FACTOR)
+    assert len(one.rows) == MOST_ROWS
+    assert 0.7 * MOST_ROWS < len(other.rows) < 0.95 * MOST_ROWS
+    assert set(other.rows) <= set(one.rows)
+    assert (other.truth < 0.5).all()
+
+
+def test_repeats_are_scored_on_other_runs():
+    data, scored = rows([8] * 400, True), rows([8] * 200, True, seed=1)
+    predict = sensor(0.7)
+    mean, std, _ = predict(data.features)
+    prior_std = np.asarray([0.17])
+    prior = PriorSummary(np.asarray([0.3]), prior_std, data.lower - 1.0, data.upper + 1.0)
+    pooling = calibrate_single_rows(mean, std[:, None] ** 2, data, prior, CONDITIONS)
+    pooling, scores = carry_errors(predict, pooling, data, scored, prior_std)
+    assert pooling.held_out is not None and sorted(scores) == [1, 2, 4, 8]
+    assert scores[8].rows == 200
+    assert scores[8].rmse[0] < scores[1].rmse[0]
+    for metrics in scores.values():
+        assert metrics.cover90[0] == pytest.approx(0.9, abs=0.05)

@@ -1,0 +1,292 @@
+"""Every operator that export-c knows: the compiled C against onnxruntime."""
+
+import ctypes
+import subprocess
+
+import numpy as np
+import onnxruntime as ort
+import pytest
+from compiled_c import COMPILERS, TYPES, WARNINGS
+from onnx import TensorProto, helper, numpy_helper
+
+from soilml.errors import ModelFileError
+from training.export_c.c_file import kernel_text
+from training.export_c.functions import ARRAYS, graph_function
+from training.export_c.literals import array
+from training.export_c.operators import OPERATORS
+from training.export_c.program import Program, SharedParts
+from training.export_c.sizes import Size, shape_of
+from training.export_c.tensor import Tensor, kind_of_array
+
+RNG = np.random.default_rng(0)
+#: Rows that the functions of these tests are called with, and their bound.
+ROWS, MOST_ROWS = 5, 9
+
+
+def values(*shape, low=-2.0, high=2.0):
+    return RNG.uniform(low, high, shape).astype(np.float32)
+
+
+A, B = values(4, 3), values(4, 3)
+UNIT, BIG = values(4, 3, low=-0.9, high=0.9), values(4, 3, low=1.1, high=5.0)
+TRUE, OTHER = A > 0, B > 0
+ODD = np.array([[np.nan, np.inf, -np.inf, 1.0]], np.float32)
+CUBE = values(2, 3, 4)
+
+
+def ints(*numbers):
+    return np.array(numbers, np.int64)
+
+
+#: Operators of one number of any sign.
+ANY = """Abs Asinh Atan Ceil Cos Cosh Erf Exp Floor Identity Neg Reciprocal Relu Round Sigmoid Sign
+Sin Sinh Softplus Tan Tanh"""
+ONE = {
+    **dict.fromkeys(("Log", "Sqrt", "Acosh"), BIG),
+    **dict.fromkeys(("Acos", "Asin", "Atanh"), UNIT),
+    **dict.fromkeys(ANY.split(), A),
+}
+ONES = numpy_helper.from_array(np.ones(1, np.float32))
+#: Name, operator, inputs that are given at run time, constants that follow them, attributes.
+CASES = [
+    *((name.lower(), name, [x], [], {}) for name, x in ONE.items()),
+    *((op.lower(), op, [A, B], [], {}) for op in ("Add", "Sub", "Mul", "Div", "Max", "Min")),
+    *((op.lower(), op, [A, B], [], {}) for op in ("Equal", "Greater", "GreaterOrEqual", "Less")),
+    *((op.lower(), op, [TRUE, OTHER], [], {}) for op in ("And", "Or", "Xor")),
+    ("less or equal", "LessOrEqual", [A, A[:1]], [], {}),
+    ("broadcast", "Add", [values(3, 1, 2), values(4, 1)], [], {}),
+    ("max of three", "Max", [A, B, BIG], [], {}),
+    ("largest with nan", "Max", [ODD, values(1, 4)], [], {}),
+    ("smallest with nan", "Min", [ODD, values(1, 4)], [], {}),
+    ("sum", "Sum", [A, B, BIG], [], {}),
+    ("mean", "Mean", [A, B, BIG], [], {}),
+    ("not", "Not", [TRUE], [], {}),
+    ("square", "Pow", [A], [np.float32(2.0)], {}),
+    ("power", "Pow", [BIG, A], [], {}),
+    ("clip", "Clip", [A], [np.float32(-0.5), np.float32(0.7)], {}),
+    ("clip below", "Clip", [A], [np.float32(-0.5)], {}),
+    ("where", "Where", [TRUE, A, B], [], {}),
+    ("is nan", "IsNaN", [ODD], [], {}),
+    ("is infinite", "IsInf", [ODD], [], {}),
+    ("is minus infinite", "IsInf", [ODD], [], {"detect_positive": 0}),
+    ("to double", "Cast", [A], [], {"to": TensorProto.DOUBLE}),
+    ("to int", "Cast", [A], [], {"to": TensorProto.INT32}),
+    ("to bool", "Cast", [np.floor(A)], [], {"to": TensorProto.BOOL}),
+    ("from bool", "Cast", [TRUE], [], {"to": TensorProto.FLOAT}),
+    *((f"{op} all", op, [A], [], {"keepdims": 0}) for op in OPERATORS if op.startswith("Reduce")),
+    *(
+        (f"{op} {axis}", op, [CUBE], [ints(axis)], {"keepdims": keep})
+        for op in OPERATORS if op.startswith("Reduce")
+        for axis, keep in ((0, 1), (1, 0), (2, 1))
+    ),
+    ("reduce outer axes", "ReduceSum", [CUBE], [ints(0, 2)], {"keepdims": 0}),
+    ("softmax", "Softmax", [A], [], {"axis": 1}),
+    ("cumulative sum", "CumSum", [A], [ints(1)], {}),
+    ("cumulative sum down", "CumSum", [CUBE], [ints(1)], {}),
+    ("matmul", "MatMul", [values(5, 7), values(7, 70)], [], {}),
+    ("matmul of a batch", "MatMul", [values(2, 3, 5, 4), values(3, 4, 6)], [], {}),
+    ("matrix by vector", "MatMul", [values(3, 4), values(4)], [], {}),
+    ("vector by matrix", "MatMul", [values(4), values(4, 3)], [], {}),
+    ("gemm", "Gemm", [values(5, 7), values(7, 33), values(33)], [], {"alpha": -0.5, "beta": 2.0}),
+    ("gemm a'", "Gemm", [values(7, 5), values(7, 17)], [], {"transA": 1}),
+    ("gemm b'", "Gemm", [values(5, 19), values(6, 19), values(5, 1)], [], {"transB": 1}),
+    ("gemm a' b'", "Gemm", [values(7, 5), values(6, 7)], [], {"transA": 1, "transB": 1}),
+    ("concat", "Concat", [A, B], [], {"axis": 0}),
+    ("concat columns", "Concat", [CUBE, values(2, 2, 4)], [], {"axis": 1}),
+    ("split", "Split", [CUBE], [], {"axis": 2, "num_outputs": 2}),
+    ("split by lengths", "Split", [CUBE], [ints(1, 2)], {"axis": 1}),
+    ("slice", "Slice", [CUBE], [ints(1, -3), ints(3, 2**40), ints(1, 2)], {}),
+    ("gather", "Gather", [CUBE], [ints(2, 0, -1)], {"axis": 1}),
+    ("gather in turn", "Gather", [CUBE], [ints(1, 2)], {"axis": 2}),
+    ("gather one", "Gather", [CUBE], [np.array(1, np.int64)], {"axis": 0}),
+    ("transpose", "Transpose", [CUBE], [], {"perm": [2, 0, 1]}),
+    ("transpose all", "Transpose", [CUBE], [], {}),
+    ("expand", "Expand", [values(3, 1)], [ints(2, 3, 4)], {}),
+    ("reshape", "Reshape", [CUBE], [ints(0, -1)], {}),
+    ("squeeze", "Squeeze", [values(1, 3, 1)], [], {}),
+    ("squeeze one", "Squeeze", [values(1, 3, 1)], [ints(-1)], {}),
+    ("unsqueeze", "Unsqueeze", [A], [ints(0, 3)], {}),
+    ("flatten", "Flatten", [CUBE], [], {"axis": 2}),
+    ("dropout", "Dropout", [A], [], {}),
+    ("shape", "Shape", [CUBE], [], {}),
+    ("size", "Size", [CUBE], [], {}),
+    ("top", "TopK", [CUBE], [ints(3)], {"axis": 2}),
+    ("bottom", "TopK", [CUBE], [ints(2)], {"largest": 0}),
+    ("compress", "Compress", [A, TRUE[:, 0]], [], {"axis": 0}),
+    ("largest index", "ArgMax", [CUBE], [], {"axis": 2}),
+    ("smallest index", "ArgMin", [CUBE], [], {"axis": 2, "keepdims": 0}),
+]  # fmt: skip
+#: Outputs of a node: one unless named here.
+OUTPUTS = {"split": 2, "split by lengths": 2, "top": 2, "bottom": 2}
+#: ONNX's own element type of whole numbers that C has as int.
+PASSED = {"int64": np.int32, "float32": np.float32, "float64": np.float64, "bool": np.bool_}
+
+
+def model_of(op, given, constants, attributes, outputs):
+    """A model of one node."""
+    inputs = [
+        helper.make_tensor_value_info(f"x{i}", helper.np_dtype_to_tensor_dtype(x.dtype), x.shape)
+        for i, x in enumerate(given)
+    ]
+    fixed = [numpy_helper.from_array(np.asarray(c), f"k{i}") for i, c in enumerate(constants)]
+    names = [f"y{i}" for i in range(outputs)]
+    node = helper.make_node(
+        op, [*(i.name for i in inputs), *(f.name for f in fixed)], names, **attributes
+    )
+    ends = [helper.make_empty_tensor_value_info(name) for name in names]
+    graph = helper.make_graph([node], "one", inputs, ends, fixed)
+    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
+
+
+def tensors_of(given):
+    return {
+        f"x{i}": Tensor(f"in_x{i}", kind_of_array(x, ""), shape_of(x.shape))
+        for i, x in enumerate(given)
+    }
+
+
+def library(folder, functions, shared):
+    """Functions compiled together, with a working memory that is large enough for each."""
+    lengths = {k: max(f.lengths.get(k, 1) for f in functions) for k in ARRAYS}
+    members = " ".join(f"{k} {ARRAYS[k]}[{length}];" for k, length in lengths.items())
+    text = "\n".join(
+        [
+            "#include <math.h>\n#include <stdbool.h>",
+            f"typedef struct {{ {members} }} WORK;",
+            "WORK work;",
+            *(array(*parts) for parts in shared.constants.values()),
+            *(kernel_text(*kernel) for kernel in sorted(shared.kernels)),
+            *(f.text.removeprefix("static ").replace("static ", "") for f in functions),
+        ]
+    )
+    source, out = folder / "operators.c", folder / "operators.so"
+    source.write_text(text)
+    flags = [
+        *WARNINGS,
+        "-Wno-unused",
+        "-Wno-error=unused-const-variable",
+        "-O1",
+        "-shared",
+        "-fPIC",
+    ]
+    command = [COMPILERS[0], *flags, source, "-o", out, "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:3000]
+    return ctypes.CDLL(str(out))
+
+
+def called(compiled, function, counts, given):
+    """Outputs of a function by name, flat; of those of variable length as far as is known."""
+    arrays = [np.ascontiguousarray(given[n], PASSED[given[n].dtype.name]) for n in function.inputs]
+    pointers = [ctypes.c_void_p() for _ in function.outputs]
+    work = ctypes.byref(ctypes.c_char.in_dll(compiled, "work"))
+    call = getattr(compiled, function.name)
+    call(
+        work, *(ctypes.c_int(c) for c in counts),
+        *(a.ctypes.data_as(ctypes.c_void_p) for a in arrays), *(ctypes.byref(p) for p in pointers),
+    )  # fmt: skip
+    return {
+        name: (pointer, TYPES[kind], length)
+        for pointer, (name, (kind, length)) in zip(pointers, function.outputs.items(), strict=True)
+    }
+
+
+def read(output, length):
+    pointer, kind, _ = output
+    return np.array(ctypes.cast(pointer, ctypes.POINTER(kind))[:length])
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    if not COMPILERS:
+        pytest.skip("no C compiler")
+    shared, functions = SharedParts(), {}
+    for index, (name, op, given, constants, attributes) in enumerate(CASES):
+        outputs = OUTPUTS.get(name, 1)
+        model = model_of(op, given, constants, attributes, outputs)
+        names = [f"y{i}" for i in range(outputs)]
+        program = Program(shared, {})
+        functions[name] = graph_function(f"f{index}", model, program, tensors_of(given), names)
+    return functions, library(tmp_path_factory.mktemp("c"), list(functions.values()), shared)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
+def test_as_onnxruntime(case, compiled):
+    name, op, given, constants, attributes = case
+    functions, library_ = compiled
+    model = model_of(op, given, constants, attributes, OUTPUTS.get(name, 1))
+    feed = {f"x{i}": x for i, x in enumerate(given)}
+    session = ort.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    expected = session.run(None, feed)
+    found = called(library_, functions[name], [], feed)
+    for y, output in zip(expected, found.values(), strict=True):
+        assert output[2] in (y.size, -1)
+        np.testing.assert_allclose(read(output, y.size), y.reshape(-1), rtol=2e-6, atol=1e-6)
+
+
+def test_every_operator_has_a_case():
+    assert {case[1] for case in CASES} | {"ConstantOfShape"} == set(OPERATORS)
+
+
+def test_sizes_may_vary(tmp_path):
+    """Rows that are picked, joined to others and multiplied, in numbers known at run time only."""
+    if not COMPILERS:
+        pytest.skip("no C compiler")
+    weights = values(4, 6)
+    nodes = [
+        helper.make_node("Shape", ["x"], ["size"], end=1),
+        helper.make_node("ConstantOfShape", ["size"], ["ones"], value=ONES),
+        helper.make_node("Unsqueeze", ["ones", "one"], ["column"]),
+        helper.make_node("Concat", ["x", "column"], ["wide"], axis=1),
+        helper.make_node("Compress", ["wide", "chosen"], ["few"], axis=0),
+        helper.make_node("Concat", ["wide", "few"], ["both"], axis=0),
+        helper.make_node("MatMul", ["both", "w"], ["y"]),
+        helper.make_node("Reshape", ["y", "flat"], ["z"]),
+        helper.make_node("ReduceSum", ["z"], ["total"], keepdims=0),
+        helper.make_node("Shape", ["few"], ["number"], end=1),
+        helper.make_node("Cast", ["number"], ["count"], to=TensorProto.FLOAT),
+    ]  # fmt: skip
+    graph = helper.make_graph(
+        nodes, "rows",
+        [helper.make_tensor_value_info("x", 1, ["rows", 3]),
+         helper.make_tensor_value_info("chosen", 9, ["rows"])],
+        [helper.make_tensor_value_info(n, 1, None) for n in ("y", "total", "count")],
+        [numpy_helper.from_array(weights, "w"), numpy_helper.from_array(ints(1), "one"),
+         numpy_helper.from_array(ints(-1, 2), "flat")],
+    )  # fmt: skip
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
+    rows = Size.of("rows")
+    inputs = {
+        "x": Tensor("in_x", "float", (rows, Size(3))),
+        "chosen": Tensor("in_chosen", "bool", (rows,)),
+    }
+    shared = SharedParts()
+    program = Program(shared, {"rows": MOST_ROWS})
+    function = graph_function("varying", model, program, inputs, ["y", "total", "count"])
+    compiled_ = library(tmp_path, [function], shared)
+    session = ort.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+    for count in (ROWS, MOST_ROWS):
+        feed = {"x": values(count, 3), "chosen": RNG.random(count) < 0.5}
+        expected = session.run(None, feed)
+        found = called(compiled_, function, [count], feed)
+        for y, output in zip(expected, found.values(), strict=True):
+            np.testing.assert_allclose(read(output, y.size), y.reshape(-1), rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("op", "given", "constants", "attributes", "said"),
+    [
+        ("Einsum", [A, B], [], {"equation": "ij,ij->i"}, "operator Einsum is not known"),
+        ("Softmax", [A], [], {"axis": 0}, "Softmax along another axis"),
+        ("Slice", [A], [ints(0), ints(4), ints(0), ints(2)], {}, "Slice with steps"),
+        ("TopK", [A], [ints(2)], {"axis": 0}, "TopK along another axis"),
+        ("CumSum", [A], [ints(1)], {"reverse": 1}, "CumSum with exclusive or reverse"),
+        ("Cast", [A], [], {"to": TensorProto.FLOAT16}, "element type 10"),
+        ("Reshape", [A, ints(2, 6)], [], {}, "the shape of Reshape depends on the readings"),
+    ],
+)
+def test_what_is_not_known_is_refused_in_one_line(op, given, constants, attributes, said):
+    model = model_of(op, given, constants, attributes, 2 if op == "TopK" else 1)
+    with pytest.raises(ModelFileError, match=said) as caught:
+        graph_function("f", model, Program(SharedParts(), {}), tensors_of(given), ["y0"])
+    assert "\n" not in str(caught.value)

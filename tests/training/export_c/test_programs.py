@@ -1,0 +1,87 @@
+"""Programs in C and C++ around exported files: examples, and a run under sanitizers."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from compiled_c import COMPILERS, ROOT, WARNINGS
+from simulated_rows import rows_of
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not COMPILERS, reason="no C compiler"),
+]
+EXAMPLES = ROOT / "examples" / "board"
+SANITIZERS = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+FIELDS = ("slip", "torque", "load", "sinkage", "drawbar_pull")
+
+
+def build(command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:3000]
+    assert done.stderr == ""
+
+
+def run(program, given=""):
+    done = subprocess.run([program], input=given, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:3000]
+    return done.stdout
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_c_example(compiler, exported, tmp_path):
+    folder, program = exported("wheel"), tmp_path / "board"
+    sources = [EXAMPLES / "main.c", folder / "wheel.c"]
+    build([compiler, *WARNINGS, "-O1", f"-I{folder}", *sources, "-lm", "-o", program])
+    *_, last = run(program).splitlines()
+    assert last == "answered"
+
+
+@pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler")
+def test_the_cpp_example(exported, tmp_path):
+    folder, program, made = exported("any_wheel"), tmp_path / "board", tmp_path / "any_wheel.o"
+    build([COMPILERS[0], *WARNINGS, "-O1", "-c", folder / "any_wheel.c", "-o", made])
+    warnings = ["-std=c++11", *WARNINGS[1:]]
+    source = EXAMPLES / "main.cpp"
+    build(["g++", *warnings, f"-I{folder}", source, made, "-lm", "-o", program])
+    lines = run(program).splitlines()
+    assert len(lines) == 2 and all(line.endswith(", in range") for line in lines)
+
+
+def sanitized(folder, program):
+    """Whether the driver could be built with sanitizers, whose libraries may be missing."""
+    driver = ROOT / "tests" / "training" / "export_c" / "driver.c"
+    command = ["gcc", "-std=c99", "-O1", *SANITIZERS, f"-I{folder}", driver, folder / "wheel.c"]
+    done = subprocess.run([*command, "-lm", "-o", program], capture_output=True)
+    return done.returncode == 0
+
+
+@pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
+def test_no_access_out_of_bounds_and_nothing_undefined(exported, compiled, tmp_path):
+    """Sets with rows of every sort; the answers are also those of the file without sanitizers."""
+    program, rng = tmp_path / "driver", np.random.default_rng(6)
+    if not sanitized(exported("wheel"), program):
+        pytest.skip("gcc has no sanitizers here")
+    odd = np.array([np.nan, np.inf, -np.inf, 0.0, -1.0, 2.0, 1e-40, 3e38], np.float32)
+    sets = []
+    for _ in range(12):
+        rows = np.stack([rows_of(rng, 40)[name] for name in FIELDS], axis=1)
+        spoilt = rng.random(rows.shape) < 0.03
+        rows[spoilt] = rng.choice(odd, spoilt.sum())
+        sets.append(rows)
+    lines = ["\n".join(" ".join(f"{v:.9g}" for v in row) for row in rows) for rows in sets]
+    found = np.loadtxt(run(program, "\n\n".join(lines) + "\n").splitlines())
+    model, expected = compiled("wheel"), []
+    for rows in sets:
+        memory = model.start()
+        for values in rows:
+            row = model.row(**dict(zip(FIELDS, values.tolist(), strict=True)))
+            alone, one = model.single(row)
+            step, _ = model.step(memory, (type(row) * 1)(row))
+            answer, whole = model.answer(memory)
+            means = [one["mean"] * (alone >= 0), whole["mean"] * (answer >= 0)]
+            expected.append([alone, step, answer, *np.stack(means, axis=1).reshape(-1)])
+    expected = np.array(expected)
+    assert (found[:, :3] == expected[:, :3]).all() and len(np.unique(found[:, :3])) > 3
+    np.testing.assert_allclose(found[:, 3:], expected[:, 3:], rtol=1e-3, atol=1e-12)

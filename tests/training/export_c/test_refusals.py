@@ -1,0 +1,127 @@
+"""What the C code refuses: by a code, and with the memory as it was."""
+
+import ctypes
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.slow
+
+READING = {"slip": 0.3, "torque": 3.0, "load": 60.0}
+BAD = [
+    ({"slip": np.nan}, "BAD_READING"),
+    ({"slip": 1.0}, "BAD_READING"),
+    ({"slip": -1.0}, "BAD_READING"),
+    ({"torque": np.inf}, "BAD_READING"),
+    ({"torque": np.nan}, "BAD_READING"),
+    ({"load": 0.0}, "BAD_READING"),
+    ({"load": -np.inf}, "BAD_READING"),
+    ({"sinkage": np.inf}, "BAD_READING"),
+    ({"drawbar_pull": -np.inf}, "BAD_READING"),
+    ({"torque_std": 0.0}, "BAD_STD"),
+    ({"torque_std": np.inf}, "BAD_STD"),
+    ({"torque_bias": -1.0}, "BAD_STD"),
+    ({"sinkage": 0.02, "sinkage_std": -0.001}, "BAD_STD"),
+]
+
+
+@pytest.fixture
+def wheel(compiled):
+    return compiled("wheel")
+
+
+@pytest.fixture
+def memory(wheel):
+    """A memory of three rows."""
+    made = wheel.start()
+    rows = wheel.rows(slip=[0.1, 0.3, 0.5], torque=[1.5, 3.0, 3.6], load=[60.0] * 3)
+    assert wheel.step(made, rows)[0] == 0
+    return made
+
+
+@pytest.mark.parametrize(("change", "code"), BAD)
+def test_a_bad_row_changes_nothing(change, code, wheel, memory):
+    before = bytes(memory)
+    row = READING | change
+    rows = (wheel.structs["wheel_row"] * 2)(wheel.row(**READING), wheel.row(**row))
+    assert wheel.step(memory, rows)[0] == wheel.codes[code] < 0
+    assert bytes(memory) == before
+    if set(change) <= set(READING):
+        assert wheel.single(wheel.row(**row))[0] == wheel.codes[code]
+
+
+def test_a_bad_number_of_rows_changes_nothing(wheel, memory):
+    before = bytes(memory)
+    rows = wheel.rows(**{k: [v] * 33 for k, v in READING.items()})
+    for count in (-1, 0, 33):
+        code = wheel.call("set_step", memory, rows, count, None, wheel.work)
+        assert code == wheel.codes["BAD_COUNT"]
+    assert bytes(memory) == before
+
+
+def test_numbers_beyond_float_change_nothing(wheel, memory):
+    before = bytes(memory)
+    row = wheel.row(**READING, torque_bias=3e38, torque_std=1e-30)
+    code, _ = wheel.step(memory, (type(row) * 1)(row))
+    assert code in (wheel.codes["NOT_FINITE"], wheel.codes["OK"])
+    assert bytes(memory) == before or np.isfinite(memory.factor[:]).all()
+
+
+@pytest.mark.parametrize("value", [1e-38, 1e10, 3e38])
+@pytest.mark.parametrize("name", ["torque", "load", "sinkage", "drawbar_pull", "torque_std"])
+def test_extreme_readings_are_answered_by_finite_numbers_or_a_code(name, value, wheel, memory):
+    row = wheel.row(**(READING | {name: value}))
+    code, _ = wheel.step(memory, (type(row) * 1)(row))
+    answered, estimate = wheel.answer(memory)
+    assert np.isfinite(memory.factor[:]).all() and np.isfinite(estimate["mean"]).all()
+    assert code in (0, wheel.codes["NOT_FINITE"]) and answered >= 0
+
+
+def test_a_memory_that_was_not_started_is_refused(wheel):
+    empty = wheel.new("memory")
+    rows = wheel.rows(**{k: [v] for k, v in READING.items()})
+    assert wheel.step(empty, rows)[0] == wheel.codes["NOT_STARTED"]
+    assert wheel.answer(empty)[0] == wheel.codes["NOT_STARTED"]
+
+
+def test_the_memory_of_another_file_is_refused(wheel, compiled):
+    other = compiled("kls1_wheel")
+    memory = ctypes.cast(
+        ctypes.pointer(other.start()), ctypes.POINTER(wheel.structs["wheel_memory"])
+    )
+    assert wheel.answer(memory.contents)[0] == wheel.codes["NOT_STARTED"]
+
+
+def test_no_row_is_no_answer(wheel):
+    assert wheel.answer(wheel.start())[0] == wheel.codes["NO_ROWS"]
+
+
+def test_rows_out_of_range_are_told_and_end_in_the_prior(wheel, memory):
+    before = list(memory.factor)
+    rows = wheel.rows(slip=[0.7, 0.3], torque=[3.0, 3.0], load=[60.0, 500.0])
+    assert wheel.step(memory, rows) == (0, [False, False])
+    assert list(memory.factor) == before and list(memory.counted) == [3.0, 5.0, 3.0]
+    code, answer = wheel.answer(memory)
+    assert code == wheel.codes["OUT_OF_RANGE"] and not answer["in_range"]
+    assert answer["abstains"].all()
+
+
+def test_a_wheel_out_of_range_is_refused(compiled):
+    model = compiled("any_wheel")
+    good = {
+        "wheel_radius": 0.15, "wheel_width": 0.12, "bearing_modulus": 1.5e6, "n": 1.1,
+        "bearing_std": 0.0, "cohesion_max": 3000.0, "shear_modulus_max": 0.03,
+    }  # fmt: skip
+    model.start(**good)
+    for name, value in (("wheel_radius", 5.0), ("n", np.nan), ("bearing_std", -0.1)):
+        code = model.call(
+            "set_start", model.new("memory"), model.new("context", **good | {name: value})
+        )
+        assert code == model.codes["BAD_CONTEXT"]
+
+
+def test_every_code_has_words(wheel):
+    message = wheel.library.wheel_message
+    message.restype = ctypes.c_char_p
+    texts = {message(code) for code in wheel.codes.values() if -8 < code < 2}
+    assert len(texts) == 9 and message(77) == b"unknown code"

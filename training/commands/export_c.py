@@ -1,0 +1,83 @@
+"""`soilml export-c`: a model file as C code for a board without Python."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+
+from soilml.cli.options import InputFile
+from soilml.errors import InputError
+from soilml.io.atomic_files import atomic_outputs, output_files
+from soilml.optional_imports import need
+
+HELP = "write a model file as C99 code"
+DESCRIPTION = """\
+Write MODEL.onnx as the C file OUT.c and its header OUT.h: C99, libm alone,
+no allocation; the header states the memory that is needed.
+
+  soilml export-c exported/wheel.onnx wheel.c
+  gcc -std=c99 -O3 main.c wheel.c -lm
+
+Functions, with NAME the name of OUT.c:
+
+  NAME_single          the estimate from one row
+  NAME_set_start       begin a set of rows of one soil
+  NAME_set_step        add rows to a set
+  NAME_set_answer      the estimate from all rows of the set
+  NAME_set_update      a step and its answer in one
+
+docs/c-export.md describes them, with an example in C and one in C++.
+"""
+#: Rows of one step that the working memory may be asked for.
+MOST_ROWS = 4096
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
+    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
+    parser.add_argument(
+        "--rows",
+        type=int,
+        default=32,
+        metavar="N",
+        help="rows that one step of a set takes at most; working memory grows with it (default 32)",
+    )
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return output_files(args.out, ".c", ".h")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Translate a model file."""
+    need("onnx", "export-c")
+    import onnx
+
+    from soilml.onboard.model_file import open_model
+    from training.export_c.c_file import write_c
+
+    out = Path(args.out)
+    if not re.fullmatch(r"[a-z_][a-z0-9_]*", out.stem):
+        raise InputError(
+            f"{args.out}: {out.stem!r} begins the names of the C functions; needed are lower-case "
+            "letters, digits and underscores, and a letter first, as in wheel.c"
+        )
+    if not 1 <= args.rows <= MOST_ROWS:
+        raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
+    _, metadata = open_model(args.model)
+    origin = Path(args.model).name
+    written = write_c(onnx.load(str(args.model)), metadata, out.stem, origin, args.rows)
+    with atomic_outputs(outputs(args)) as (source, header):
+        source.write_text(written.source, encoding="utf-8")
+        header.write_text(written.header, encoding="utf-8")
+    of_set = f"memory of a set {written.memory_bytes}, " if written.memory_bytes else ""
+    print(
+        f"written: {out} ({len(written.source) / 1e3:.0f} kB), {out.with_suffix('.h')}; bytes of "
+        f"constants {written.constant_bytes}, {of_set}working memory {written.work_bytes}",
+        file=sys.stderr,
+    )
+    return 0

@@ -1,0 +1,188 @@
+"""A model file as a C file and its header."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from soilml import __version__
+from soilml.onboard.model_file import read_fields
+from soilml.onboard.set_contract import MEMORY_INPUTS
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
+from training.export_c.functions import (
+    ARRAYS,
+    WIDTH,
+    GraphFunction,
+    answer_function,
+    single_function,
+    step_function,
+    update_function,
+)
+from training.export_c.graph_translation import rows_are_apart
+from training.export_c.interface import Interface, read_interface
+from training.export_c.literals import array, number
+from training.export_c.program import Constant, SharedParts
+
+#: Bytes of an element, as all usual compilers have them; the C file checks what follows from it.
+BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
+#: Rows that one call takes, unless the user wants another number.
+ROWS_PER_CALL = 32
+TEMPLATES = Path(__file__).parent / "templates"
+#: Functions of the C library in the kernels, by element type.
+_MATH = {"EXP": {"float": "expf", "double": "exp"}}
+
+
+@dataclass(frozen=True)
+class CFile:
+    """Texts of the C file and of its header, and the memory that they need.
+
+    Parameters
+    ----------
+    source, header : str
+        C99.
+    memory_bytes, work_bytes, constant_bytes : int
+        Memory of one set, working memory of a call, and constants.
+    """
+
+    source: str
+    header: str
+    memory_bytes: int
+    work_bytes: int
+    constant_bytes: int
+
+
+def write_c(
+    model: Any, metadata: Mapping[str, str], name: str, origin: str, rows: int = ROWS_PER_CALL
+) -> CFile:
+    """Translate a model file.
+
+    Parameters
+    ----------
+    model : onnx.ModelProto
+        The model with its graph.
+    metadata : mapping of str to str
+        The metadata of the file.
+    name : str
+        Prefix of all C names that a user sees.
+    origin : str
+        Name of the model file, for the comment at the head.
+    rows : int
+        Rows that one step takes at most.
+
+    Raises
+    ------
+    ModelFileError
+        For a graph with an operator, a type or a shape that is not known.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    interface, shared = read_interface(model, metadata), SharedParts()
+    functions: dict[str, GraphFunction] = {}
+    if interface.single:
+        functions["single"] = single_function(model, interface, shared)
+    if interface.sets:
+        if rows_are_apart(model):
+            functions["step"] = step_function(model, interface, shared, rows)
+        else:
+            functions["update"] = update_function(model, interface, shared, rows)
+        functions["answer"] = answer_function(model, interface, shared)
+    used = frozenset().union(*(function.constants for function in functions.values()))
+    constants = [parts for parts in shared.constants.values() if parts[0] in used]
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters["float"] = lambda x: number(x, "float")
+    environment.globals["arguments"] = lambda function: _arguments(interface, function)
+    sizes = _sizes(interface, functions, constants, rows)
+    fields = read_fields(metadata)
+    values = {
+        "name": name,
+        "NAME": name.upper(),
+        "origin": origin,
+        "version": __version__,
+        "sha": metadata["graph_sha256"],
+        "interface": interface,
+        "functions": functions,
+        "arrays": _arrays(functions),
+        "constants": [array(*parts) for parts in constants],
+        "kernels": [kernel_text(kernel, kind) for kernel, kind in sorted(shared.kernels)],
+        "rows": rows,
+        "quantities": list(zip(fields["names"], fields["units"], strict=True)),
+        "lower": fields["prior"].lower.tolist(),
+        "upper": fields["prior"].upper.tolist(),
+        "factors": fields["pooling"].single_row_coverage_factor.tolist(),
+        "z90": Z_90,
+        "vague": NOT_IDENTIFIED_ABOVE,
+        **sizes,
+    }
+    source, header = (
+        environment.get_template(f"{part}.j2").render(values) for part in ("source.c", "header.h")
+    )
+    return CFile(source, header, **sizes)
+
+
+def _arrays(functions: Mapping[str, GraphFunction]) -> dict[str, tuple[str, int]]:
+    """Arrays of the working memory, which all functions share: type and length by name."""
+    return {
+        name: (kind, max(f.lengths.get(kind, 0) for f in functions.values()))
+        for kind, name in ARRAYS.items()
+        if any(kind in f.lengths for f in functions.values())
+    }
+
+
+def _sizes(
+    interface: Interface,
+    functions: Mapping[str, GraphFunction],
+    constants: Sequence[Constant],
+    rows: int,
+) -> dict[str, int]:
+    """Bytes of the structs that a user allocates, rounded up to a double."""
+    work = sum(BYTES[kind] * length for kind, length in _arrays(functions).values())
+    if interface.sets:
+        work += len(interface.rows) * rows * BYTES["float"]
+        work += interface.columns * max(interface.columns * BYTES["float"], BYTES["double"])
+        work += interface.columns * BYTES["double"]
+    triangle = interface.columns * (interface.columns + 1) // 2
+    memory = triangle * BYTES["double"] + (3 + len(interface.context)) * BYTES["float"] + 16
+    return {
+        "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
+        "work_bytes": -(-work // 8) * 8,
+        "constant_bytes": sum(values.size * BYTES[kind] for _, values, kind in constants),
+    }
+
+
+def _arguments(interface: Interface, function: GraphFunction) -> str:
+    """What a function of a set is given after its counts, as lines of C."""
+    given = [_argument(interface, name) for name in function.inputs]
+    given += [f"&out_{name}" for name in function.outputs]
+    indent = " " * 8
+    lines = textwrap.wrap(", ".join(given), WIDTH, initial_indent=indent, subsequent_indent=indent)
+    return "\n" + "\n".join(lines)
+
+
+def _argument(interface: Interface, name: str) -> str:
+    """What a function of a set is given for an input of the graph."""
+    if name == MEMORY_INPUTS[0]:
+        return "work->system"
+    if name == MEMORY_INPUTS[1]:
+        return "memory->counted"
+    for index, field in enumerate(interface.rows):
+        if field.name == name:
+            return f"work->readings[{index}]"
+    return f"&memory->context.{name}"
+
+
+def kernel_text(name: str, kind: str) -> str:
+    """The text of a kernel for one element type."""
+    text = (TEMPLATES / "kernels" / f"{name}.c").read_text()
+    for mark, functions in _MATH.items():
+        text = text.replace(mark, functions.get(kind, mark))
+    return text.replace("REAL", kind)

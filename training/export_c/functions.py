@@ -1,0 +1,169 @@
+"""The functions of a C file that compute a graph: for one row, a step of a set, its answer."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.onboard.set_contract import (
+    MEMORY_OUTPUTS,
+    ROW_IN_RANGE,
+    SET_PREFIX,
+    SET_SWITCH,
+)
+from training.export_c.graph_translation import translate_graph
+from training.export_c.interface import Interface, input_shapes
+from training.export_c.memory_plan import MemoryPlan, plan_memory
+from training.export_c.program import Program, SharedParts
+from training.export_c.sizes import Shape, Size
+from training.export_c.tensor import Tensor
+
+#: Names of the arrays of the working memory, by the type of their elements.
+ARRAYS = {"double": "doubles", "float": "floats", "int": "ints", "bool": "bools"}
+#: Element types of the constants that stand for inputs.
+DTYPES = {"double": np.float64, "float": np.float32, "int": np.int32, "bool": np.bool_}
+#: Counts that a function may be given: rows of readings, and rows of the memory.
+ROWS, KEPT = "rows", "kept"
+#: Outputs that a step needs: the memory, the counts, and which rows are in range.
+STEP_OUTPUTS = (*MEMORY_OUTPUTS, ROW_IN_RANGE)
+#: Width of lines of C.
+WIDTH = 100
+
+
+@dataclass(frozen=True)
+class GraphFunction:
+    """One function: its text, and what it takes and gives.
+
+    Parameters
+    ----------
+    name, text : str
+        Name and C text of the function.
+    inputs : tuple of str
+        Inputs of the graph that it reads, after the working memory and the counts.
+    outputs : dict of str to (str, int)
+        C type and number of elements of each output; -1 for a number that varies.
+    lengths : dict of str to int
+        Elements of working memory by type.
+    constants : frozenset of str
+        Names of the constant arrays that it reads.
+    """
+
+    name: str
+    text: str
+    inputs: tuple[str, ...]
+    outputs: dict[str, tuple[str, int]]
+    lengths: dict[str, int]
+    constants: frozenset[str]
+
+
+def single_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
+    """The estimate from one row."""
+    inputs = _inputs(model, {ROWS: Size(1), KEPT: Size(0)}, switch=False)
+    names = [o.name for o in model.graph.output]
+    return graph_function("single_graph", model, Program(shared, {}), inputs, names)
+
+
+def step_function(
+    model: Any, interface: Interface, shared: SharedParts, rows: int
+) -> GraphFunction:
+    """The rows that readings add to the memory of a set, and the counts; no answer."""
+    inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size(0)}, switch=True)
+    return graph_function("step_graph", model, Program(shared, {ROWS: rows}), inputs, STEP_OUTPUTS)
+
+
+def update_function(
+    model: Any, interface: Interface, shared: SharedParts, rows: int
+) -> GraphFunction:
+    """The memory with the rows that readings add, the counts, and the answer."""
+    inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size.of(KEPT)}, switch=True)
+    program = Program(shared, {ROWS: rows, KEPT: interface.columns})
+    names = [*STEP_OUTPUTS, *_answers(model)]
+    return graph_function("update_graph", model, program, inputs, names)
+
+
+def answer_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
+    """The estimate from the memory of a set."""
+    inputs = _inputs(model, {ROWS: Size(0), KEPT: Size.of(KEPT)}, switch=True)
+    program = Program(shared, {KEPT: interface.columns})
+    return graph_function("answer_graph", model, program, inputs, _answers(model))
+
+
+def _answers(model: Any) -> list[str]:
+    """Outputs that belong to a set."""
+    return [o.name for o in model.graph.output if o.name.startswith(SET_PREFIX)]
+
+
+def _inputs(model: Any, counts: Mapping[str, Size], switch: bool) -> dict[str, Tensor]:
+    """The inputs of the graph for given numbers of rows, and the branch of the set posterior."""
+    inputs = {}
+    for name, (kind, dims) in input_shapes(model).items():
+        if name == SET_SWITCH:
+            inputs[name] = Tensor.constant(np.asarray([switch]), name)
+            continue
+        shape: Shape = tuple(
+            Size(d) if isinstance(d, int) else counts[KEPT if len(dims) > 1 else ROWS] for d in dims
+        )
+        empty = any(size == Size(0) for size in shape)
+        if empty:
+            values: NDArray[Any] = np.zeros([s.constant for s in shape], DTYPES[kind])
+            inputs[name] = Tensor.constant(values, name)
+        else:
+            inputs[name] = Tensor(f"in_{name}", kind, shape)
+    return inputs
+
+
+def graph_function(
+    name: str, model: Any, program: Program, inputs: Mapping[str, Tensor], wanted: Sequence[str]
+) -> GraphFunction:
+    """Translate a graph and write the function.
+
+    Its parameters are the working memory, the counts of the program, the inputs that are read, and
+    for each output a pointer that is set to it. It returns the length of an output of variable
+    length that is a matrix, if there is one.
+    """
+    given = tuple(program.bounds)
+    found = translate_graph(model, program, inputs, wanted)
+    plan = plan_memory(program, frozenset(tensor.owner for tensor in found.values()))
+    given_on = program.given | {tensor.owner for tensor in found.values()}
+    read = [n for n, tensor in inputs.items() if tensor.name in given_on]
+    varying = [t.shape[0] for t in found.values() if not t.count.fixed and t.rank > 1]
+    parameters = [
+        "WORK *work",
+        *(f"int {count}" for count in given),
+        *(f"const {inputs[n].kind} *in_{n}" for n in read),
+        *(f"const {tensor.kind} **out_{key}" for key, tensor in found.items()),
+    ]
+    head = f"static {'int' if varying else 'void'} {name}({', '.join(parameters)})"
+    lines = [*textwrap.wrap(head, WIDTH, subsequent_indent=" " * 4), "{"]
+    lines += _statements(program, plan)
+    lines += [f"    *out_{key} = {tensor.name};" for key, tensor in found.items()]
+    lines += [f"    return {varying[0].c};"] if varying else []
+    sizes = {k: (t.kind, t.count.constant if t.count.fixed else -1) for k, t in found.items()}
+    code = " ".join(s.code for s in program.statements)
+    names = {*re.findall(r"\bw\d+\b", code), *(tensor.owner for tensor in found.values())}
+    text = "\n".join([*lines, "}"])
+    return GraphFunction(name, text, tuple(read), sizes, plan.lengths, frozenset(names))
+
+
+def _statements(program: Program, plan: MemoryPlan) -> list[str]:
+    """The statements of a program, each tensor declared where it is written first."""
+    lines: list[str] = []
+    born: set[str] = set()
+    for statement in program.statements:
+        if statement.comment:
+            text = f"/* {statement.comment} */"
+            lines += textwrap.wrap(text, WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 7)
+        for own in statement.names:
+            if own not in born:
+                kind = program.memory[own][0]
+                place = f"work->{ARRAYS[kind]} + {plan.offsets[own]}"
+                lines.append(f"    {kind} *const {own} = {place};")
+                born.add(own)
+        lines.append(statement.code)
+    return lines

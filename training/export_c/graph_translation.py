@@ -1,0 +1,194 @@
+"""An ONNX graph, with some inputs fixed, as a program."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from soilml.errors import ModelFileError
+from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_SWITCH
+from training.export_c.node import Node
+from training.export_c.operators import OPERATORS
+from training.export_c.program import Program
+from training.export_c.sizes import Size
+from training.export_c.tensor import Tensor
+
+
+def translate_graph(
+    model: Any, program: Program, inputs: Mapping[str, Tensor], outputs: Sequence[str]
+) -> dict[str, Tensor]:
+    """Append the computation of some outputs to a program.
+
+    Nodes whose inputs are constant are computed now, a branch by a constant condition is chosen
+    now, and nodes that the outputs do not need are left out.
+
+    Parameters
+    ----------
+    model : onnx.ModelProto
+        The model; its graph may have If nodes.
+    program : Program
+        Receives the statements.
+    inputs : mapping of str to Tensor
+        Inputs of the graph by name: constants, or tensors that the C function is given.
+    outputs : sequence of str
+        Outputs that are computed.
+
+    Raises
+    ------
+    ModelFileError
+        For an operator, or a form of it, that is not known.
+    """
+    from onnx import numpy_helper
+
+    known: dict[str, Tensor] = {}
+    for initial in model.graph.initializer:
+        known[initial.name] = Tensor.constant(numpy_helper.to_array(initial), initial.name)
+    known |= inputs
+    opsets = model.opset_import
+    nodes = _needed(_without_branches(model.graph, known), set(outputs))
+    uses = Counter(name for node in nodes for name in node.input)
+    uses.update(dict.fromkeys(outputs, 2))
+    for node in nodes:
+        found = _translate(program, node, [known.get(n) for n in node.input], opsets)
+        for name, tensor in zip(node.output, found, strict=False):
+            several = tensor.pending and uses[name] > 1
+            known[name] = program.stored(tensor) if several else tensor
+    return {name: program.stored(known[name]) for name in outputs if known[name].count != Size(0)}
+
+
+def rows_are_apart(model: Any) -> bool:
+    """Whether the rows that readings add to the memory of a set do not depend on that memory.
+
+    They can then be computed without it, and without the answer.
+
+    Raises
+    ------
+    ModelFileError
+        Unless the memory is passed on with further rows below it: packed rows are added to a
+        factor in double precision, and earlier ones cannot be changed.
+    """
+    switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
+    memory, grown = MEMORY_INPUTS[0], MEMORY_OUTPUTS[0]
+    nodes = _without_branches(model.graph, switch)
+    makers = {name: node for node in nodes for name in node.output}
+    joined = _source(makers, grown, "Concat")
+    if joined is None or _source(makers, joined.input[0], "", memory) is None:
+        raise ModelFileError(
+            f"export-c needs a graph whose {grown} is {memory} with the rows of new readings "
+            "below it; this graph changes earlier rows"
+        )
+    wanted = {*joined.input[1:], ROW_IN_RANGE}
+    return not any(memory in node.input for node in _needed(nodes, wanted))
+
+
+def _source(makers: dict[str, Any], name: str, kind: str, wanted: str = "") -> Any:
+    """The node of a kind, or the input, that a value is passed on from, if need be guarded."""
+    passing = {"Identity": 0, "Where": 1}  # a guard: the value where it is sound, else a constant
+    while name != wanted:
+        node = makers.get(name)
+        if node is None or node.op_type == kind:
+            return node
+        if node.op_type not in passing:
+            return None
+        name = node.input[passing[node.op_type]]
+    return name
+
+
+def _translate(
+    program: Program, node: Any, inputs: list[Tensor | None], opsets: Any
+) -> list[Tensor]:
+    from onnx import helper
+
+    if node.op_type == "Constant" or (
+        node.op_type in OPERATORS and all(t is None or t.value is not None for t in inputs)
+    ):
+        return _computed_now(node, inputs, opsets)
+    if node.op_type not in OPERATORS:
+        raise ModelFileError(f"operator {node.op_type} is not known to export-c")
+    attributes = {a.name: helper.get_attribute_value(a) for a in node.attribute}
+    if "value" in attributes:
+        from onnx import numpy_helper
+
+        attributes["value"] = numpy_helper.to_array(attributes["value"])
+    translated = Node(node.op_type, tuple(inputs), attributes, len(node.output))
+    before = len(program.statements)
+    program.begin(_comment(node))
+    found = OPERATORS[node.op_type](program, translated)
+    if all(tensor.count == Size(0) for tensor in found):
+        del program.statements[before:]
+        return [_empty(tensor) for tensor in found]
+    return found
+
+
+def _computed_now(node: Any, inputs: list[Tensor | None], opsets: Any) -> list[Tensor]:
+    """Outputs of a node whose inputs are constant, by ONNX's reference implementation."""
+    from onnx import helper
+    from onnx.reference import ReferenceEvaluator
+
+    values = {
+        name: tensor.value
+        for name, tensor in zip(node.input, inputs, strict=True)
+        if tensor is not None
+    }
+    infos = [
+        helper.make_tensor_value_info(name, helper.np_dtype_to_tensor_dtype(v.dtype), v.shape)
+        for name, v in values.items()
+        if v is not None
+    ]
+    outputs = [name for name in node.output if name]
+    ends = [helper.make_empty_tensor_value_info(name) for name in outputs]
+    graph = helper.make_graph([node], "constant", infos, ends)
+    model = helper.make_model(graph, opset_imports=opsets)
+    found = ReferenceEvaluator(model).run(None, values)
+    return [Tensor.constant(np.asarray(x), n) for x, n in zip(found, outputs, strict=True)]
+
+
+def _without_branches(graph: Any, known: dict[str, Tensor]) -> list[Any]:
+    """The nodes of a graph, with each If node replaced by its chosen branch."""
+    from onnx import helper, numpy_helper
+
+    nodes: list[Any] = []
+    for node in graph.node:
+        if node.op_type != "If":
+            nodes.append(node)
+            continue
+        condition = known.get(node.input[0])
+        if condition is None or condition.value is None:
+            raise ModelFileError(
+                "operator If whose condition depends on the readings is not known to export-c"
+            )
+        chosen = "then_branch" if condition.value.all() else "else_branch"
+        branch = next(helper.get_attribute_value(a) for a in node.attribute if a.name == chosen)
+        for initial in branch.initializer:
+            known[initial.name] = Tensor.constant(numpy_helper.to_array(initial), initial.name)
+        nodes += _without_branches(branch, known)
+        nodes += [
+            helper.make_node("Identity", [own.name], [name])
+            for own, name in zip(branch.output, node.output, strict=True)
+        ]
+    return nodes
+
+
+def _needed(nodes: list[Any], wanted: set[str]) -> list[Any]:
+    """The nodes that the wanted outputs depend on, in their order."""
+    kept = []
+    for node in reversed(nodes):
+        if any(name in wanted for name in node.output):
+            wanted |= set(node.input)
+            kept.append(node)
+    return kept[::-1]
+
+
+def _comment(node: Any) -> str:
+    made = ", ".join(name for name in node.output if name)
+    return f"{made} = {node.op_type}({', '.join(node.input)})"
+
+
+def _empty(tensor: Tensor) -> Tensor:
+    """A constant of a shape without elements."""
+    dtype = {"float": np.float32, "double": np.float64, "int": np.int64, "bool": np.bool_}
+    sizes = [size.constant if size.fixed else 0 for size in tensor.shape]
+    return Tensor.constant(np.zeros(sizes, dtype[tensor.kind]), "")

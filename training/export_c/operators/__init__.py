@@ -1,0 +1,20 @@
+"""ONNX operators as C: every operator that export-c knows, by its name."""
+
+from __future__ import annotations
+
+from training.export_c.node import Translation
+from training.export_c.operators import (
+    elementwise,
+    products,
+    rearrangement,
+    reductions,
+    selection,
+)
+
+OPERATORS: dict[str, Translation] = {
+    **elementwise.OPERATORS,
+    **products.OPERATORS,
+    **rearrangement.OPERATORS,
+    **reductions.OPERATORS,
+    **selection.OPERATORS,
+}

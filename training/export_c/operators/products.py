@@ -1,0 +1,122 @@
+"""Products of matrices."""
+
+from __future__ import annotations
+
+from training.export_c.literals import number
+from training.export_c.loops import element, indices_of, leaves_of, nest, offset
+from training.export_c.node import Node, Translation
+from training.export_c.operators.rearrangement import transposed
+from training.export_c.program import Program
+from training.export_c.sizes import Shape, Size, broadcast, strides
+from training.export_c.tensor import Tensor
+
+
+def translate_gemm(program: Program, node: Node) -> list[Tensor]:
+    """`alpha a b + beta c` of two matrices, either of which may be transposed."""
+    a, b, c = node.input(0), program.stored(node.input(1)), node.optional(2)
+    transpose_a, transpose_b = (int(node.attributes.get(k, 0)) for k in ("transA", "transB"))
+    alpha, beta = (float(node.attributes.get(k, 1.0)) for k in ("alpha", "beta"))
+    if a.source is not None and transpose_b and not transpose_a:
+        out = _started(program, a.kind, (a.shape[0], b.shape[0]), c, beta)
+        _emit_by_rows(program, a.source, b, alpha, out)
+        return [out]
+    a = program.stored(a)
+    if transpose_a and transpose_b:
+        a, transpose_a = transposed(program, a, [1, 0]), 0
+    m, k = (a.shape[1], a.shape[0]) if transpose_a else (a.shape[0], a.shape[1])
+    n = b.shape[0] if transpose_b else b.shape[1]
+    out = _started(program, a.kind, (m, n), c, beta)
+    steps = (Size(1), m) if transpose_a else (k, Size(1))
+    _emit(program, (m, k, n), alpha, (a, *steps), b, bool(transpose_b), out)
+    return [out]
+
+
+def translate_matmul(program: Program, node: Node) -> list[Tensor]:
+    """A product of matrices or vectors, for each pair of a batch."""
+    a, b = program.stored(node.input(0)), program.stored(node.input(1))
+    left = a.seen_as((Size(1), *a.shape)) if a.rank == 1 else a
+    right = b.seen_as((*b.shape, Size(1))) if b.rank == 1 else b
+    batch = broadcast([left.shape[:-2], right.shape[:-2]])
+    m, k, n = left.shape[-2], left.shape[-1], right.shape[-1]
+    out = _started(program, a.kind, (*batch, m, n), None, 1.0)
+    indices = indices_of(batch)
+    _emit(
+        program, (m, k, n), 1.0, (left, k, Size(1)), right, False, out,
+        batch, indices, [_offset(left, batch, indices), _offset(right, batch, indices)],
+    )  # fmt: skip
+    shape = (*batch, *([] if a.rank == 1 else [m]), *([] if b.rank == 1 else [n]))
+    return [out.seen_as(shape)]
+
+
+def _offset(tensor: Tensor, batch: Shape, indices: list[str]) -> str:
+    """Where the matrix of a batch begins in a tensor that may be broadcast over it."""
+    own = (Size(1),) * (len(batch) + 2 - tensor.rank) + tensor.shape
+    steps = [
+        Size(0) if size == Size(1) else step
+        for size, step in zip(own[:-2], strides(own)[:-2], strict=True)
+    ]
+    return offset(steps, indices)
+
+
+def _started(program: Program, kind: str, shape: Shape, c: Tensor | None, beta: float) -> Tensor:
+    """The tensor to which a product is added: zero, or `beta c` broadcast to its shape."""
+    if c is None or beta == 0.0:
+        zero = number(0.0, kind)
+        return program.stored(program.computed(kind, shape, zero, []))
+    text = "{0}" if beta == 1.0 else f"{number(beta, kind)} * {{0}}"
+    start = program.computed(kind, shape, text, [c])
+    return program.stored(start)
+
+
+def _emit(
+    program: Program,
+    sizes: tuple[Size, Size, Size],
+    alpha: float,
+    left: tuple[Tensor, Size, Size],
+    b: Tensor,
+    transpose_b: bool,
+    out: Tensor,
+    batch: Shape = (),
+    indices: list[str] | None = None,
+    offsets: list[str] | None = None,
+) -> None:
+    a, row, step = left
+    m, k, n = sizes
+    at_a, at_b = (f" + {o}" if o != "0" else "" for o in offsets or ["0", "0"])
+    inner = offset(strides((*batch, m, n))[: len(batch)], indices or [])
+    at_out = "" if inner == "0" else f" + {inner}"
+    if transpose_b:
+        kernel, steps = program.shared.kernel("add_product_transposed", a.kind), row.c
+    else:
+        kernel, steps = program.shared.kernel("add_product", a.kind), f"{row.c}, {step.c}"
+    call = (
+        f"{kernel}({m.c}, {k.c}, {n.c}, {number(alpha, a.kind)}, {a.name}{at_a}, {steps}, "
+        f"{b.name}{at_b}, {out.name}{at_out});"
+    )
+    program.emit(nest(list(batch), indices or [], call), out, a, b)
+
+
+def _emit_by_rows(program: Program, a: Tensor, b: Tensor, alpha: float, out: Tensor) -> None:
+    """Add `alpha a b^T`; rows of `a`, which is an expression, are computed when they are needed.
+
+    A matrix that is used once then needs the memory of one of its rows.
+    """
+    expression = a.expression
+    assert expression is not None
+    k, n = b.shape[1], b.shape[0]
+    row = program.new(a.kind, (k,))
+    indices = indices_of(a.shape)
+    inner = nest(
+        [k], indices[-1:], f"{row.name}[{indices[-1]}] = {element(a.shape, expression, indices)};"
+    )
+    place = offset([step * n for step in strides(a.shape[:-1])], indices[:-1])
+    kernel = program.shared.kernel("add_product_transposed", a.kind)
+    call = (
+        f"    {kernel}(1, {k.c}, {n.c}, {number(alpha, a.kind)}, {row.name}, {k.c}, {b.name}, "
+        f"{out.name} + {place});"
+    )
+    body = nest(a.shape[:-1], indices[:-1], f"{{\n{inner}\n{call}\n}}")
+    program.emit(body, row, out, b, *leaves_of(expression))
+
+
+OPERATORS: dict[str, Translation] = {"Gemm": translate_gemm, "MatMul": translate_matmul}

@@ -1,0 +1,142 @@
+"""A C function under construction: statements, working memory, constants, kernels."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.export_c.loops import element_loops, leaves_of
+from training.export_c.sizes import Shape, Size
+from training.export_c.tensor import Expression, Tensor, kind_of_array
+
+#: Tensors that one expression reads at most; longer ones are hard to read.
+LONGEST_EXPRESSION = 6
+
+
+@dataclass(frozen=True)
+class Statement:
+    """C text, what it is for, and the names of the working memory that it touches."""
+
+    code: str
+    comment: str
+    names: tuple[str, ...]
+
+
+#: Name, elements and C type of a constant array.
+Constant = tuple[str, NDArray[Any], str]
+
+
+@dataclass
+class SharedParts:
+    """What the functions of one C file share: constant arrays, and kernels by element type."""
+
+    constants: dict[str, Constant] = field(default_factory=dict)
+    kernels: dict[tuple[str, str], None] = field(default_factory=dict)
+
+    def constant(self, values: NDArray[Any]) -> str:
+        """The name of the C array with these elements; equal arrays are one."""
+        kind = kind_of_array(values, "of the graph")
+        key = hashlib.sha256(kind.encode() + values.tobytes()).hexdigest()
+        if key not in self.constants:
+            self.constants[key] = (f"w{len(self.constants)}", values, kind)
+        return self.constants[key][0]
+
+    def kernel(self, name: str, kind: str) -> str:
+        """The name of a kernel for an element type, which the file then defines."""
+        self.kernels[name, kind] = None
+        return f"{name}_{kind}"
+
+
+class Program:
+    """One function of the C file.
+
+    Parameters
+    ----------
+    shared : SharedParts
+        Constants and kernels of the file.
+    bounds : dict of str to int
+        Largest value of each count that sizes depend on.
+    """
+
+    def __init__(self, shared: SharedParts, bounds: dict[str, int]) -> None:
+        self.shared = shared
+        self.bounds = dict(bounds)
+        self.statements: list[Statement] = []
+        self.memory: dict[str, tuple[str, Shape]] = {}
+        self.given: set[str] = set()
+        self._stored: dict[Tensor, Tensor] = {}
+        self._comment = ""
+
+    def begin(self, comment: str) -> None:
+        """Say what the next statements compute."""
+        self._comment = comment
+
+    def new(self, kind: str, shape: Shape) -> Tensor:
+        """A tensor in the working memory."""
+        name = f"t{len(self.memory)}"
+        self.memory[name] = (kind, shape)
+        return Tensor(name, kind, shape)
+
+    def count(self, most: Size) -> str:
+        """A new count, which statements must set; it is at most this size."""
+        name = f"n{len(self.bounds)}"
+        self.bounds[name] = most.most(self.bounds)
+        return name
+
+    def emit(self, code: str, *tensors: Tensor) -> None:
+        """Append a statement that reads or writes these tensors."""
+        self.given |= {t.owner for t in tensors if t.value is None and t.owner not in self.memory}
+        names = tuple(dict.fromkeys(t.owner for t in tensors if t.owner in self.memory))
+        self.statements.append(Statement(code, self._comment, names))
+        self._comment = ""
+
+    def computed(self, kind: str, shape: Shape, text: str, operands: Iterable[Tensor]) -> Tensor:
+        """A tensor whose elements follow from those of others, by a C expression."""
+        parts = tuple(self._operand(operand, shape) for operand in operands)
+        while len(leaves_of(Expression(text, parts))) > LONGEST_EXPRESSION:
+            index = next((i for i, part in enumerate(parts) if part.expression is not None), None)
+            if index is None:
+                break
+            parts = (*parts[:index], self.stored(parts[index]), *parts[index + 1 :])
+        return Tensor("", kind, shape, expression=Expression(text, parts))
+
+    def stored(self, tensor: Tensor) -> Tensor:
+        """The tensor in memory: computed now where it is an expression, named where constant."""
+        if tensor.value is not None:
+            return replace(tensor, name=self.shared.constant(tensor.value))
+        if tensor.sizes is not None:
+            return self._stored_sizes(tensor, tensor.sizes)
+        if tensor.source is not None:
+            return self.stored(tensor.source).seen_as(tensor.shape)
+        if tensor.expression is None:
+            return tensor
+        if tensor not in self._stored:
+            out = self.new(tensor.kind, tensor.shape)
+            code = element_loops(out.name, tensor.shape, tensor.expression)
+            self.emit(code, out, *leaves_of(tensor.expression))
+            self._stored[tensor] = out
+        return self._stored[tensor]
+
+    def _operand(self, operand: Tensor, shape: Shape) -> Tensor:
+        """An operand of an expression of this shape."""
+        if operand.expression is not None and operand not in self._stored:
+            return operand if operand.shape == shape else self.stored(operand)
+        if operand.value is not None and operand.value.size == 1:
+            return operand
+        return self.stored(operand)
+
+    def _stored_sizes(self, tensor: Tensor, sizes: tuple[Size, ...]) -> Tensor:
+        if all(size.fixed for size in sizes):
+            dtype = {"int": np.int32, "float": np.float32, "double": np.float64}[tensor.kind]
+            values = np.asarray([size.constant for size in sizes], dtype)
+            return self.stored(Tensor.constant(values.reshape(len(sizes)), ""))
+        out = self.new(tensor.kind, tensor.shape)
+        cast = "" if tensor.kind == "int" else f"({tensor.kind})"
+        lines = [f"    {out.name}[{i}] = {cast}{size.c};" for i, size in enumerate(sizes)]
+        self.emit("\n".join(lines), out)
+        return out

@@ -1,0 +1,160 @@
+"""Inputs of a set posterior as a caller may feed them, made complete and finite in the graph.
+
+A caller without `soilml.Estimator`, for example one in C, may leave inputs out, feed one value for
+all rows, or feed what a failing sensor gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.onboard.set_contract import (
+    ABSENT_READING,
+    ABSENT_STD,
+    DAMAGED_COUNTS,
+    LEAST_STD,
+    MEMORY_INPUTS,
+    NOISE_OF_FILE,
+    NOT_MEASURED,
+    OPERATING_STD_INPUTS,
+    OPTIONAL_READINGS,
+    READING_INPUTS,
+    RESPONSE_CHANNELS,
+    STD_INPUTS,
+)
+from training.onnx_graph.value import (
+    Value,
+    absolute,
+    add_all,
+    concat,
+    constant,
+    maximum,
+    where,
+)
+
+#: All standard deviations of a row, and those that may be zero.
+ROW_STDS = (*STD_INPUTS, *OPERATING_STD_INPUTS)
+MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
+#: Constant part and share of the reading of each noise of a file, by the names of `NOISE_NAMES`.
+FileNoise = Mapping[str, Sequence[float]]
+
+#: Sums of inputs by row up to this are finite in float32; one with NaN or an infinity is not below
+#: it. Sums of context inputs, and of squares of a memory, are far smaller than this, so that their
+#: products are finite too.
+LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
+#: Readings of channels are limited to this: they are as impossible, and their squares are finite.
+LARGEST_READING = 1e12
+#: Slip of a row that is not finite: out of every range.
+IMPOSSIBLE_SLIP = -1.0
+#: Readings below this share of the marker were not measured.
+MARKER_SHARE = 0.5
+#: Standard deviation of a reading that was not measured: on the scale of every response, also of
+#: drawbar pull over any load, it is far beyond what is used, and its square is finite.
+NO_WEIGHT_STD = 1e15
+#: Standard deviations from this up are given; zero is not, except for those that may be.
+LEAST_GIVEN_STD = 1e-30
+
+
+def default_values() -> dict[str, NDArray[Any]]:
+    """Values of the inputs by row that need not be fed, (1,) each."""
+    values = dict.fromkeys(OPTIONAL_READINGS, NOT_MEASURED)
+    values |= dict.fromkeys(ROW_STDS, NOISE_OF_FILE)
+    return {name: np.full(1, value, np.float32) for name, value in values.items()}
+
+
+def complete_inputs(
+    inputs: Mapping[str, Value], context: Sequence[str], noise: FileNoise
+) -> dict[str, Value]:
+    r"""Inputs by row of one length (rows,), without markers, and everything finite.
+
+    - An input of one element holds for all rows.
+    - A row of which any input is not finite gets a slip that is out of range, and harmless values.
+    - A context input that is not finite, or senseless, puts all rows out of range; memory that is
+      not finite is replaced by counts that no set can outweigh (`DAMAGED_COUNTS`), so that the set
+      stays refused.
+    - A negative standard deviation, and one of zero unless it may be zero, becomes that of the
+      file's noise,
+
+    .. math:: \sigma = \sqrt{\sigma_{constant}^2 + (\sigma_{share} y)^2}
+
+    - A reading that was not measured becomes one with a standard deviation that gives it no weight;
+      a larger one than any sensor gives is limited.
+
+    Parameters
+    ----------
+    inputs : mapping of str to Value
+        All inputs of the graph.
+    context : sequence of str
+        Names of those that hold for a whole set.
+    noise : FileNoise
+        Noise of the file.
+    """
+    complete = dict(inputs)
+    of_rows = [inputs[name] for name in (*READING_INPUTS, *ROW_STDS)]
+    if context:
+        total = _sum([inputs[name] for name in context])
+        finite = absolute(total) <= LARGEST_CONTEXT
+        complete |= {name: where(finite, inputs[name], 1.0) for name in context}
+        of_rows.append(total)
+    finite = absolute(_sum(of_rows)) <= LARGEST_SUM  # (rows,)
+    for name in (*READING_INPUTS, *ROW_STDS):
+        harmless = IMPOSSIBLE_SLIP if name == "slip" else 1.0
+        complete[name] = where(finite, inputs[name], harmless)
+    memory, counts = (inputs[name] for name in MEMORY_INPUTS)
+    squares = memory.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
+    intact = squares <= LARGEST_MEMORY
+    damaged = np.asarray(DAMAGED_COUNTS)
+    complete |= zip(
+        MEMORY_INPUTS, (where(intact, memory, 0.0), where(intact, counts, damaged)), strict=True
+    )
+    return complete | _without_markers(complete, noise)
+
+
+def _without_markers(rows: Mapping[str, Value], noise: FileNoise) -> dict[str, Value]:
+    """Channels and all standard deviations (rows,) with their markers replaced."""
+    read = [_reading_of(name) for name in ROW_STDS]
+    reading = _stacked([rows[name] for name in read])  # (stds, rows)
+    std = _stacked([rows[name] for name in ROW_STDS])
+    parts = np.asarray([_noise_of(name, noise) for name in ROW_STDS])
+    may_be_zero = np.asarray([[name in MAY_BE_ZERO] for name in ROW_STDS])
+    own = reading * parts[:, 1:]
+    own = (own * own + parts[:, :1] ** 2).node("Sqrt")
+    own = maximum(own, np.where(may_be_zero, 0.0, LEAST_STD))
+    std = where(std < np.where(may_be_zero, 0.0, LEAST_GIVEN_STD), own, std)
+    marked = reading < MARKER_SHARE * NOT_MEASURED
+    reading = where(marked, constant(std.graph, ABSENT_READING), reading)
+    reading = reading.clip(-LARGEST_READING, LARGEST_READING)
+    no_weight = constant(std.graph, np.where(may_be_zero, ABSENT_STD, NO_WEIGHT_STD))
+    std = where(marked | (std >= ABSENT_STD), no_weight, std)
+    stds, readings = (
+        [part.reshape(-1) for part in value.split(len(ROW_STDS), axis=0)]
+        for value in (std, reading)
+    )
+    channels = {n: v for n, v in zip(read, readings, strict=True) if n in RESPONSE_CHANNELS}
+    return dict(zip(ROW_STDS, stds, strict=True)) | channels
+
+
+def _reading_of(name: str) -> str:
+    """The reading that a standard deviation is of: torque of torque_std and torque_bias."""
+    return name.rpartition("_")[0]
+
+
+def _noise_of(name: str, noise: FileNoise) -> tuple[float, float]:
+    """Constant part and share of the file's noise for a standard deviation."""
+    reading = _reading_of(name)
+    constant_part, share = noise.get(reading if name.endswith("_std") else name, (0.0, 0.0))
+    if reading in OPTIONAL_READINGS and not constant_part + share:
+        return ABSENT_STD, 0.0
+    return float(constant_part), float(share)
+
+
+def _sum(values: list[Value]) -> Value:
+    return add_all(values) if len(values) > 1 else values[0]
+
+
+def _stacked(values: list[Value]) -> Value:
+    return concat(values, axis=0).reshape(len(values), -1)
