@@ -49,15 +49,18 @@ def torque_only(rows):
     return {name: rows[name] for name in ("slip", "load", "torque")}
 
 
-def flagged(wheel, rows):
-    """Whether the set is flagged or refused; a flagged set must return the prior."""
+def flagged(wheel, rows, width=0.35):
+    """Whether the set is flagged or refused; a flagged estimate must be widened towards the prior.
+
+    `width` is the least standard deviation of a flagged estimate, as a share of the prior's.
+    """
     try:
         estimate = wheel.run(**rows)
     except InputError:
         return True
     if not estimate.in_range:
-        np.testing.assert_allclose(estimate.mean, wheel.prior.mean, rtol=1e-2)
-        np.testing.assert_allclose(estimate.std, wheel.prior.std, rtol=1e-2)
+        assert np.all((wheel.prior.lower <= estimate.mean) & (estimate.mean <= wheel.prior.upper))
+        assert np.all(estimate.std >= width * wheel.prior.std)
     return not bool(estimate.in_range)
 
 
@@ -80,7 +83,7 @@ def test_a_wrong_unit_is_flagged(wheel, name, factor):
     for k, soil in enumerate(soils(SETS)):
         rows = simulate(soil, k)
         rows = rows if name == "sinkage" else torque_only(rows)
-        assert flagged(wheel, rows | {name: factor * rows[name]})
+        assert flagged(wheel, rows | {name: factor * rows[name]}, width=0.75)
 
 
 def test_rows_of_two_different_soils_are_flagged(wheel):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn, final
 
@@ -58,11 +58,11 @@ class Estimator:
     names: tuple[str, ...]
     units: tuple[str, ...]
     per_row: tuple[str, ...]
-    metadata: dict[str, str]
+    metadata: dict[str, str] = field(repr=False)
     prior: PriorSummary
-    pooling: PoolingCalibration
-    sets: SetPosterior | None
-    session: ort.InferenceSession
+    pooling: PoolingCalibration = field(repr=False)
+    sets: SetPosterior | None = field(repr=False)
+    session: ort.InferenceSession = field(repr=False)
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Estimator:
