@@ -34,6 +34,7 @@ class Contact:
     normal_lever_arm: Real | None = None  # m, of the normal stress, where it misses the axle
     shear_direction: Array | None = None  # 1 or -1, of the shear stress; None: that of the slip
     travel_ratio: Array | None = None  # v / (r omega), (batch,); None: 1 - slip
+    repeats: int = 1  # how often the depths of the first points are repeated by the others
 
     if not TYPE_CHECKING:
 
@@ -93,10 +94,15 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     """
     xp = namespace(contact.depth)
     modulus = soil.kc / contact.width + soil.kphi
-    normal = modulus * xp.exp(soil.n * xp.log(contact.depth))
+    depth = contact.depth[: contact.depth.shape[0] // contact.repeats, ...]
+    normal = modulus * xp.exp(soil.n * xp.log(depth))
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
+    if contact.repeats > 1:
+        normal = xp.concat([normal] * contact.repeats, axis=0)
+        strength = xp.concat([strength] * contact.repeats, axis=0)
     mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), soil)
-    shear = shear_direction(contact, at) * strength * mobilised
+    shear = strength * mobilised
+    shear *= shear_direction(contact, at)
     return Stress(contact=contact, normal=normal, shear=shear)
 
 
@@ -105,7 +111,8 @@ def mobilised_fraction(displacement: Array, soil: Soil) -> Array:
 
     `displacement` j (m) is not negative. References: Janosi and Hanamoto, Proc. 1st ISTVS, 1961.
     """
-    return -namespace(displacement).expm1(-displacement / soil.shear_modulus)
+    remaining = namespace(displacement).exp(displacement * (-1.0 / soil.shear_modulus))
+    return 1.0 - remaining
 
 
 def shear_direction(contact: Contact, at: Operating) -> Array:
@@ -142,10 +149,21 @@ def integrate(stress: Stress) -> tuple[Array, Array, Array]:
     """
     xp, contact = namespace(stress.normal), stress.contact
     normal, shear = stress.normal, stress.shear
-    load = xp.sum(normal * contact.horizontal_area + shear * contact.frontal_area, axis=0)
-    pull = xp.sum(shear * contact.horizontal_area - normal * contact.frontal_area, axis=0)
+    pull = shear * contact.horizontal_area
+    pull -= normal * contact.frontal_area
+    pull = xp.sum(pull, axis=0)
+    if contact.normal_lever_arm is None and contact.shear_lever_arm.ndim < 2:
+        torque = contact.shear_lever_arm * xp.sum(shear * contact.area, axis=0)
+        return vertical_load(stress), pull, torque
     torque_per_area = shear * contact.shear_lever_arm
     if contact.normal_lever_arm is not None:
         torque_per_area = torque_per_area + normal * contact.normal_lever_arm
-    torque = xp.sum(torque_per_area * contact.area, axis=0)
-    return load, pull, torque
+    return vertical_load(stress), pull, xp.sum(torque_per_area * contact.area, axis=0)
+
+
+def vertical_load(stress: Stress) -> Array:
+    """Vertical load (N) that the stresses carry, (batch,); see `integrate`."""
+    xp, contact = namespace(stress.normal), stress.contact
+    load = stress.normal * contact.horizontal_area
+    load += stress.shear * contact.frontal_area
+    return xp.sum(load, axis=0)

@@ -11,7 +11,8 @@ from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase
-from soilml.physics.nearby_equilibrium import SinkageEstimate, equilibrium_near
+from soilml.physics.coarse_search import SinkageEstimate
+from soilml.physics.nearby_equilibrium import equilibrium_near
 from soilml.physics.sinkage_search import first_equilibrium
 
 #: Relative step in sinkage of the central difference for dW/dz. Its truncation error is of the

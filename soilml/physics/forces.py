@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from soilml.arrays import Array, namespace
-from soilml.physics.contact import Contact, Force, Stress, integrate, stress
+from soilml.physics.contact import Contact, Force, Stress, integrate, stress, vertical_load
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.load_case import LoadCase
 from soilml.row_status import Status
@@ -40,6 +40,13 @@ def forces_at_sinkage(load_case: LoadCase, sinkage: Array, *, coarse: bool = Fal
         status=xp.where(no_bearing, status + int(Status.NO_BEARING), status),
     )
     return apply_stage(load_case.effects, "on_force", force, load_case)
+
+
+def load_at_sinkage(load_case: LoadCase, sinkage: Array, *, coarse: bool = False) -> Array:
+    """Load (N) that the soil carries at this sinkage (m); see `forces_at_sinkage`."""
+    if any(effect.overrides("on_force") for effect in load_case.effects):
+        return forces_at_sinkage(load_case, sinkage, coarse=coarse).load
+    return vertical_load(stresses_at_sinkage(load_case, sinkage, coarse=coarse)[1])
 
 
 def stresses_at_sinkage(

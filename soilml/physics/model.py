@@ -19,12 +19,12 @@ from soilml.physics.forces import stress_profile
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
-from soilml.physics.nearby_equilibrium import SinkageEstimate
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 
 #: Rows solved together: as many as keep the points along their contacts in a processor's cache.
-CHUNK = 1024
+CHUNK = 2048
 
 
 @final

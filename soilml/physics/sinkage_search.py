@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
 from soilml.physics.contact import Force, integrate
+from soilml.physics.coarse_search import coarse_estimate
 from soilml.physics.forces import forces_at_sinkage, stresses_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.merged_rows import merge_rows
+from soilml.physics.secant_steps import forces_near
 from soilml.row_status import Status
 
 #: A row has converged where the soil carries the load to this relative accuracy.
@@ -55,11 +58,22 @@ PEAK_BRACKET = 1e-3
 def first_equilibrium(load_case: LoadCase) -> Force:
     """Forces at the smallest sinkage that carries the load; rows without one by their status."""
     xp = namespace(load_case.at.load)
-    force, solved = _solve_by_secant(load_case)
+    force, solved = _solve_from_coarse(load_case)
     if not bool(xp.all(solved)):
-        unsolved = xp.nonzero(~solved)[0]
-        force = merge_rows(force, solved, _solve_by_scan(rows(load_case, unsolved)))
+        unsolved = rows(load_case, xp.nonzero(~solved)[0])
+        others, found = _solve_by_secant(unsolved)
+        if not bool(xp.all(found)):
+            rest = rows(unsolved, xp.nonzero(~found)[0])
+            others = merge_rows(others, found, _solve_by_scan(rest))
+        force = merge_rows(force, solved, others)
     return force
+
+
+def _solve_from_coarse(load_case: LoadCase) -> tuple[Force, Array]:
+    """Forces at the root next to that of a few points, and which rows need no further search."""
+    force, slope = forces_near(load_case, coarse_estimate(load_case))
+    solved = force.status == 0
+    return force, solved & ~earlier_equilibrium_possible(load_case, force, slope)
 
 
 def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
@@ -195,25 +209,3 @@ def _log_load_ratio(load_case: LoadCase) -> Callable[[Array], Array]:
         return xp.log(xp.maximum(ratio, xp.full_like(ratio, SMALLEST_RATIO)))
 
     return log_ratio
-
-
-def merge_rows(force: Force, keep: Array, others: Force) -> Force:
-    """`force` where `keep`, and the rows of `others`, in order, elsewhere."""
-    xp = namespace(force.load)
-    position = merged_position(keep)
-    merged = {}
-    for field in fields(Force):
-        both = xp.concat([getattr(force, field.name), getattr(others, field.name)], axis=0)
-        merged[field.name] = xp.take(both, position, axis=0)
-    return Force(**merged)
-
-
-def merged_position(keep: Array) -> Array:
-    """Where each merged row is, in all rows followed by the rows that are not kept."""
-    xp = namespace(keep)
-    size = keep.shape[0]
-    return xp.where(
-        keep,
-        xp.arange(size, device=keep.device),
-        size - 1 + xp.cumulative_sum(xp.astype(~keep, xp.int64)),
-    )

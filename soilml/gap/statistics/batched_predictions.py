@@ -19,7 +19,7 @@ from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
-from soilml.physics.nearby_equilibrium import SinkageEstimate
+from soilml.physics.coarse_search import SinkageEstimate
 
 if TYPE_CHECKING:
     from soilml.gap.statistics.coordinates import FitCoordinate

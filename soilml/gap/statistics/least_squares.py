@@ -21,7 +21,7 @@ from soilml.gap.statistics.batched_predictions import (
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
 from soilml.gap.statistics.readings_by_gear import readings_by_gear
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.physics.nearby_equilibrium import SinkageEstimate
+from soilml.physics.coarse_search import SinkageEstimate
 
 Floats = NDArray[np.float64]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
+from soilml.numerics.sine_series import sine_and_versine
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.gears.arc import differences_from_entry
 from soilml.physics.gears.braking_law import (
@@ -21,7 +21,7 @@ from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
 #: quadrature.
-DRIVING_NODES = 16
+DRIVING_NODES = 14
 BRAKING_NODES = 24
 #: A nearly locked wheel mobilises the shear strength close to its entry. Where the travel ratio is
 #: more than twice this number, a part of the contact ends at this number over the ratio, as a
@@ -73,7 +73,7 @@ class Wheel(RigidWheel):
         """The points along the arc; more of them where a braking wheel shears both ways."""
         xp = namespace(geometry.entry)
         if bool(xp.any(at.slip < 0)):
-            return _braking_contact(geometry, at, self.braking)
+            return _braking_contact(geometry, at, self.braking, BRAKING_NODES)
         return _two_part_contact(geometry, at, self.braking, DRIVING_NODES)
 
     def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
@@ -98,35 +98,129 @@ class Wheel(RigidWheel):
 
 
 def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
-    """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes."""
+    """Two parts, before and behind the maximum stress, nodes crowded where stress vanishes.
+
+    The first part is measured from the entry backward, the second from the exit forward. All sines
+    and cosines follow from those of the distances to these ends, and of these ends themselves.
+    """
     xp = namespace(rim.entry)
-    x, weight = columns(crowded_start(count), rim.entry)
+    nodes = crowded_start(count)
+    x, weight = columns(nodes, rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    passed = xp.concat([x * front, (rim.entry - rim.exit) - x * rear], axis=0)
+    length = xp.stack([front, rear], axis=0)
+    sine, versine = sine_and_versine(nodes, length)  # (2, count, batch)
+    sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
+    sin_exit, cos_exit = xp.sin(rim.exit), xp.cos(rim.exit)
+    arc, none = front + rear, 0.0 * front
+    # sin(entry) - sin(exit), without loss of digits
+    whole = 2.0 * xp.sin(0.5 * arc) * xp.cos(0.5 * (rim.entry + rim.exit))
+    of_parts = [
+        (front, -rear),
+        (none, arc),
+        (sin_entry, sin_exit),
+        (cos_entry, -cos_exit),
+        (none, whole),
+        (sin_entry, -sin_exit),
+        (cos_entry, cos_exit),
+    ]
+    stacked = xp.stack([value for both in of_parts for value in both], axis=0)
+    rate, start, sin_end, along, sin_start, across, cos_end = (
+        stacked[2 * i : 2 * i + 2, ...][:, None, :] for i in range(len(of_parts))
+    )
+    # angle passed since entry, and the difference of its sine from that of the entry angle
+    passed = x * rate
+    passed += start
+    sin_difference = versine * sin_end
+    sin_difference += sine * along
+    sin_difference += sin_start
     # the pressure behind the maximum mirrors that before it, at the same fractions of both parts
-    depth = depth_at(rim, x * front)
-    arc = xp.concat([weight * front, weight * rear], axis=0)
-    return contact_at(rim, at, passed, xp.concat([depth, depth], axis=0), arc, law)
+    cos_difference = sine[0, ...] * sin_entry
+    cos_difference -= versine[0, ...] * cos_entry
+    cosine = sine * across
+    cosine -= versine * cos_end
+    cosine += cos_end
+
+    def points(value: Array) -> Array:
+        return xp.reshape(value, (2 * count, -1))
+
+    travelled = 1.0 - displacement_slip(at.slip, law)
+    displacement = passed - travelled * sin_difference
+    displacement *= rim.shear_radius
+    displacement = points(displacement)
+    area = weight * (rim.radius * rim.width * length)[:, None, :]
+    depth = rim.radius * cos_difference
+    return Contact(
+        depth=xp.concat([depth, depth], axis=0),
+        shear_displacement=displacement,
+        surface_travel=points(rim.shear_radius * passed),
+        area=points(area),
+        horizontal_area=points(area * cosine),
+        frontal_area=points(area * (sin_entry - sin_difference)),
+        shear_lever_arm=rim.lever,
+        width=rim.width,
+        shear_direction=displacement_direction(displacement, at.slip, law),
+        travel_ratio=travelled,
+        repeats=2,
+    )
 
 
-def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw) -> Contact:
-    """Parts that end where shear displacement changes its direction and the shear curve bends."""
+def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
+    """Parts that end where shear displacement changes its direction and the shear curve bends.
+
+    Each part is measured backward from its front end. The pressure behind the maximum is that at an
+    angle before it, which is measured forward from the angle of the part's front end.
+    """
     xp = namespace(rim.entry)
-    x, weight = columns(crowded_ends(BRAKING_NODES), rim.entry)
+    nodes = crowded_ends(count)
+    x, weight = columns(nodes, rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    ends = _braking_part_ends(rim, displacement_slip(at.slip, law))
-    passed, equivalent, arc = [], [], []
-    for low, high in pairwise(ends):
-        length = high - low
-        from_entry = (rim.entry - high) + length * x
-        # behind the maximum, the angle before it that has the same pressure
-        mirrored = ((low - rim.exit) + length * (1.0 - x)) * (front / rear)
-        passed.append(from_entry)
-        equivalent.append(xp.where(high <= rim.peak, mirrored, from_entry))
-        arc.append(weight * length)
-    depth = depth_at(rim, xp.concat(equivalent, axis=0))
-    passed, arc = xp.concat(passed, axis=0), xp.concat(arc, axis=0)
-    return contact_at(rim, at, passed, depth, arc, law)
+    travelled = 1.0 - displacement_slip(at.slip, law)
+    ends = xp.stack(_braking_part_ends(rim, 1.0 - travelled), axis=0)
+    low, high = ends[:-1, :], ends[1:, :]  # (parts, batch)
+    length, ratio = high - low, front / rear
+    behind = high <= rim.peak
+    begin = xp.where(behind, rim.entry - (high - rim.exit) * ratio, high)
+    sine, versine = sine_and_versine(nodes, length)
+    sin_high, cos_high = xp.sin(high), xp.cos(high)
+    half = 0.5 * (rim.entry - high)
+    sin_start = 2.0 * xp.sin(half) * xp.cos(rim.entry - half)
+    passed = x * length[:, None, :]
+    passed += (rim.entry - high)[:, None, :]
+    sin_difference = versine * sin_high[:, None, :]
+    sin_difference += sine * cos_high[:, None, :]
+    sin_difference += sin_start[:, None, :]
+    cosine = sine * sin_high[:, None, :]
+    cosine -= versine * cos_high[:, None, :]
+    cosine += cos_high[:, None, :]
+    # depth, from the difference of its cosine from that of the entry angle
+    sine, versine = sine_and_versine(nodes, xp.where(behind, length * ratio, length))
+    half = 0.5 * (rim.entry - begin)
+    cos_start = 2.0 * xp.sin(half) * xp.sin(rim.entry - half)
+    sin_begin = xp.sin(begin)
+    depth = sine * xp.where(behind, -sin_begin, sin_begin)[:, None, :]
+    depth -= versine * xp.cos(begin)[:, None, :]
+    depth += cos_start[:, None, :]
+    depth *= rim.radius
+
+    def points(value: Array) -> Array:
+        return xp.reshape(value, (length.shape[0] * count, -1))
+
+    displacement = passed - travelled * sin_difference
+    displacement *= rim.shear_radius
+    displacement = points(displacement)
+    area = weight * (rim.radius * rim.width * length)[:, None, :]
+    return Contact(
+        depth=xp.maximum(points(depth), xp.full_like(points(depth), SMALLEST_DEPTH)),
+        shear_displacement=displacement,
+        surface_travel=points(rim.shear_radius * passed),
+        area=points(area),
+        horizontal_area=points(area * cosine),
+        frontal_area=points(area * (xp.sin(rim.entry) - sin_difference)),
+        shear_lever_arm=rim.lever,
+        width=rim.width,
+        shear_direction=displacement_direction(displacement, at.slip, law),
+        travel_ratio=travelled,
+    )
 
 
 def _braking_part_ends(rim: WheelArc, slip: Array) -> list[Array]:

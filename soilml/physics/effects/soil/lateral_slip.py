@@ -49,7 +49,7 @@ class LateralSlip(SlipLoadScaling):
         travelled = travel_ratio(contact, load_case.at)
         aside = self.scaled(self.share, load_case) * travelled * xp.tan(beta)
         aside = aside * contact.surface_travel
-        ahead = xp.maximum(xp.abs(contact.shear_displacement), xp.full_like(aside, 1e-100))
+        ahead = xp.maximum(xp.abs(contact.shear_displacement), xp.full_like(aside, 1e-30))
         both = xp.where(aside == 0, ahead, xp.hypot(ahead, aside))
         # forward stress of the whole displacement over that of its forward part alone
         factor = (xp.expm1(-both / modulus) / both) / (xp.expm1(-ahead / modulus) / ahead)

@@ -47,7 +47,7 @@ class ShearSoftening(SlipLoadScaling):
         sheared = stress.contact.shear_displacement
         xp = namespace(sheared)
         # the ratio of the curves has a limit where neither has moved
-        moved = xp.maximum(xp.abs(sheared), xp.full_like(sheared, 1e-100))
+        moved = xp.maximum(xp.abs(sheared), xp.full_like(sheared, 1e-30))
         modulus = load_case.soil.shear_modulus
         at_peak = moved / (self.peak * modulus)
         hump = (1.0 / (self.residual * (1.0 - math.exp(-1.0))) - 1.0) * xp.exp(1.0 - at_peak)
