@@ -56,9 +56,14 @@ def _part_fields(cls: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(cls) if field.name not in own)
 
 
+@cache
+def _is_dataclass(cls: type) -> bool:
+    return is_dataclass(cls)
+
+
 def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
     """(path name, key, part) of the parts of `tree` that may hold parameters."""
-    if is_dataclass(tree) and not isinstance(tree, type):
+    if _is_dataclass(type(tree)):
         for name in _part_fields(type(tree)):
             yield name, name, getattr(tree, name)
     elif isinstance(tree, tuple):
@@ -70,7 +75,7 @@ def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
 def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
     """Every parameter of the tree that has a value, dotted path -> (declaration, value)."""
     found: dict[str, tuple[Parameter, Real]] = {}
-    if is_dataclass(tree) and not isinstance(tree, type):
+    if _is_dataclass(type(tree)):
         for name, parameter in declared(type(tree)).items():
             if (value := getattr(tree, name)) is not None:
                 found[prefix + name] = parameter, value
@@ -87,12 +92,12 @@ def values(tree: Any) -> dict[str, Real]:
 def mapped(tree: T, change: Callable[[Any], Real]) -> T:
     """The same tree with every parameter's value replaced by what `change` makes of it."""
     changed: dict[str | int, Any] = {}
-    if is_dataclass(tree) and not isinstance(tree, type):
+    if _is_dataclass(type(tree)):
         for name in declared(type(tree)):
             if (value := getattr(tree, name)) is not None:
                 changed[name] = change(value)
     for _, key, part in _parts(tree):
-        if isinstance(part, tuple) or is_dataclass(part):
+        if isinstance(part, tuple) or _is_dataclass(type(part)):
             changed[key] = mapped(part, change)
     whole: T = _with_fields(tree, changed)
     return whole
@@ -134,6 +139,8 @@ def _with_fields(tree: Any, changed: Mapping[str | int, Any]) -> Any:
 def check(tree: Any, where: str = "") -> None:
     """Raise `InputError` where a parameter is not finite or lies outside its bounds."""
     for path, (parameter, value) in located(tree).items():
+        if type(value) is float and parameter.lower <= value <= parameter.upper:
+            continue
         numbers = to_numpy(value)
         bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
         if np.any(bad):

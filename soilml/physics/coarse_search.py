@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 
 from soilml.arrays import Array, namespace
-from soilml.parameters import mapped
 from soilml.physics.forces import load_at_sinkage
-from soilml.physics.load_case import LoadCase
+from soilml.physics.load_case import LoadCase, single_precision
 
-#: Evaluations of the load. The last step is not evaluated: it is smaller than the error of the few
-#: points.
+#: Most evaluations of the load. The last step is not evaluated.
 EVALUATIONS = 4
+#: The search ends, from the second evaluation on, where the steps in log sinkage of all rows are
+#: below this: the next ones are of the order of its square.
+SMALL_STEP = 0.02
 #: Rows whose last step in log sinkage is larger than this are not solved.
 MAX_LAST_STEP = 0.3
 #: Changes of log sinkage below this leave the slope as it is: rounding would spoil it.
@@ -41,7 +42,7 @@ def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
     """Sinkage by secant steps on few points, in single precision, to a few thousandths."""
     xp = namespace(load_case.at.load)
     precise = load_case.at.load.dtype
-    single = mapped(load_case, lambda v: xp.astype(v, xp.float32) if hasattr(v, "dtype") else v)
+    single = single_precision(load_case)
     soil, at, gear = single.soil, single.at, single.gear
     most = xp.log(gear.largest_sinkage() + 0.0 * at.load) - MARGIN
     x = xp.minimum(xp.log(gear.initial_sinkage(soil, at)), most)
@@ -58,5 +59,7 @@ def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
         last_x, last_y = x, y
         step = xp.clip(-y / slope, -MAX_STEP, MAX_STEP)
         x = xp.minimum(x + step, most + MARGIN)
+        if bool(xp.all(xp.abs(step) < SMALL_STEP)):
+            break
     x = xp.where(xp.abs(step) < MAX_LAST_STEP, x, xp.full_like(x, math.nan))
     return SinkageEstimate(xp.astype(x, precise), xp.astype(slope, precise))

@@ -97,12 +97,18 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     depth = contact.depth[: contact.depth.shape[0] // contact.repeats, ...]
     normal = modulus * xp.exp(soil.n * xp.log(depth))
     strength = soil.cohesion + normal * xp.tan(soil.friction_angle)
+    displacement = contact.shear_displacement
+    # under a driving wheel the displacement and the shear stress are positive all along the arc
+    signed = contact.repeats == 1 or bool(xp.any(at.slip < 0))
+    shear = mobilised_fraction(xp.abs(displacement) if signed else displacement, soil)
     if contact.repeats > 1:
         normal = xp.concat([normal] * contact.repeats, axis=0)
-        strength = xp.concat([strength] * contact.repeats, axis=0)
-    mobilised = mobilised_fraction(xp.abs(contact.shear_displacement), soil)
-    shear = strength * mobilised
-    shear *= shear_direction(contact, at)
+        parts = xp.reshape(shear, (contact.repeats, *strength.shape))
+        shear = xp.reshape(parts * strength, shear.shape)
+    else:
+        shear *= strength
+    if signed:
+        shear *= shear_direction(contact, at)
     return Stress(contact=contact, normal=normal, shear=shear)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from soilml.arrays import namespace, no_gradient, requires_gradient
 from soilml.parameters import values
 from soilml.physics.contact import Force
@@ -33,7 +35,8 @@ def equilibrium_forces(load_case: LoadCase, estimate: SinkageEstimate | None = N
     From an estimate of the sinkage the search is shorter; see `equilibrium_near`.
     """
     load_case = apply_input_effects(load_case)
-    parameters = list(values(load_case).values())
+    plain = isinstance(load_case.at.load, np.ndarray)  # then no parameter has a gradient
+    parameters = [] if plain else list(values(load_case).values())
     with no_gradient(parameters):
         force = (
             first_equilibrium(load_case)

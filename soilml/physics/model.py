@@ -11,7 +11,7 @@ import numpy as np
 
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
-from soilml.parameters import check, values, with_values
+from soilml.parameters import check, mapped, values
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect, apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, sensor_readings
@@ -23,8 +23,13 @@ from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 
-#: Rows solved together: as many as keep the points along their contacts in a processor's cache.
+#: Rows solved together: many enough that calls cost little beside the arithmetic, and few enough
+#: that the points along their contacts stay in a processor's cache.
 CHUNK = 2048
+
+# The C library gives memory back after every call and fetches it again, which takes longer than the
+# arithmetic, until it has once freed a block this large.
+np.empty(24 << 20, np.uint8)
 
 
 @final
@@ -141,9 +146,12 @@ def flattened(load_case: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
     shape: tuple[int, ...] = np.broadcast_shapes(*(tuple(v.shape) for v in arrays.values()))
     size = math.prod(shape)
     for path, array in arrays.items():
+        if array.shape == shape == (size,):
+            continue
         if array.ndim > 0 or path.startswith("at."):
             arrays[path] = xp.reshape(xp.broadcast_to(array, shape), (size,))
-    return with_values(load_case, arrays), shape
+    in_order = iter(arrays.values())
+    return mapped(load_case, lambda _: next(in_order)), shape
 
 
 def _float64(value: Real, xp: Any, device: Any) -> Array:

@@ -10,6 +10,7 @@ from soilml.physics.merged_rows import merge_rows
 from soilml.physics.secant_steps import forces_near
 from soilml.physics.sinkage_search import earlier_equilibrium_possible, first_equilibrium
 
+
 def equilibrium_near(load_case: LoadCase, estimate: SinkageEstimate) -> Force:
     """Forces at the equilibrium next to an estimate of the sinkage; arrays (batch,).
 
@@ -25,5 +26,3 @@ def equilibrium_near(load_case: LoadCase, estimate: SinkageEstimate) -> Force:
     if not unsolved.shape[0]:
         return force
     return merge_rows(force, solved, first_equilibrium(rows(load_case, unsolved)))
-
-

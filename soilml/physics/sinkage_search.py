@@ -14,10 +14,10 @@ from dataclasses import replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
-from soilml.physics.contact import Force, integrate
+from soilml.physics.contact import Force, vertical_load
 from soilml.physics.coarse_search import coarse_estimate
-from soilml.physics.forces import forces_at_sinkage, stresses_at_sinkage
-from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.forces import forces_at_sinkage, load_at_sinkage, stresses_at_sinkage
+from soilml.physics.load_case import LoadCase, rows, single_precision
 from soilml.physics.merged_rows import merge_rows
 from soilml.physics.secant_steps import forces_near
 from soilml.row_status import Status
@@ -100,14 +100,16 @@ def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array
     xp = namespace(slope)
     if not load_case.effects and not bool(xp.any(load_case.at.slip < 0)):
         return xp.zeros_like(slope, dtype=xp.bool)
-    in_doubt = _load_may_fall_with_sinkage(load_case, force.sinkage)
+    single, sinkage = single_precision(load_case), xp.astype(force.sinkage, xp.float32)
+    in_doubt = _load_may_fall_with_sinkage(single, sinkage)
     index = xp.nonzero(in_doubt)[0]
     if index.shape[0] == 0:
         return slope < SMALLEST_POWER
-    largest_load = _largest_load_below(load_case, force.sinkage, index)
+    largest_load = _largest_load_below(single, sinkage, index)
     # back to all rows: row i in doubt is number (rows in doubt up to i) - 1 of `largest_load`;
     # a zero is appended for the case that nothing is in doubt
     number = xp.clip(xp.cumulative_sum(xp.astype(in_doubt, xp.int64)) - 1, 0, None)
+    largest_load = xp.astype(largest_load, slope.dtype)
     padded = xp.concat([largest_load, xp.zeros_like(slope[:1])])
     nearly_carried = xp.take(padded, number) > NEARLY_CARRIED * load_case.at.load
     return (slope < SMALLEST_POWER) | (in_doubt & nearly_carried)
@@ -115,17 +117,16 @@ def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array
 
 def _load_may_fall_with_sinkage(load_case: LoadCase, sinkage: Array) -> Array:
     """Rows in which downward shear or an effect may make the load fall with sinkage."""
-    xp = namespace(sinkage)
+    xp, effects = namespace(sinkage), load_case.effects
+    if any(effect.overrides("on_stress") for effect in effects):
+        return xp.ones_like(sinkage, dtype=xp.bool)
     _, stresses = stresses_at_sinkage(load_case, sinkage, coarse=True)
     lift = stresses.shear * stresses.contact.frontal_area
     downward_shear = xp.sum(xp.maximum(-lift, xp.zeros_like(lift)), axis=0)
     in_doubt = downward_shear > NEGLIGIBLE_DOWNWARD_SHEAR * load_case.at.load
-    if any(effect.overrides("on_stress") for effect in load_case.effects):
-        in_doubt = xp.ones_like(in_doubt)
-    if any(effect.overrides("on_force") for effect in load_case.effects):
-        load_by_stresses = integrate(stresses)[0]
+    if any(effect.overrides("on_force") for effect in effects):
         load = forces_at_sinkage(load_case, sinkage, coarse=True).load
-        in_doubt = in_doubt | (load != load_by_stresses)
+        in_doubt = in_doubt | (load != vertical_load(stresses))
     return in_doubt
 
 
@@ -138,7 +139,7 @@ def _largest_load_below(load_case: LoadCase, sinkage: Array, index: Array) -> Ar
     ]
     smaller = xp.concat([sinkage[index] * fraction for fraction in fractions], axis=0)
     repeated = rows(load_case, xp.concat([index] * CHECKED_SINKAGES, axis=0))
-    load = forces_at_sinkage(repeated, smaller, coarse=True).load
+    load = load_at_sinkage(repeated, smaller, coarse=True)
     return xp.max(xp.reshape(load, (CHECKED_SINKAGES, index.shape[0])), axis=0)
 
 
@@ -205,7 +206,7 @@ def _log_load_ratio(load_case: LoadCase) -> Callable[[Array], Array]:
     xp = namespace(load_case.at.load)
 
     def log_ratio(log_sinkage: Array) -> Array:
-        ratio = forces_at_sinkage(load_case, xp.exp(log_sinkage)).load / load_case.at.load
+        ratio = load_at_sinkage(load_case, xp.exp(log_sinkage)) / load_case.at.load
         return xp.log(xp.maximum(ratio, xp.full_like(ratio, SMALLEST_RATIO)))
 
     return log_ratio

@@ -112,11 +112,12 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
     sin_exit, cos_exit = xp.sin(rim.exit), xp.cos(rim.exit)
     arc, none = front + rear, 0.0 * front
+    shear_radius = rim.shear_radius + none
     # sin(entry) - sin(exit), without loss of digits
     whole = 2.0 * xp.sin(0.5 * arc) * xp.cos(0.5 * (rim.entry + rim.exit))
     of_parts = [
-        (front, -rear),
-        (none, arc),
+        (shear_radius * front, -shear_radius * rear),
+        (none, shear_radius * arc),
         (sin_entry, sin_exit),
         (cos_entry, -cos_exit),
         (none, whole),
@@ -127,9 +128,9 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     rate, start, sin_end, along, sin_start, across, cos_end = (
         stacked[2 * i : 2 * i + 2, ...][:, None, :] for i in range(len(of_parts))
     )
-    # angle passed since entry, and the difference of its sine from that of the entry angle
-    passed = x * rate
-    passed += start
+    surface_travel = x * rate
+    surface_travel += start
+    # difference from the sine of the entry angle
     sin_difference = versine * sin_end
     sin_difference += sine * along
     sin_difference += sin_start
@@ -144,15 +145,13 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
         return xp.reshape(value, (2 * count, -1))
 
     travelled = 1.0 - displacement_slip(at.slip, law)
-    displacement = passed - travelled * sin_difference
-    displacement *= rim.shear_radius
-    displacement = points(displacement)
+    displacement = points(surface_travel - (shear_radius * travelled) * sin_difference)
     area = weight * (rim.radius * rim.width * length)[:, None, :]
     depth = rim.radius * cos_difference
     return Contact(
         depth=xp.concat([depth, depth], axis=0),
         shear_displacement=displacement,
-        surface_travel=points(rim.shear_radius * passed),
+        surface_travel=points(surface_travel),
         area=points(area),
         horizontal_area=points(area * cosine),
         frontal_area=points(area * (sin_entry - sin_difference)),
