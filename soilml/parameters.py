@@ -11,7 +11,7 @@ sits in a tree of dataclasses, tuples of named parts, and plain mappings.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, TypeVar, get_type_hints
 
@@ -56,15 +56,16 @@ def _part_fields(cls: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(cls) if field.name not in own)
 
 
-@cache
-def _is_dataclass(cls: type) -> bool:
-    return is_dataclass(cls)
+def _is_node(tree: Any) -> bool:
+    """Whether `tree` is an instance of a dataclass."""
+    return hasattr(type(tree), "__dataclass_fields__")
 
 
 def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
     """(path name, key, part) of the parts of `tree` that may hold parameters."""
-    if _is_dataclass(type(tree)):
-        for name in _part_fields(type(tree)):
+    if _is_node(tree):
+        cls: type = type(tree)
+        for name in _part_fields(cls):
             yield name, name, getattr(tree, name)
     elif isinstance(tree, tuple):
         for index, part in enumerate(tree):
@@ -75,7 +76,7 @@ def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
 def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
     """Every parameter of the tree that has a value, dotted path -> (declaration, value)."""
     found: dict[str, tuple[Parameter, Real]] = {}
-    if _is_dataclass(type(tree)):
+    if _is_node(tree):
         for name, parameter in declared(type(tree)).items():
             if (value := getattr(tree, name)) is not None:
                 found[prefix + name] = parameter, value
@@ -92,12 +93,12 @@ def values(tree: Any) -> dict[str, Real]:
 def mapped(tree: T, change: Callable[[Any], Real]) -> T:
     """The same tree with every parameter's value replaced by what `change` makes of it."""
     changed: dict[str | int, Any] = {}
-    if _is_dataclass(type(tree)):
+    if _is_node(tree):
         for name in declared(type(tree)):
             if (value := getattr(tree, name)) is not None:
                 changed[name] = change(value)
     for _, key, part in _parts(tree):
-        if isinstance(part, tuple) or _is_dataclass(type(part)):
+        if isinstance(part, tuple) or _is_node(part):
             changed[key] = mapped(part, change)
     whole: T = _with_fields(tree, changed)
     return whole

@@ -41,17 +41,16 @@ class SinkageEstimate:
 def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
     """Sinkage by secant steps on few points, in single precision, to a few thousandths."""
     xp = namespace(load_case.at.load)
-    precise = load_case.at.load.dtype
     single = single_precision(load_case)
     soil, at, gear = single.soil, single.at, single.gear
     most = xp.log(gear.largest_sinkage() + 0.0 * at.load) - MARGIN
     x = xp.minimum(xp.log(gear.initial_sinkage(soil, at)), most)
     slope = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
     log_load = xp.log(at.load)
-    step = last_x = last_y = None
-    for _ in range(EVALUATIONS):
+    step = last_x = last_y = x
+    for number in range(EVALUATIONS):
         y = xp.log(load_at_sinkage(single, xp.exp(x), coarse=True)) - log_load
-        if last_x is not None:
+        if number > 0:
             change = x - last_x
             secant = (y - last_y) / xp.where(change == 0, xp.ones_like(change), change)
             usable = (xp.abs(change) > MIN_CHANGE) & (secant > SLOPES[0]) & (secant < SLOPES[1])
@@ -59,7 +58,7 @@ def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
         last_x, last_y = x, y
         step = xp.clip(-y / slope, -MAX_STEP, MAX_STEP)
         x = xp.minimum(x + step, most + MARGIN)
-        if bool(xp.all(xp.abs(step) < SMALL_STEP)):
+        if number > 0 and bool(xp.all(xp.abs(step) < SMALL_STEP)):
             break
     x = xp.where(xp.abs(step) < MAX_LAST_STEP, x, xp.full_like(x, math.nan))
-    return SinkageEstimate(xp.astype(x, precise), xp.astype(slope, precise))
+    return SinkageEstimate(xp.astype(x, xp.float64), xp.astype(slope, xp.float64))

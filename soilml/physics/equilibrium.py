@@ -9,11 +9,11 @@ import numpy as np
 
 from soilml.arrays import namespace, no_gradient, requires_gradient
 from soilml.parameters import values
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.nearby_equilibrium import equilibrium_near
 from soilml.physics.sinkage_search import first_equilibrium
 

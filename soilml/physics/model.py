@@ -12,6 +12,7 @@ import numpy as np
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import check, mapped, values
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect, apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, sensor_readings
@@ -19,7 +20,6 @@ from soilml.physics.forces import stress_profile
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 

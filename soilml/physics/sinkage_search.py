@@ -1,21 +1,21 @@
 """Search for the smallest sinkage at which the soil carries the load, row by row of a batch.
 
-Most rows are solved by secant steps in log sinkage (`_solve_by_secant`), where the load carried
-rises all the way. It need not under a braking wheel or with effects: where a few coarse
-evaluations leave doubt, or the secant steps fail, the row is scanned for its first crossing
-(`_solve_by_scan`).
+Most rows are solved from an estimate on few points (`_solve_from_coarse`), the others by secant
+steps in log sinkage inside a bracket (`_solve_by_secant`), where the load carried rises all the
+way. It need not under a braking wheel or with effects: where a few coarse evaluations leave doubt,
+or the secant steps fail, the row is scanned for its first crossing (`_solve_by_scan`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
-from soilml.physics.contact import Force, vertical_load
 from soilml.physics.coarse_search import coarse_estimate
+from soilml.physics.contact import Force, vertical_load
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage, stresses_at_sinkage
 from soilml.physics.load_case import LoadCase, rows, single_precision
 from soilml.physics.merged_rows import merge_rows
@@ -54,19 +54,47 @@ REFINEMENTS, REFINED_INTERVALS = 2, 16
 #: Width in log sinkage of the bracket below the peak of a row that has no equilibrium.
 PEAK_BRACKET = 1e-3
 
+#: Forces of all rows, and which of them are solved.
+Search = Callable[[LoadCase], tuple[Force, Array]]
+
 
 def first_equilibrium(load_case: LoadCase) -> Force:
     """Forces at the smallest sinkage that carries the load; rows without one by their status."""
+    searches = [_solve_from_coarse, _solve_by_secant, _solve_by_scan]
+    if load_rises_with_sinkage(load_case):
+        searches.insert(1, _too_heavy)
+    return _solve_in_turn(load_case, searches)
+
+
+def _solve_in_turn(load_case: LoadCase, searches: Sequence[Search]) -> Force:
+    """The forces by the first search, and by the next ones in rows that it leaves unsolved."""
     xp = namespace(load_case.at.load)
-    force, solved = _solve_from_coarse(load_case)
-    if not bool(xp.all(solved)):
-        unsolved = rows(load_case, xp.nonzero(~solved)[0])
-        others, found = _solve_by_secant(unsolved)
-        if not bool(xp.all(found)):
-            rest = rows(unsolved, xp.nonzero(~found)[0])
-            others = merge_rows(others, found, _solve_by_scan(rest))
-        force = merge_rows(force, solved, others)
-    return force
+    force, solved = searches[0](load_case)
+    if len(searches) == 1 or bool(xp.all(solved)):
+        return force
+    unsolved = rows(load_case, xp.nonzero(~solved)[0])
+    return merge_rows(force, solved, _solve_in_turn(unsolved, searches[1:]))
+
+
+def load_rises_with_sinkage(load_case: LoadCase) -> bool:
+    """Whether the load that the soil carries rises with sinkage in all rows.
+
+    The shear under a driving wheel lifts it everywhere in front of the axle. Under a braking wheel
+    shear pulls down, and so it does behind the axle of a driving one, which an effect may bring
+    into contact.
+    """
+    xp = namespace(load_case.at.slip)
+    return not load_case.effects and not bool(xp.any(load_case.at.slip < 0))
+
+
+def _too_heavy(load_case: LoadCase) -> tuple[Force, Array]:
+    """Forces at the largest sinkage, and which rows are too heavy even there."""
+    xp = namespace(load_case.at.load)
+    largest = load_case.gear.largest_sinkage() + 0.0 * load_case.at.load
+    force = forces_at_sinkage(load_case, largest)
+    heavy = (force.load < load_case.at.load) & (force.status == 0)
+    status = xp.where(heavy, 0 * force.status + int(Status.TOO_HEAVY), force.status)
+    return replace(force, status=status), heavy
 
 
 def _solve_from_coarse(load_case: LoadCase) -> tuple[Force, Array]:
@@ -92,13 +120,11 @@ def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
 def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array) -> Array:
     """Rows that may carry the load at a smaller sinkage already, judged by coarse evaluations.
 
-    The shear under a driving wheel lifts it everywhere in front of the axle, and the load carried
-    rises with sinkage. Under a braking wheel shear pulls down, and so it does behind the axle of a
-    driving one. Without that pull the load would be reached earlier, though hardly so where the
-    pull is small.
+    Without shear that pulls the gear down the load would be reached earlier, though hardly so where
+    that pull is small.
     """
     xp = namespace(slope)
-    if not load_case.effects and not bool(xp.any(load_case.at.slip < 0)):
+    if load_rises_with_sinkage(load_case):
         return xp.zeros_like(slope, dtype=xp.bool)
     single, sinkage = single_precision(load_case), xp.astype(force.sinkage, xp.float32)
     in_doubt = _load_may_fall_with_sinkage(single, sinkage)
@@ -143,7 +169,7 @@ def _largest_load_below(load_case: LoadCase, sinkage: Array, index: Array) -> Ar
     return xp.max(xp.reshape(load, (CHECKED_SINKAGES, index.shape[0])), axis=0)
 
 
-def _solve_by_scan(load_case: LoadCase) -> Force:
+def _solve_by_scan(load_case: LoadCase) -> tuple[Force, Array]:
     """Rows that secant steps do not solve, or where they may miss the first equilibrium.
 
     The load carried may rise to a peak and fall again: the gear comes to rest where it first
@@ -165,7 +191,7 @@ def _solve_by_scan(load_case: LoadCase) -> Force:
     top = xp.take_along_axis(grid, peak[None, :], axis=0)[0, :]
     low, high = xp.where(exists, low, top - PEAK_BRACKET), xp.where(exists, high, top)
     force, balanced, _ = _root_between(load_case, low, high, 0.5 * (low + high), 1.0 / (high - low))
-    return _with_reasons(load_case, force, exists, balanced, top)
+    return _with_reasons(load_case, force, exists, balanced, top), balanced
 
 
 def _refined_about(grid: Array, peak: Array) -> Array:

@@ -15,11 +15,11 @@ from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.statistics.joined_cases import CaseSets, join_key, joined_load_case
 from soilml.gap.statistics.readings_by_gear import GearReadings, readings_by_gear
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
-from soilml.physics.coarse_search import SinkageEstimate
 
 if TYPE_CHECKING:
     from soilml.gap.statistics.coordinates import FitCoordinate

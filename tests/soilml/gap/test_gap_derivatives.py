@@ -22,9 +22,9 @@ from soilml.gap.statistics.coordinates import (
 )
 from soilml.gap.statistics.joined_cases import CaseSets, joined_load_case
 from soilml.gap.statistics.least_squares import FitRequest, descend_together
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
-from soilml.physics.coarse_search import SinkageEstimate
 
 WHEEL_EFFECTS = [
     name
