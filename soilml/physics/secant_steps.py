@@ -18,7 +18,7 @@ MAX_EVALUATIONS = 6
 #: A row is solved where the logarithm of the load carried over the load is below the first figure,
 #: and its product with that of the evaluation before below the second: the error of the
 #: interpolation between the two is of the order of the product.
-MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-9
+MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-11
 #: A change of that logarithm below this is mostly rounding and gives no slope.
 MIN_CHANGE = 1e-9
 #: The estimate may be off by this much in log sinkage at most; larger steps leave its vicinity.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, cast, final
 
-import numpy as np
-
 from soilml.arrays import Array, Real, namespace
+from soilml.numerics.quadrature import columns, gauss
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force, mobilised_fraction
 from soilml.physics.effects.base import EffectCard
@@ -79,9 +78,7 @@ def buried(entry: Array) -> tuple[Array, Array]:
     by quadrature, whose digits do not cancel in a shallow rut as those of the closed forms do.
     """
     xp = namespace(entry)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    share = xp.asarray(0.5 + 0.5 * nodes[:, None], dtype=entry.dtype, device=entry.device)
-    weight = xp.asarray(0.5 * weights[:, None], dtype=entry.dtype, device=entry.device)
+    share, weight = columns(gauss(12), entry)
     t = share * entry
     strip = weight * entry * xp.sin(t) ** 2
     below = 2.0 * xp.sin(0.5 * (entry + t)) * xp.sin(0.5 * (entry - t))
