@@ -90,8 +90,8 @@ def load_rises_with_sinkage(load_case: LoadCase) -> bool:
 def _too_heavy(load_case: LoadCase) -> tuple[Force, Array]:
     """Forces at the largest sinkage, and which rows are too heavy even there."""
     xp = namespace(load_case.at.load)
-    largest = load_case.gear.largest_sinkage() + 0.0 * load_case.at.load
-    force = forces_at_sinkage(load_case, largest)
+    largest = xp.log(load_case.gear.largest_sinkage() + 0.0 * load_case.at.load)
+    force = forces_at_sinkage(load_case, xp.exp(largest))  # to the bit as the scan has it
     heavy = (force.load < load_case.at.load) & (force.status == 0)
     status = xp.where(heavy, 0 * force.status + int(Status.TOO_HEAVY), force.status)
     return replace(force, status=status), heavy
