@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -178,29 +179,16 @@ def _exported(folder: Path, family, posterior, noise) -> Path:
 
 def _fitted(factory: pytest.TempPathFactory, name: str, family, settings):
     """The set posterior of a family, with a response surface that is fitted once."""
-    from training.regressors.standardisation import Standardisation
     from training.set_posterior.graph import SetPosteriorGraph
-    from training.set_posterior.response_surface import Response, fit_response
+    from training.set_posterior.response_surface import fit_response
     from training.set_posterior.sampler.misfit_test import MisfitLimits
 
     def fill(folder: Path) -> None:
         fit = fit_response(family, settings, lambda *_: None)
-        layers = {f"layer{i}": layer for i, layer in enumerate(fit.layers)}
-        arrays = {"mean": fit.scaling.mean, "scale": fit.scaling.scale, "error": fit.error}
-        terms = np.asarray(fit.terms)
-        ends = {"lower": fit.lower, "upper": fit.upper}
-        np.savez(folder / "response.npz", terms=terms, **arrays, **ends, **layers)
+        (folder / "response.pickle").write_bytes(pickle.dumps(fit))
 
     folder = shared_folder(factory, name, fill)
-    with np.load(folder / "response.npz") as kept:
-        response = Response(
-            terms=tuple(tuple(int(k) for k in term) for term in kept["terms"]),
-            scaling=Standardisation(kept["mean"], kept["scale"]),
-            layers=tuple(kept[f"layer{i}"] for i in range(len(kept.files) - 6)),
-            lower=kept["lower"],
-            upper=kept["upper"],
-            error=kept["error"],
-        )
+    response = pickle.loads((folder / "response.pickle").read_bytes())
     return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
 
 

@@ -1,4 +1,4 @@
-"""Standard deviations of errors that all rows share: what a file assumes, and what a user sets."""
+"""Errors that all rows share: what a file assumes, and what a user sets."""
 
 from __future__ import annotations
 
@@ -8,14 +8,27 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
+    SENSOR_ERROR_COLUMNS,
+)
 
 
 def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
     """The usual errors from the entry `set` of a file's metadata; none in earlier versions."""
     if "errors" not in metadata:
         return {}
-    return {name: float(metadata["errors"][name]) for name in COMMON_ERROR_INPUTS}
+    errors = metadata["errors"]
+    return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
+
+
+def error_columns(usual: Mapping[str, float]) -> int:
+    """Columns of errors in the residual system of a file with these usual errors."""
+    if not usual:
+        return 1
+    return len(ERROR_COLUMNS if MODEL_ERROR_INPUT in usual else SENSOR_ERROR_COLUMNS)
 
 
 def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, float]:
@@ -24,7 +37,7 @@ def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> 
     Raises
     ------
     InputError
-        If a value is negative or not finite, or if the file takes slip and load as exact.
+        If a value is negative or not finite, or if the file takes what has this error as exact.
     """
     own = {name: float(given[name]) for name in COMMON_ERROR_INPUTS if name in given}
     for name, value in own.items():
@@ -35,7 +48,12 @@ def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> 
 
 
 def check_takes_errors(usual: Mapping[str, float], name: str, std: float) -> None:
-    """Raise `InputError` where a file that takes slip and load as exact is given an error."""
+    """Raise `InputError` for an error that a file of an earlier version takes no account of."""
+    if name == MODEL_ERROR_INPUT and name not in usual and std > 0.0:
+        raise InputError(
+            f"{name} is {std:g}, but this file takes its model as right; train it again, with "
+            "[set_posterior], to have errors of the model taken into account"
+        )
     if not usual and std > 0.0:
         raise InputError(
             f"{name} is {std:g}, but this file takes slip, load and the scale of torque as exact; "

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 #: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
 #: files without that entry have version 1. docs/onnx-interface.md lists the changes.
-INTERFACE = "2"
+INTERFACE = "3"
 
 #: Readings that every row must have, and readings that a row may lack.
 REQUIRED_READINGS = ("slip", "torque", "load")
@@ -29,18 +29,23 @@ STD_INPUTS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
 OPERATING_STD_INPUTS = ("slip_std", "load_std")
 #: Names under which that noise is declared.
 OPERATING_NOISE = ("slip", "load")
-#: Standard deviations of errors that all rows of a set share: offset of slip, relative errors of
-#: load and torque, offsets of sinkage and drawbar pull.
-COMMON_ERROR_INPUTS = (
+#: Standard deviations of errors of the sensors that all rows of a set share: offset of slip,
+#: relative errors of load and torque, offsets of sinkage and drawbar pull.
+SENSOR_ERROR_INPUTS = (
     "slip_bias",
     "load_gain",
     "torque_gain",
     "sinkage_bias",
     "drawbar_pull_bias",
 )
-#: Errors that all rows share, in the order of their columns of the residual system, after those of
-#: the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
-ERROR_COLUMNS = (
+#: Size of the errors of the model, as a multiple of their usual size; 0: the model is right. Files
+#: of interface 2 and earlier lack it.
+MODEL_ERROR_INPUT = "model_error"
+#: All errors that a set shares.
+COMMON_ERROR_INPUTS = (*SENSOR_ERROR_INPUTS, MODEL_ERROR_INPUT)
+#: Errors of the sensors that all rows share, in the order of their columns of the residual system,
+#: after those of the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
+SENSOR_ERROR_COLUMNS = (
     "torque_bias",
     "sinkage_bias",
     "drawbar_pull_bias",
@@ -48,6 +53,19 @@ ERROR_COLUMNS = (
     "slip_bias",
     "load_gain",
 )
+#: Errors of the model, in the order of their columns, after those of the sensors: logarithm of the
+#: bearing modulus, its changes with slip and with the logarithm of load, contact behind the axle
+#: as a multiple of `exit-angle` at its usual size, logarithm of sinkage, drawbar pull over load.
+MODEL_ERROR_COLUMNS = (
+    "bearing",
+    "bearing_by_slip",
+    "bearing_by_load",
+    "contact",
+    "sinkage",
+    "drawbar_pull",
+)
+#: All columns of errors.
+ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)
 #: Channels in the order in which a response surface predicts them.
 RESPONSE_CHANNELS = ("torque", "sinkage", "drawbar_pull")
 #: Names under which the noise of a file, or of a user, is declared.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.common_errors import (
     check_takes_errors,
+    error_columns,
     read_common_errors,
     with_common_errors,
 )
@@ -26,7 +27,6 @@ from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
-    ERROR_COLUMNS,
     LEAST_STD,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
@@ -99,7 +99,7 @@ class SetPosterior:
     @property
     def columns(self) -> int:
         """Columns of the residual system: monomials, and errors that all rows share."""
-        return self.terms + (len(ERROR_COLUMNS) if self.common_errors else 1)
+        return self.terms + error_columns(self.common_errors)
 
     @property
     def missing_context(self) -> tuple[str, ...]:

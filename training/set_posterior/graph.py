@@ -12,9 +12,11 @@ from soilml.onboard.set_contract import (
     ERROR_COLUMNS,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
+    MODEL_ERROR_COLUMNS,
     OPERATING_STD_INPUTS,
     READING_INPUTS,
     ROW_IN_RANGE,
+    SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
     STD_INPUTS,
     empty_memory,
@@ -104,11 +106,16 @@ class SetPosteriorGraph:
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
+        terms, of_sensors = len(self.response.terms), len(SENSOR_ERROR_COLUMNS)
+        of_model = len(MODEL_ERROR_COLUMNS)
+
         def system_at(basis: Value | None) -> Value:
-            system = concat([memory, rows.system_at(basis)], axis=0)
-            if basis is not None:
-                system = system.named(outputs[0])
-            return integrate_out_errors(system, len(self.response.terms), len(ERROR_COLUMNS))
+            if basis is None:  # the first round is but a start: it takes the model as right
+                earlier, _ = memory.split([terms + of_sensors, of_model], axis=1)
+                system = concat([earlier, rows.system_at(basis)], axis=0)
+                return integrate_out_errors(system, terms, of_sensors)
+            system = concat([memory, rows.system_at(basis)], axis=0).named(outputs[0])
+            return integrate_out_errors(system, terms, of_sensors + of_model)
 
         consistency = add_consistency(counts, self.limits, self.family.targets)
         sample = add_importance_sampler(self.family, self.response, context, system_at, consistency)

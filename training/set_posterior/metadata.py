@@ -23,6 +23,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
         "noise": {name: list(parts) for name, parts in posterior.noise.items()},
         "context": posterior.family.limits(),
         "errors": posterior.family.usual_errors(),
+        "model_errors": posterior.family.model_errors(),
         "alone": sets_only,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),
         "interval": list(INTERVAL),

@@ -13,11 +13,12 @@ from scipy.stats import qmc
 
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
-from training.onnx_graph.value import Value, constant, gemm, tanh
+from training.onnx_graph.value import Value, gemm, tanh
 from training.regressors.standardisation import Standardisation
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
+from training.set_posterior.response_values import ResponseValues, SoilValues
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -36,6 +37,9 @@ FIRST_RATE, LARGEST_RATE, WARM_UP = 4e-3, 6e-3, 0.1
 LEAST_OUTPUT_STD = 2e-3
 #: Weight of each channel's error in the loss; readings of sinkage have more noise.
 CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
+#: The changes by another contact are needed to a tenth of their size: of fewer designs, one in
+#: eight, and with fewer hidden units.
+CONTACT_SHARE, LEAST_CONTACT_DESIGNS, CONTACT_HIDDEN = 8, 512, 32
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ class Response:
     lower: Floats  # (f,) ends of the features of the designs
     upper: Floats
     error: Floats  # (channels,) rms over held-out designs, on the scales of the responses
+    #: the changes of the channels with another contact, if this is an error of the family's model
+    contact: Response | None = None
 
     def coefficients(self, features: Floats) -> Floats:
         """Coefficients (n, terms, channels) at features (n, f)."""
@@ -79,69 +85,63 @@ class Response:
         """Channels (n, m, channels) at features (n, f) and coordinates (n, m, p) or (m, p)."""
         return np.asarray(monomials(x, self.terms) @ self.coefficients(features))
 
+    def add_at_soil(self, features: Value) -> SoilValues:
+        """Add the network to a graph, for the values of the channels at single soils."""
+        hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
+        for weights, bias in self._inner_layers():
+            hidden = tanh(gemm(hidden, weights, bias))
+        return SoilValues.of(hidden, self.layers[-2:], len(self.terms))
+
     def add_to(self, features: Value, directions: Floats) -> ResponseValues:
         """Add the network to a graph, with its derivatives along directions of the features (d, f).
 
         The derivatives are exact: each layer carries the tangents of its values.
         """
         hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
-        pairs = list(zip(self.layers[0::2], self.layers[1::2], strict=True))
         tangent: Value | Floats = (directions / self.scaling.scale)[:, None]
-        for weights, bias in pairs[:-1]:
+        for weights, bias in self._inner_layers():
             hidden = tanh(gemm(hidden, weights, bias))
             tangent = tangent @ weights * (1.0 - hidden * hidden)
         assert isinstance(tangent, Value)
-        channels = len(RESPONSE_CHANNELS)
-        weights, bias = (_by_channel(layer, len(self.terms)) for layer in pairs[-1])
-        output = gemm(hidden, weights, bias).reshape(-1, channels, len(self.terms))
-        coefficients = output.node("Transpose", perm=[1, 0, 2])
-        return ResponseValues(coefficients, tangent, weights.reshape(-1, len(self.terms)))
+        return ResponseValues.of(hidden, tangent, self.layers[-2:], len(self.terms))
 
-
-@dataclass(frozen=True)
-class ResponseValues:
-    """Graph values of a response surface for rows of readings, float32."""
-
-    coefficients: Value  # (channels, rows, terms)
-    tangent: Value  # (d, rows, hidden) derivatives of the last hidden layer along d directions
-    last_layer: Floats  # (hidden * channels, terms) its weights
-
-    def slopes_at(self, basis: Value | None) -> Value:
-        """Derivatives (d, channels, rows) of the channels at one soil along the directions.
-
-        The soil is given by its monomials (terms, 1); None is the middle of the prior's range.
-        """
-        channels = len(RESPONSE_CHANNELS)
-        if basis is None:
-            by_channel: Value | Floats = self.last_layer[:, 0].reshape(-1, channels)
-        else:
-            last_layer = constant(basis.graph, self.last_layer)
-            by_channel = (last_layer @ basis).reshape(-1, channels)
-        return (self.tangent @ by_channel).node("Transpose", perm=[0, 2, 1])
-
-
-def _by_channel(layer: Floats, terms: int) -> Floats:
-    """The last layer with its outputs by channel first, then by term."""
-    by_channel = layer.reshape(*layer.shape[:-1], terms, -1).swapaxes(-1, -2)
-    return by_channel.reshape(*layer.shape[:-1], -1)
+    def _inner_layers(self) -> list[tuple[Floats, Floats]]:
+        """Weights and biases of all layers but the last."""
+        return list(zip(self.layers[0:-2:2], self.layers[1:-2:2], strict=True))
 
 
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:
-    """The response surface of a family, fitted to simulated designs.
-
-    Each design is simulated at points of the unknowns, and a polynomial is fitted to its responses;
-    a network then learns the coefficients of the polynomials from the features of the designs.
+    """The response surface of a family, with that of the changes by another contact if it has one.
 
     Raises
     ------
     InputError
         If fewer than half of the designs carry their load on all soils of the prior.
     """
+    response = _fit(family, family.responses, settings, progress)
+    if family.model_errors()["contact"] == 0.0:
+        return response
+    designs = max(LEAST_CONTACT_DESIGNS, settings.designs // CONTACT_SHARE)
+    smaller = replace(settings, designs=designs, hidden=min(settings.hidden, CONTACT_HIDDEN))
+    return replace(response, contact=_fit(family, family.contact_changes, smaller, progress))
+
+
+def _fit(
+    family: WheelFamily,
+    respond: Callable[[Floats, Floats], Floats],
+    settings: ResponseSettings,
+    progress: Progress,
+) -> Response:
+    """A surface of channels (n, m, 3), fitted to simulated designs.
+
+    Each design is simulated at points of the unknowns, and a polynomial is fitted to its responses;
+    a network then learns the coefficients of the polynomials from the features of the designs.
+    """
     terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
     x = _points(family, int(POINTS_PER_TERM * len(terms)), settings.seed)
     basis = monomials(x, terms)
     designs = family.designs(settings.designs, settings.seed)
-    coefficients, squared_error, feasible = _fit_polynomials(family, designs, x, basis, progress)
+    coefficients, squared_error, feasible = _fit_polynomials(respond, designs, x, basis, progress)
     if feasible.mean() < 0.5:
         raise InputError(
             f"only {feasible.mean():.0%} of the operating conditions have an equilibrium on all "
@@ -161,7 +161,11 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
 
 
 def _fit_polynomials(
-    family: WheelFamily, designs: Floats, x: Floats, basis: Floats, progress: Progress
+    respond: Callable[[Floats, Floats], Floats],
+    designs: Floats,
+    x: Floats,
+    basis: Floats,
+    progress: Progress,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Least-squares polynomials of designs at points x (m, p), whose monomials are the basis.
 
@@ -172,7 +176,7 @@ def _fit_polynomials(
     coefficients, squared_error, feasible = [], [], []
     for first in range(0, len(designs), SIMULATED_AT_A_TIME):
         progress("simulating", first, len(designs))
-        y = family.responses(designs[first : first + SIMULATED_AT_A_TIME], x[None])
+        y = respond(designs[first : first + SIMULATED_AT_A_TIME], x[None])
         finite = np.isfinite(y).all(axis=(1, 2))
         a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
         coefficients.append(a)

@@ -13,6 +13,7 @@ from soilml.config.prior_settings import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.physics.contact import Force
+from soilml.physics.effects.base import Effect
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
@@ -31,6 +32,7 @@ from training.set_posterior.families.dimensionless_design import (
     SHEAR_MODULUS_SHARE,
 )
 from training.set_posterior.families.dimensionless_sets import simulate_sets
+from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
@@ -143,8 +145,8 @@ class DimensionlessFamily:
         """See `WheelFamily` and `simulate_sets`."""
         return simulate_sets(self, self.ranges["slip"], count, rows, seed)
 
-    def force(self, designs: Floats, x: Floats) -> Force:
-        """Forces of the wheel (n, m) on soils at coordinates x (n, m, p)."""
+    def force(self, designs: Floats, x: Floats, *effects: Effect) -> Force:
+        """Forces of the wheel (n, m), with effects, on soils at coordinates x (n, m, p)."""
         slip, r, b, load, n, k, c_max, shear_max = designs[:, None, :].transpose(2, 0, 1)
         c, phi, shear, log_bearing, exponent = (a.value(x[..., i]) for i, a in enumerate(self.axes))
         soil = Soil(
@@ -155,11 +157,14 @@ class DimensionlessFamily:
             kphi=k * np.exp(log_bearing) * (REFERENCE_DEPTH * r) ** -exponent,
             n=n + exponent,
         )
-        return Model(Wheel(radius=r, width=b))(soil, Operating(slip=slip, load=load))
+        return Model(Wheel(radius=r, width=b), effects)(soil, Operating(slip=slip, load=load))
 
     def responses(self, designs: Floats, x: Floats) -> Floats:
         """See `WheelFamily`; torque as the logarithm of T / (W r), and the length is the radius."""
-        force = self.force(designs, x)
+        return self._responses(designs, x)
+
+    def _responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
+        force = self.force(designs, x, *effects)
         r, load = designs[:, RADIUS, None], designs[:, LOAD, None]
         with np.errstate(invalid="ignore", divide="ignore"):
             torque, sinkage = np.log(force.torque / (load * r)), np.log(force.sinkage / r)
@@ -204,6 +209,14 @@ class DimensionlessFamily:
         """See `WheelFamily`; none of drawbar pull, as loads differ by a factor of a thousand."""
         return USUAL_ERRORS
 
+    def model_errors(self) -> dict[str, float]:
+        """See `WheelFamily`; `bearing_std` is the error of the bearing curve."""
+        return usual_model_errors(["cohesion", "kphi", "n"], Model(Wheel(radius=1.0, width=1.0)))
+
+    def contact_changes(self, designs: Floats, x: Floats) -> Floats:
+        """See `WheelFamily`."""
+        return self._responses(designs, x, usual_contact()) - self._responses(designs, x)
+
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`; features are linear in the logarithms of the inputs."""
         graph, radius, n = readings["slip"].graph, readings["wheel_radius"], readings["n"]
@@ -233,6 +246,7 @@ class DimensionlessFamily:
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=1.0,
+            usual_log_load=0.0,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
             target_scale=target_scale.reshape(-1, 1),

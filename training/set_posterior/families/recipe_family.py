@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,11 +20,13 @@ from soilml.onboard.set_contract import (
     OPERATING_NOISE,
     RESPONSE_CHANNELS,
 )
+from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.run_patterns import run_patterns
+from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     PULL_OFFSET_SHARE,
@@ -123,11 +126,16 @@ class RecipeFamily:
         polynomial of the unknowns; and the noise computed from a reading is then within 5 % of
         that computed from the true torque.
         """
+        return self._responses(designs, x)
+
+    def _responses(self, designs: Floats, x: Floats, *effects: Effect) -> Floats:
+        """The responses with further effects."""
         case = self.recipe.case.with_values(
             {axis.name: axis.value(x[..., i]) for i, axis in enumerate(self.axes)}
         )
         slip, load = (designs[:, None, k] for k in (0, 1))
-        force = case.model(case.soil, Operating(slip=slip, load=load))
+        model = replace(case.model, effects=(*case.model.effects, *effects))
+        force = model(case.soil, Operating(slip=slip, load=load))
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.linear_torque:
                 torque = np.arcsinh(force.torque / (2.0 * self.linear_torque))
@@ -148,6 +156,14 @@ class RecipeFamily:
         load = float(self.recipe.load.at(np.asarray(0.5)))
         return USUAL_ERRORS | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
 
+    def model_errors(self) -> dict[str, float]:
+        """See `WheelFamily`."""
+        return usual_model_errors([axis.name for axis in self.axes], self.recipe.case.model)
+
+    def contact_changes(self, designs: Floats, x: Floats) -> Floats:
+        """See `WheelFamily`."""
+        return self._responses(designs, x, usual_contact()) - self._responses(designs, x)
+
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
         operating = concat([readings["slip"], readings["load"]], axis=0)
@@ -160,6 +176,7 @@ class RecipeFamily:
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=0.0 if self.linear_torque else 1.0,
+            usual_log_load=math.log(float(self.recipe.load.at(np.asarray(0.5)))),
             most_torque_noise=ANY_NOISE if self.linear_torque else MOST_RELATIVE_NOISE,
             length=length,
             target_scale=constant(operating.graph, np.ones((self.targets, 1))),

@@ -30,6 +30,7 @@ USUAL_ERRORS = {
     "torque_gain": 0.03,
     "sinkage_bias": 0.0005,
     "drawbar_pull_bias": 0.0,
+    "model_error": 0.0,
 }
 #: Usual offset of a sensor of drawbar pull as a share of a typical load.
 PULL_OFFSET_SHARE = 0.01
@@ -47,6 +48,7 @@ class ContextValues:
     torque: Value  # (rows,) the torque reading on the scale of the response
     torque_slope: Value  # (rows,) derivative of that scale by torque, 1 / (N m)
     torque_by_load: float  # derivative of the torque scale by log load, with its sign changed
+    usual_log_load: float  # from which changes with the logarithm of load are counted
     most_torque_noise: float  # readings with more noise on that scale are left out
     length: Value  # unit of sinkage, and of torque over load, m
     target_scale: Value  # (q, 1) factors of the values of the estimated axes
@@ -178,6 +180,21 @@ class WheelFamily(Protocol):
 
     def usual_errors(self) -> dict[str, float]:
         """Usual standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
+        ...
+
+    def model_errors(self) -> dict[str, float]:
+        """Usual standard deviations of errors of the model, by `MODEL_ERROR_COLUMNS`.
+
+        Nil for what is an unknown of the family, or an effect of its model.
+        """
+        ...
+
+    def contact_changes(self, designs: Floats, x: Floats) -> Floats:
+        """Changes of the channels (n, m, 3) where the rim touches the soil behind the axle too.
+
+        That is with the effect `exit-angle` at its usual size. It is called only if this is one of
+        the errors of the model.
+        """
         ...
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:

@@ -11,6 +11,7 @@ from soilml.onboard.set_contract import (
     OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
+    SENSOR_ERROR_COLUMNS,
 )
 from training.onnx_graph.value import Value, absolute, concat, constant, gemm, log, maximum, sqrt
 from training.set_posterior.families.wheel_family import (
@@ -20,6 +21,8 @@ from training.set_posterior.families.wheel_family import (
     WheelFamily,
 )
 from training.set_posterior.response_surface import Response
+from training.set_posterior.response_values import ResponseValues
+from training.set_posterior.sampler.model_errors import ModelErrors, add_model_errors
 from training.set_posterior.sampler.sensor_errors import (
     SensorErrors,
     add_sensor_errors,
@@ -49,12 +52,14 @@ class ResidualRows:
     residuals: Value  # (channels, rows, terms) without weights
     weight: Value  # (channels, rows, 1), 0 for readings that are left out
     used: Value  # (channels * rows,) whether a reading takes part
-    errors: SensorErrors
+    values: ResponseValues  # the response surface at the rows, with slopes by log slip and load
+    sensor_errors: SensorErrors
+    model_errors: ModelErrors
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
     def system_at(self, basis: Value | None) -> Value:
-        r"""The system (readings, terms + errors), with errors of slip and load linear at one soil.
+        r"""The system (readings, terms + errors), with errors linear at one soil.
 
         Errors of a row's slip and load are part of all its channels. With d the changes of its
         weighted residuals with one standard deviation of such an error, their covariance is
@@ -64,11 +69,18 @@ class ResidualRows:
         ----------
         basis : Value or None
             Monomials (terms, 1) of the soil at which the residuals' derivatives by slip and load
-            are taken; None is the middle of the prior's range.
+            and the other errors are taken; None is the middle of the prior's range, and the system
+            is then without columns of errors of the model.
         """
-        common, of_row = self.errors.columns_at(basis)
-        system = concat([self.residuals, common, of_row], axis=2) * self.weight
-        columns = self.terms + len(ERROR_COLUMNS)
+        slopes = self.values.slopes_at(basis)
+        common, of_row = self.sensor_errors.columns_at(slopes)
+        parts, columns = [self.residuals, common], self.terms + len(SENSOR_ERROR_COLUMNS)
+        if basis is not None:
+            load_slopes = slopes.take([1], axis=0).reshape(len(RESPONSE_CHANNELS), -1, 1)
+            coefficients = self.values.coefficients
+            parts.append(self.model_errors.columns_at(load_slopes, coefficients, basis))
+            columns = self.terms + len(ERROR_COLUMNS)
+        system = concat([*parts, of_row], axis=2) * self.weight
         of_each = len(OPERATING_STD_INPUTS)
         whitened = whiten_rows(system, columns + of_each, of_each)
         return whitened.reshape(-1, columns).node("Compress", self.used, axis=0)
@@ -115,7 +127,9 @@ def add_residual_rows(
         residuals,
         weight.reshape(channels, -1, 1),
         used.reshape(-1),
-        add_sensor_errors(context, values, readings, slope, y),
+        values,
+        add_sensor_errors(context, readings, slope, y),
+        add_model_errors(family, response, context, readings, slope),
         in_range,
         concat(counts, axis=0),
     )

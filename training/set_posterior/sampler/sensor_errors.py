@@ -9,24 +9,22 @@ import numpy as np
 from soilml.onboard.set_contract import OPERATING_STD_INPUTS, RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, concat, constant, gemm, maximum, sqrt
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues
-from training.set_posterior.response_surface import ResponseValues
 
 
 @dataclass(frozen=True)
 class SensorErrors:
     """Changes of the residuals with errors of the sensors, before weights."""
 
-    values: ResponseValues
     by_reading: Value  # (2, channels, rows): what load's change of the scales adds to the slopes
     per_error: Value  # (4, 1, rows): log slip and log load for one standard deviation of each error
     offsets: Value  # (channels, rows, channels + 1): offset of each channel, and gain of torque
 
-    def columns_at(self, basis: Value | None) -> tuple[Value, Value]:
+    def columns_at(self, slopes: Value) -> tuple[Value, Value]:
         """Columns of the common errors (channels, rows, errors), and of each row's own, at a soil.
 
-        `basis` has the monomials (terms, 1) of the soil; None is the middle of the prior's range.
+        `slopes` (2, channels, rows) are derivatives of the channels there by log slip and log load.
         """
-        slopes = self.values.slopes_at(basis) + self.by_reading
+        slopes = slopes + self.by_reading
         both = concat([slopes, slopes], axis=0) * self.per_error
         operating = both.node("Transpose", perm=[1, 2, 0])
         common, of_row = operating.split(2, axis=2)
@@ -35,7 +33,6 @@ class SensorErrors:
 
 def add_sensor_errors(
     context: ContextValues,
-    values: ResponseValues,
     readings: dict[str, Value],
     slope: Value,
     y: Value,
@@ -52,8 +49,6 @@ def add_sensor_errors(
     ----------
     context : ContextValues
         The torque reading on its scale, and how that depends on load.
-    values : ResponseValues
-        The response surface at the rows, with its slopes by log slip and log load.
     readings : dict
         Readings and standard deviations by input name.
     slope, y : Value
@@ -80,7 +75,6 @@ def add_sensor_errors(
     channel_of_column = np.eye(channels, channels + 1)[:, None]
     channel_of_column[0, 0, -1] = 1.0
     return SensorErrors(
-        values,
         by_reading,
         concat(per_error, axis=0).reshape(2 * len(OPERATING_STD_INPUTS), 1, -1),
         slope.reshape(channels, -1, 1) * channel_of_column * offset,
