@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.experiment_design import is_identified
-from soilml.onboard.estimate import Estimate
+from soilml.onboard.estimate import Estimate, Reason
 from soilml.quantities import column
 
 
@@ -36,4 +39,29 @@ def width_notes(estimate: Estimate, what: str, does: str, hint: str) -> list[str
             f"{' and '.join(vague)}: the estimate is mostly the prior, {what} {does} not determine "
             f"{'it' if len(vague) == 1 else 'them'}; {hint} for a better estimate"
         )
+    return notes
+
+
+def refusal_notes(
+    by: str,
+    names: Sequence[Any],
+    outside: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    estimate: Estimate,
+) -> list[str]:
+    """Why runs (n,) are not in range, and what their estimate is then.
+
+    `outside` and `rows` are the rows out of range, and all rows, of each.
+    """
+    notes = []
+    for i, name in enumerate(names):
+        if estimate.in_range[i]:
+            continue
+        reason, what = Reason(int(estimate.reason[i])), "the estimate is the prior"
+        why = reason.words
+        if reason == Reason.OUT_OF_RANGE:
+            why = f"{outside[i]} of {rows[i]} rows are out of range"
+        if reason == Reason.INCONSISTENT:
+            what = "the estimate is widened as far as the misfit says"
+        notes.append(f"{by} {name}: {why}; {what}")
     return notes

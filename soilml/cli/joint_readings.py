@@ -97,7 +97,7 @@ def _common_error_note(sets: SetPosterior) -> list[str]:
     said = [
         texts[name].format(100.0 * std if name.endswith("gain") else std)
         for name, std in sets.common_errors.items()
-        if std > 0.0
+        if std > 0.0 and name in texts
     ]
     if not said:
         return []

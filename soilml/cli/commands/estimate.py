@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.cli.advice_text import advice_after_estimate, median_row, widest_row
-from soilml.cli.estimate_text import estimate_columns, width_notes
+from soilml.cli.estimate_text import estimate_columns, refusal_notes, width_notes
 from soilml.cli.joint_readings import (
     channel_note,
     joint_readings,
@@ -21,13 +21,14 @@ from soilml.cli.joint_readings import (
 )
 from soilml.cli.options import InputFile, add_row_options, read_rows
 from soilml.cli.output import write_columns
+from soilml.cli.usual_model_error import usual_answer
 from soilml.cli.wheel_check import apply_case_option, check_table_wheel, describe_file
 from soilml.errors import InputError, TableError
 from soilml.io.atomic_files import output_files
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
-from soilml.onboard.estimate import Estimate, Reason
+from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.fusion.joint_errors import are_comparable
 from soilml.onboard.multi_sensor import ACROSS_FILES, CORRELATED, fuse_estimates
@@ -60,7 +61,10 @@ is close to the prior. --by run pools all rows of a run, which is far more
 accurate; sinkage_m, drawbar_pull_N and <column>_std are used where the table
 has them, slip_std and load_N_std included. The estimate of a run is the prior
 where more than a tenth of its rows is out of range, and widened as far as the
-misfit says where no soil explains them all. A row with a blank reading, or
+misfit says where no soil explains them all. A run gets two answers: as if the
+model of wheel and soil were right, and, in columns with _usual, with the errors
+that such a model usually has; a [discrepancy] of --case takes the place of the
+second answer. A row with a blank reading, or
 whose status is not ok, gets a blank estimate. Slip differs from row to row and
 has no --by.
 
@@ -264,9 +268,8 @@ def _group_estimates(
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
     readings = [joint_readings(estimator, rows, case) for _, rows in groups]
-    estimates = [estimator.run(**inputs) for inputs in readings]
-    in_range = [int(estimator.rows_in_range(**inputs).sum()) for inputs in readings]
-    estimate = Estimate.stack(estimates, (len(estimates),))
+    in_range = np.asarray([int(estimator.rows_in_range(**inputs).sum()) for inputs in readings])
+    estimate = Estimate.stack([estimator.run(**one) for one in readings], (len(readings),))
     position = {name: i for i, (name, _) in enumerate(groups)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])
@@ -274,11 +277,14 @@ def _group_estimates(
     columns: dict[str, Any] = {
         by: np.asarray(order),
         "rows": np.where(answered, counts[index], 0),
-        "rows_in_range": np.where(answered, np.asarray(in_range)[index], 0),
+        "rows_in_range": np.where(answered, in_range[index], 0),
     }
     for key, values in estimate_columns(estimate).items():
         columns[key] = np.where(answered, values[index], np.nan)
     columns["in_range"] = answered & estimate.in_range[index]
+    names = [name for name, _ in groups]
+    second, second_notes = usual_answer(estimator, case, by, names, readings, estimate)
+    columns |= {key: np.where(answered, values[index], np.nan) for key, values in second.items()}
     notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
     notes += width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
     if estimate.in_range.any():
@@ -287,12 +293,5 @@ def _group_estimates(
             estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
         )
         notes += [f"{by} {name}: {line}" for line in lines]
-    for (name, rows), inside, one in zip(groups, in_range, estimates, strict=True):
-        if not one.in_range:
-            why, what = Reason(int(one.reason)).words, "the estimate is the prior"
-            if one.reason == Reason.OUT_OF_RANGE:
-                why = f"{len(rows) - inside} of {len(rows)} rows are out of range"
-            if one.reason == Reason.INCONSISTENT:
-                what = "the estimate is widened as far as the misfit says"
-            notes.append(f"{by} {name}: {why}; {what}")
-    return columns, notes
+    notes += refusal_notes(by, names, counts - in_range, counts, estimate)
+    return columns, notes + second_notes

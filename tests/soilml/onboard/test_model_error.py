@@ -1,0 +1,114 @@
+"""Errors of the model, onboard."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import simulated_run
+
+from soilml.errors import InputError
+from soilml.onboard.common_errors import error_columns
+from soilml.onboard.estimator import Estimator
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
+    SENSOR_ERROR_COLUMNS,
+)
+from soilml.physics.operating_point import Operating
+
+EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+
+
+@pytest.fixture(scope="module")
+def estimator(wheel_set_file):
+    return Estimator.load(wheel_set_file)
+
+
+def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 30):
+    """Runs (rows,) of torque on soils of the prior where the model is wrong, and the soils."""
+    family, rng = posterior.family, np.random.default_rng(4)
+    case = family.recipe.case
+    model = case.model if effect is None else case.model + effect
+    for _ in range(count):
+        x = np.asarray([axis.quantile(rng.random()) for axis in family.axes])
+        truth = [float(axis.value(v)) for axis, v in zip(family.axes, x, strict=True)]
+        names = [axis.name for axis in family.axes]
+        values = {name: bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
+        soil = case.with_values(values | dict(zip(names, truth, strict=True))).soil
+        slip, load = rng.uniform(0.06, 0.58, 16), rng.choice([40.0, 70.0, 100.0], 16)
+        torque = model(soil, Operating(slip=slip, load=load)).torque
+        noisy = torque * (1.0 + 0.02 * rng.standard_normal(16))
+        yield {"slip": slip, "load": load, "torque": noisy}, np.asarray(truth)
+
+
+def share_held(estimator, runs) -> np.ndarray:
+    """Share of the 90 % intervals that hold the truth, (q,)."""
+    held = []
+    for run, truth in runs:
+        found = estimator.run(**run)
+        held.append((truth >= found.low) & (truth <= found.high))
+    return np.mean(held, axis=0)
+
+
+@pytest.mark.slow
+def test_intervals_hold_where_the_bearing_is_another(estimator, wheel_posterior):
+    runs = list(wrong_runs(wheel_posterior, bearing=0.55))
+    right, usual = (share_held(estimator.on(model_error=size), runs) for size in (0.0, 1.0))
+    assert right[2] < 0.4 and right.min() < usual.min()
+    assert usual.min() > 0.7
+
+
+@pytest.mark.slow
+def test_intervals_hold_where_the_soil_sinks_with_slip(estimator, wheel_posterior):
+    from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+
+    runs = list(wrong_runs(wheel_posterior, SlipSinkage(n1=0.25)))
+    right, usual = (share_held(estimator.on(model_error=size), runs) for size in (0.0, 1.0))
+    assert right[0] < 0.5
+    assert usual.min() > 0.75
+
+
+def test_a_model_with_errors_increases_the_covariance(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 16)
+    exact = estimator.on(**EXACT)
+    sizes = [exact.on(model_error=size).run(**run).covariance for size in (0.0, 0.5, 1.0)]
+    areas = [np.linalg.det(covariance) for covariance in sizes]
+    assert areas[1] > 2.0 * areas[0] and areas[2] > 1.5 * areas[1]
+
+
+def test_the_model_is_taken_as_right_unless_told(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 16)
+    assert estimator.sets.common_errors[MODEL_ERROR_INPUT] == 0.0
+    told = estimator.on(model_error=0.0).run(**run)
+    assert np.array_equal(estimator.run(**run).mean, told.mean)
+
+
+def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 24)
+    usual = estimator.on(model_error=1.0)
+    memory = usual.start()
+    for first in range(0, 24, 4):
+        part = {name: values[first : first + 4] for name, values in run.items()}
+        found, memory = usual.step(memory, **part)
+    together = usual.run(**run)
+    assert np.abs(found.mean - together.mean).max() < together.std.max()
+    assert found.std == pytest.approx(together.std, rel=0.25)
+    with pytest.raises(InputError, match="this memory is of"):
+        estimator.step(memory, **run)
+
+
+def test_a_file_of_an_earlier_version_says_that_its_model_is_right(estimator):
+    sensors = {k: v for k, v in estimator.sets.common_errors.items() if k != MODEL_ERROR_INPUT}
+    old = replace(estimator, sets=replace(estimator.sets, common_errors=sensors))
+    with pytest.raises(
+        InputError, match="model_error is 1, but this file takes its model as right"
+    ):
+        old.on(model_error=1.0)
+    assert MODEL_ERROR_INPUT not in old.on(model_error=0.0).sets.common_errors
+    assert error_columns(sensors) == len(SENSOR_ERROR_COLUMNS)
+    assert error_columns(estimator.sets.common_errors) == len(ERROR_COLUMNS)
+    assert error_columns({}) == 1
+    for value in (-1.0, np.nan):
+        with pytest.raises(InputError, match=r"model_error is .*; needed is a standard deviation"):
+            estimator.on(model_error=value)
