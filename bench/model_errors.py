@@ -29,14 +29,16 @@ from wrong_worlds import (
 
 from soilml import Estimator
 from soilml.onboard.estimate import Estimate
-from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
+from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, MODEL_ERROR_INPUT
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, rows of each set, and the seed of both.
 SETS, ROWS, SEED = 100, 16, 1
-#: Sensors that are exact, as files took them before they knew of errors.
+#: Sensors that are exact, as files took them before they knew of errors, and a right model.
 EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
+#: A model with its usual errors, beside those of the sensors.
+USUAL_MODEL = {MODEL_ERROR_INPUT: 1.0}
 #: Nominal coverage of the intervals.
 COVERAGE = 0.9
 
@@ -97,18 +99,20 @@ def with_prior(estimates: Sequence[Estimate], estimator: Estimator) -> list[Esti
 
 
 def lines_of(estimator: Estimator, world: World, channels: Sequence[str]) -> tuple[Scores, ...]:
-    """Scores with exact sensors and the prior for refused sets, and as the file answers."""
+    """Scores with exact sensors and the prior for refused sets, and of the file's two answers."""
     drives = simulate(world, SETS, ROWS, SEED)
     before = with_prior(answers(estimator.on(**EXACT), drives, channels, None), estimator)
-    after = answers(estimator, drives, channels, world)
-    return Scores.of(before, drives.truth), Scores.of(after, drives.truth)
+    right = answers(estimator, drives, channels, world)
+    usual = answers(estimator.on(**USUAL_MODEL), drives, channels, world)
+    return tuple(Scores.of(found, drives.truth) for found in (before, right, usual))
 
 
 def coverage_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
     """A line for each world: coverage, refusals, interval score."""
     lines = [
-        "| what is wrong | refused | 90 % of c, phi, K | score | now refused | 90 % | score |",
-        "|---|---:|---|---:|---:|---|---:|",
+        "| what is wrong | exact sensors: refused | 90 % of c, phi, K | score | usual errors of "
+        "sensors: refused | 90 % | score | and of the model: refused | 90 % | score |",
+        "|---|---:|---|---:|---:|---|---:|---:|---|---:|",
     ]
     for world in worlds:
         cells = []
@@ -146,9 +150,11 @@ def price_table(estimator: Estimator) -> str:
     """Width of the intervals of sound sets with usual errors over that with exact sensors."""
     drives = simulate(WORLDS[0], SETS, ROWS, SEED)
     lines = ["| what may be wrong | torque: c, phi, K | all channels: c, phi, K |", "|---|---|---|"]
-    usual = estimator.sets.common_errors if estimator.sets else {}
-    cases = {f"{name} {std:g}": EXACT | {name: std} for name, std in usual.items()}
-    cases |= {"all of them": dict(usual)}
+    usual = dict(estimator.sets.common_errors) if estimator.sets else {}
+    cases = {f"{name} {std:g}": EXACT | {name: std} for name, std in usual.items() if std}
+    cases |= {"all errors of sensors": usual}
+    for size in (0.5, 1.0):
+        cases[f"and model_error {size:g}"] = usual | {MODEL_ERROR_INPUT: size}
     known = {c: _widths(estimator.on(**EXACT), drives, CHANNELS[c]) for c in CHANNELS}
     for name, errors in cases.items():
         given = estimator.on(**errors)

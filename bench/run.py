@@ -119,8 +119,10 @@ PARTS = (
         "loads, 2 % torque noise (`python bench/model_errors.py`). Sets are simulated by the "
         "reference wheel of blind sets, which shares no code with `soilml`. First the file with "
         "exact sensors and the prior for refused sets, as files were before they knew of errors; "
-        "then as it answers with its usual errors. Score: mean of the interval score over "
-        "parameters and sets, in standard deviations of the prior; the prior has about 3.3.",
+        "then its two answers: with the usual errors of the sensors, as if the model were right, "
+        "and with the usual errors of the model as well (`model_error` 1). Score: mean of the "
+        "interval score over parameters and sets, in standard deviations of the prior; the prior "
+        "has about 3.3.",
         lambda folder: model_errors.tables(ROOT / "exported" / "wheel.onnx"),
     ),
     Part(

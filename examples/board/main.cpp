@@ -22,6 +22,7 @@ static any_wheel_context wheel_on_dry_sand(float radius, float width)
     // errors that all rows share: as usual
     wheel.slip_bias = wheel.load_gain = wheel.torque_gain = NAN;
     wheel.sinkage_bias = wheel.drawbar_pull_bias = NAN;
+    wheel.model_error = 0.0f; // the model is right; 1: its errors are as usual
     return wheel;
 }
 
