@@ -22,8 +22,9 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 #: Largest difference in one set of 100, and in any, of mean and standard deviation and of the ends.
 MOMENTS, ENDS = (2e-4, 5e-3), (5e-3, 0.3)
 #: Largest difference after thousands of rows: both sides read a factor in float32, whose rounding
-#: grows with the root of the number of rows while the standard deviation shrinks with it.
-LONG = 0.01
+#: grows with the root of the number of rows while the standard deviation shrinks with it. The ends
+#: of the interval, steps of an empirical distribution function, magnify it.
+LONG, LONG_ENDS = 0.01, 0.05
 #: Largest difference of an estimate from one row, which is computed in double.
 SINGLE = 1e-5
 #: The prior's standard deviation is that of the data in the metadata, and that of its quantiles in
@@ -147,7 +148,8 @@ def test_a_day_of_rows_one_by_one(compiled):
     expected, memory = estimator.step(memory, **rows)
     _, answer = model.answer(own)
     assert own.counted[1] == 6000 and answer["in_range"] == bool(expected.in_range)
-    assert max(differences(answer, expected)) < LONG
+    found = differences(answer, expected)
+    assert max(found[:2]) < LONG and max(found[2:]) < LONG_ENDS
 
 
 @pytest.mark.slow
