@@ -10,7 +10,6 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
@@ -62,13 +61,21 @@ _FORMER_PATHS = {
 }
 
 
-class _FormerPaths(MetaPathFinder, Loader):
-    """Imports a module by its former path, with a warning that names the present one."""
+class _FormerPaths:
+    """Imports a module by its former path, with a warning that names the present one.
+
+    A finder and loader without the base classes of `importlib.abc`, whose import takes longer than
+    everything else here.
+    """
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        return ModuleSpec(name, self) if name in _FORMER_PATHS else None
+        loader: Any = self
+        return ModuleSpec(name, loader) if name in _FORMER_PATHS else None
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """The module is created as usual."""
 
     def exec_module(self, module: ModuleType) -> None:
         former = module.__name__

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_effects_option, available_effects
+from soilml.cli.options import InputFile, add_effects_option
 from soilml.io.atomic_files import output_files
 
 HELP = "simulate measurements from a recipe, as a Parquet file"
@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     need("datagen.generate", "generate")
     from datagen.generate import generate
     from datagen.recipe import read_recipe
+    from soilml.cli.option_values import available_effects
     from soilml.cli.progress import progress_bar
     from soilml.identification.discrepancy import ignored_discrepancy
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,12 @@ from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
-from soilml.onboard.estimate import Estimate
-from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, column
+
+if TYPE_CHECKING:
+    from soilml.onboard.estimate import Estimate
+    from soilml.onboard.estimator import Estimator
 
 Floats = NDArray[np.float64]
 

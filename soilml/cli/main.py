@@ -8,7 +8,6 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
-from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 from soilml import __version__
@@ -71,13 +70,25 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+def parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The parser of the command line.
+
+    Parameters
+    ----------
+    command
+        The first word of a command line. If it is a command, its module alone is imported and its
+        arguments are declared; if it is an option such as --help, or None, those of all commands.
+    """
     layout: Any = argparse.RawDescriptionHelpFormatter
     root = _Parser("soilml", description=DESCRIPTION, epilog=EPILOG, formatter_class=layout)
     root.add_argument("--version", action="version", version=f"soilml {__version__}")
     commands = root.add_subparsers(metavar="COMMAND", required=True)
-    for name, path in _command_modules().items():
+    own = command in (*COMMANDS, "--version")
+    every = command is None or (command.startswith("-") and not own)
+    for name, path in (COMMANDS if own else COMMANDS | _other_commands()).items():
+        if not every and command != name:
+            commands.add_parser(name)
+            continue
         module = importlib.import_module(path)
         sub = commands.add_parser(
             name,
@@ -90,10 +101,12 @@ def parser() -> argparse.ArgumentParser:
     return root
 
 
-def _command_modules() -> dict[str, str]:
-    """Module of every command by name: those of this distribution, then those of others."""
+def _other_commands() -> dict[str, str]:
+    """Modules of the commands of other distributions, by name."""
+    from importlib.metadata import entry_points
+
     others = {entry.name: entry.value for entry in entry_points(group="soilml.commands")}
-    return COMMANDS | {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
+    return {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
 
 
 def _no_outputs(args: argparse.Namespace) -> list[Any]:
@@ -117,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     reserve_standard_descriptors()
     words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
-    args = parser().parse_args(words)
+    args = parser(words[0] if words else "").parse_args(words)
     try:
         with termination_as_exception():
             check_outputs(args.outputs(args), _input_files(args))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -70,7 +69,7 @@ def atomic_outputs(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Pat
     do not share one. Raises `InputError` as `check_writable` does, and where the disk is full.
     """
     targets = [check_writable(path) for path in paths]
-    parts = [t.parent / f".{t.name[:40]}.{secrets.token_hex(4)}.part" for t in targets]
+    parts = [t.parent / f".{t.name[:40]}.{os.urandom(4).hex()}.part" for t in targets]
     try:
         yield parts
         for part in parts:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NoReturn, final
 
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
@@ -20,6 +19,7 @@ from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.model_file import open_model, read_fields, read_prior, read_probe
 from soilml.onboard.probe import reproduces
 from soilml.onboard.row_estimates import run_rows
+from soilml.onboard.session import Session
 from soilml.onboard.set_estimate import estimate_of_set
 from soilml.onboard.set_posterior import SetPosterior, without_copies
 
@@ -62,7 +62,7 @@ class Estimator:
     prior: PriorSummary
     pooling: PoolingCalibration = field(repr=False)
     sets: SetPosterior | None = field(repr=False)
-    session: ort.InferenceSession = field(repr=False)
+    session: Session = field(repr=False)
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Estimator:

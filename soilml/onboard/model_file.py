@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnxruntime as ort
 
 from soilml.errors import ModelFileError
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
+from soilml.onboard.session import Session, create_session
 from soilml.onboard.set_posterior import SetPosterior
 
 #: Version of the file format: names of inputs and outputs, keys of the metadata.
@@ -30,7 +30,7 @@ PATTERN_KEYS = {
 }
 
 
-def open_model(path: str | os.PathLike[str]) -> tuple[ort.InferenceSession, dict[str, str]]:
+def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     """Open a model file and verify its checksums.
 
     Returns
@@ -199,15 +199,9 @@ def _read_content(file: Path) -> bytes:
         raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
 
 
-def _create_session(file: Path, content: bytes) -> tuple[ort.InferenceSession, dict[str, str]]:
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4
+def _create_session(file: Path, content: bytes) -> tuple[Session, dict[str, str]]:
     try:
-        session = ort.InferenceSession(
-            content, options, providers=["CPUExecutionProvider"], enable_fallback=0
-        )
+        session = create_session(content)
         return session, dict(session.get_modelmeta().custom_metadata_map)
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__

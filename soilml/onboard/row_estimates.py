@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
+
+from soilml.onboard.session import Session
 
 #: Outputs of the graph for single readings.
 ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
@@ -15,9 +16,7 @@ ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
 ROWS_PER_CALL = 4096
 
 
-def run_rows(
-    session: ort.InferenceSession, rows: Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[Any]]:
+def run_rows(session: Session, rows: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[Any]]:
     """Mean and std (m, q), covariance (m, q, q), float64, and the flag in_range (m,).
 
     Parameters

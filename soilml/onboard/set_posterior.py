@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, final
 
 import numpy as np
-import onnxruntime as ort
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
@@ -23,6 +22,7 @@ from soilml.onboard.common_errors import (
 )
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings
 from soilml.onboard.memory import Memory
+from soilml.onboard.session import Session
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
@@ -208,15 +208,13 @@ class SetPosterior:
         kept = memory.system.astype(np.float32), memory.counts.astype(np.float32)
         return feed | dict(zip(MEMORY_INPUTS, kept, strict=True))
 
-    def rows_in_range(
-        self, session: ort.InferenceSession, rows: Mapping[str, Floats]
-    ) -> NDArray[np.bool_]:
+    def rows_in_range(self, session: Session, rows: Mapping[str, Floats]) -> NDArray[np.bool_]:
         """Which rows (m,) lie in the range of the response surface."""
         flags: NDArray[np.bool_] = session.run((ROW_IN_RANGE,), self.feed(rows, self.start()))[0]
         return flags
 
     def update(
-        self, session: ort.InferenceSession, rows: Mapping[str, Floats], memory: Memory
+        self, session: Session, rows: Mapping[str, Floats], memory: Memory
     ) -> tuple[list[Any], Memory]:
         """Outputs of the graph, in the order of `SET_OUTPUTS`, and memory after further rows.
 

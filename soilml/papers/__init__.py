@@ -6,8 +6,3 @@ To add a paper: write `NAME.csv` with one row per printed number (columns in `CO
 folder, and add one line to `PAPERS` in `catalogue.py`. A row that no function computes, or that is
 known to miss its tolerance, must state a reason.
 """
-
-from soilml.papers.catalogue import PAPERS, Paper
-from soilml.papers.published import COLUMNS, Comparison, PrintedNumber, printed_numbers
-
-__all__ = ["COLUMNS", "PAPERS", "Comparison", "Paper", "PrintedNumber", "printed_numbers"]

@@ -7,8 +7,8 @@ from importlib import resources
 import pytest
 
 from soilml.cli import main
-from soilml.papers import COLUMNS, PAPERS, printed_numbers
-from soilml.papers.catalogue import chapters
+from soilml.papers.catalogue import PAPERS, chapters
+from soilml.papers.published import COLUMNS, printed_numbers
 
 ROWS = list(printed_numbers())
 CHAPTERS = [chapter for name in PAPERS for chapter in chapters(name)]
@@ -43,7 +43,7 @@ def test_an_input_is_not_counted_as_a_result():
 
 
 def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(monkeypatch, capsys):
-    monkeypatch.setattr("soilml.cli.commands.papers.is_terminal", lambda: True)
+    monkeypatch.setattr("soilml.cli.execution.papers.is_terminal", lambda: True)
     assert main(["papers", "nagatani2009"]) == 0
     short = capsys.readouterr()
     assert main(["papers", "nagatani2009", "--all"]) == 0

@@ -204,10 +204,6 @@ class Graph:
 
 def session_of(model: Any) -> Any:
     """An onnxruntime session of a model, on one thread."""
-    import onnxruntime as ort
+    from soilml.onboard.session import create_session
 
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    content = model.SerializeToString()
-    return ort.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    return create_session(model.SerializeToString())

@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
-import numpy as np
-
 from soilml.cli.options import (
-    MAX_ROWS,
     InputFile,
     add_effects_option,
     add_gear_option,
-    available_effects,
-    parse_numbers,
 )
-from soilml.cli.output import write_columns
-from soilml.config.case import read_case_of_one_gear
-from soilml.errors import InputError
-from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import output_files
-from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.row_status import Status
 
 HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
@@ -73,47 +61,6 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
-    slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
-    if slips.size * loads.size > MAX_ROWS:
-        raise InputError(
-            f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "
-            f"at most {MAX_ROWS} are possible"
-        )
-    slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
-    covariates = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
-    force = case.model(case.soil, Operating(slip=slip, load=load, **covariates))
-    failed = int(np.count_nonzero(force.status))
-    if failed == slip.size:
-        worst = Status(int(force.status[0]))
-        limit = f" (at most {force.load.max():.4g} N)" if worst is Status.TOO_HEAVY else ""
-        raise InputError(
-            f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
-        )
-    labels = {} if args.label is None else {"run": [args.label] * slip.size}
-    write_columns(
-        labels
-        | {
-            "slip": slip,
-            "load_N": load,
-            **{
-                COVARIATES[field]: np.full(slip.size, value)
-                for field, value in covariates.items()
-                if value is not None
-            },
-            "torque_Nm": force.torque,
-            "drawbar_pull_N": force.drawbar_pull,
-            "sinkage_m": force.sinkage,
-            "entry_angle_rad": force.entry_angle,
-            "status": [Status(int(code)).reason for code in force.status],
-        },
-        args.out,
-    )
-    for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
-        print(line, file=sys.stderr)
-    if failed:
-        print(
-            f"{failed} of {slip.size} rows have no equilibrium: see the column status",
-            file=sys.stderr,
-        )
-    return 0
+    from soilml.cli.execution.simulate import run
+
+    return run(args)

@@ -36,6 +36,7 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
         "soilml.onboard.memory",
         "soilml.onboard.probe",
         "soilml.onboard.row_estimates",
+        "soilml.onboard.session",
         "soilml.onboard.set_estimate",
         "soilml.quantities",
         "soilml.onboard.set_contract",

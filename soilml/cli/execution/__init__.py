@@ -1,0 +1,1 @@
+"""What the sub-commands do, one module each; `soilml/cli/commands` declares their arguments."""

@@ -1,0 +1,49 @@
+"""`soilml effects`: the catalogue of effects."""
+
+from __future__ import annotations
+
+import argparse
+
+from soilml.cli.option_values import available_effects
+from soilml.errors import InputError
+from soilml.io.text_tables import format_table
+from soilml.parameters import declared
+from soilml.physics.effects.base import STAGES
+from soilml.physics.operating_point import COVARIATES
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the catalogue or one entry."""
+    effects = available_effects(args)
+    if args.name is None:
+        listed = [
+            (name, cls.about.kind, cls.about.size, cls.about.text) for name, cls in effects.items()
+        ]
+        print(format_table(("effect", "of the", "size", "what it is"), listed, text_columns=4))
+        return 0
+    if args.name not in effects:
+        raise InputError(f"no effect {args.name!r}; there are: {', '.join(effects)}")
+    cls = effects[args.name]
+    acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if cls.overrides(stage))
+    neutral = cls()
+    rows = [
+        (name, p.text, f"{getattr(neutral, name):g}", f"{p.lower:g} .. {p.upper:g}", p.unit)
+        for name, p in declared(cls).items()
+    ]
+    about = cls.about
+    print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
+    if about.needs:
+        print(f"needs: {', '.join(COVARIATES[field] for field in about.needs)}")
+    print(f"distinguished from others by: {about.isolate}\nsource: {about.source}\n")
+    print(format_table(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
+    print(
+        f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"
+    )
+    for name, value in cls.about.reference.items():
+        print(f"{name} = {value:g}")
+    return 0
+
+
+def _dedented(text: str) -> str:
+    lines = text.strip().splitlines()
+    return "\n".join([lines[0], *[line.removeprefix("    ") for line in lines[1:]]])

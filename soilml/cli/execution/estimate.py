@@ -1,0 +1,216 @@
+"""`soilml estimate`: a trained model applied to measured rows, as on board."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.cli.advice_text import advice_after_estimate, median_row, widest_row
+from soilml.cli.estimate_text import estimate_columns, refusal_notes, width_notes
+from soilml.cli.joint_readings import (
+    channel_note,
+    joint_readings,
+    row_readings,
+    unused_std_note,
+)
+from soilml.cli.option_values import read_rows
+from soilml.cli.output import write_columns
+from soilml.cli.usual_model_error import usual_answer
+from soilml.cli.wheel_check import apply_case_option, check_table_wheel, describe_file
+from soilml.errors import InputError, TableError
+from soilml.io.read_table import FILLED, RUNS
+from soilml.io.table import Table
+from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
+from soilml.onboard.estimate import Estimate, Reason
+from soilml.onboard.estimator import Estimator
+from soilml.onboard.fusion.joint_errors import are_comparable
+from soilml.onboard.multi_sensor import CORRELATED, fuse_estimates
+from soilml.optional_imports import need
+from soilml.quantities import column
+
+if TYPE_CHECKING:
+    from soilml.config.case import Case
+
+
+def run(args: argparse.Namespace) -> int:
+    """Estimate and write the table."""
+    need("onnxruntime", "estimate")
+    estimators = [Estimator.load(file) for file in (args.model, *args.others)]
+    _check_options(args, estimators)
+    if args.runs is None and args.case is None:
+        print("\n".join(describe_file(estimator) for estimator in estimators))
+        return 0
+    estimators, case, case_notes = apply_case_option(args, estimators)
+    case_notes = [describe_file(estimator) for estimator in estimators] + case_notes
+    if args.runs is None:
+        print("\n".join(case_notes))
+        return 0
+    read = {name: column(name) for estimator in estimators for name in estimator.inputs}
+    needed = tuple(key for key in RUNS if key in ("run", *read.values()))
+    filled = [key for key in FILLED if key in needed]
+    table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
+    for estimator in estimators:
+        check_table_wheel(estimator, table)
+    usable = [_complete(estimator, table) & table.answered for estimator in estimators]
+    complete = np.any([_complete(estimator, table) for estimator in estimators], axis=0)
+    if not np.any(usable):
+        wanted = ", ".join(column(n) for n in estimators[0].inputs)
+        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
+    if args.by is None:
+        columns, notes = _row_estimates(estimators, table, usable, args.rule, case)
+    else:
+        columns, notes = _group_estimates(estimators[0], table, usable[0], args.by, case)
+    write_columns(columns, args.out)
+    notes = case_notes + notes
+    if args.by is None or estimators[0].sets is None:
+        notes += unused_std_note(estimators[0], table)
+    notes += _excluded(table, ~complete, "lack a reading")
+    notes += _excluded(table, complete & ~table.answered, "have a status that is not ok")
+    print("\n".join(notes), file=sys.stderr)
+    return 0
+
+
+def _excluded(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
+    """A note on rows that get no estimate: how many, the reason, and the first three."""
+    if not rows.any():
+        return []
+    some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
+    more = ", ..." if rows.sum() > 3 else ""
+    return [f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}"]
+
+
+def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` for options that cannot be combined."""
+    if args.runs is None and (args.by, args.where, args.out) != (None, None, None):
+        raise InputError("RUNS.csv is missing: --by, --where and --out are for its rows")
+    if args.rule is not None and not args.others:
+        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
+    if args.by is not None and args.others:
+        raise InputError("--with fuses single rows; omit --by")
+    known = are_comparable([e.pooling.held_out for e in estimators])
+    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+        _check_independent(args, estimators)
+    if args.by is not None and estimators[0].per_row:
+        raise InputError(
+            f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
+            "a run; omit --by"
+        )
+
+
+def _check_independent(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` where all inputs of one file are inputs of another: dependent errors."""
+    files = list(zip((args.model, *args.others), estimators, strict=True))
+    for (one, first), (other, second) in combinations(files, 2):
+        shared = set(first.inputs) & set(second.inputs)
+        if len(shared) == min(len(first.inputs), len(second.inputs)):
+            names = ", ".join(column(name) for name in first.inputs if name in shared)
+            raise InputError(
+                f"{one} and {other} both read {names}: their errors are not independent; use one "
+                f"of them, or --rule {COVARIANCE_INTERSECTION}"
+            )
+
+
+def _complete(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
+    """Rows that have all readings that the model needs, (rows,)."""
+    return np.asarray(np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0))
+
+
+def _row_estimates(
+    estimators: list[Estimator],
+    table: Table,
+    usable: list[NDArray[np.bool_]],
+    rule: str | None,
+    case: Case | None,
+) -> tuple[dict[str, Any], list[str]]:
+    """Columns with a line for every row, blank where no model has all its readings, and notes."""
+    estimates = [_all_rows(*parts, table, case) for parts in zip(estimators, usable, strict=True)]
+    answered = np.any(usable, axis=0)
+    inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
+    columns: dict[str, Any] = {"run": table["run"]}
+    columns |= {column(name): table[column(name)] for name in inputs}
+    estimate, files = estimates[0], None
+    if len(estimators) > 1:
+        combined = fuse_estimates(estimates, rule)
+        estimate, files = combined.estimate, combined.used.sum(axis=0)
+    for key, values in estimate_columns(estimate).items():
+        columns[key] = np.where(answered, values, np.nan)
+    columns["in_range"] = answered & estimate.in_range
+    hint = "pool rows with --by run"
+    if files is not None:
+        columns["files"] = files
+    if estimators[0].per_row:
+        hint = "measure with other sensors too, or train for a narrower prior of the soil,"
+    notes = width_notes(estimate, "a single row", "does", hint)
+    if len(estimators) > 1:
+        notes.append(f"fused by the rule {combined.rule}")
+    elif estimate.in_range.any():
+        row = median_row(estimate)
+        readings = row_readings(estimators[0], table.rows(np.asarray([row])))
+        lines = advice_after_estimate(
+            estimators[0], estimate.mean[row], estimate.covariance[row], readings
+        )
+        notes += [f"after {table.place(row)} alone, a typical row: {line}" for line in lines[-1:]]
+    outside = int(np.count_nonzero(answered & ~estimate.in_range))
+    if outside:
+        why = "" if files is None else ", or the files contradict each other there"
+        count = f"{outside} of {int(answered.sum())} rows"
+        notes.append(f"{count} are out of range{why}: their estimate is the prior")
+    return columns, notes
+
+
+def _all_rows(
+    estimator: Estimator, usable: NDArray[np.bool_], table: Table, case: Case | None
+) -> Estimate:
+    """An estimate for every row; one that is not usable counts as out of range."""
+    result = estimator.prior_estimate(len(table))
+    if usable.any():
+        alone = estimator.sets is not None and estimator.sets.sets_only
+        rows = table.rows(usable)
+        readings = row_readings(estimator, rows)
+        if alone:
+            readings = joint_readings(estimator, rows, case, together=False)
+        estimate = estimator(**readings)
+        for key in Estimate.ARRAYS:
+            getattr(result, key)[usable] = getattr(estimate, key)
+    return result
+
+
+def _group_estimates(
+    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str, case: Case | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Columns with a line for every value of a column, from all its usable rows, and notes."""
+    order = [name for name, _ in table.groups(by)]
+    groups = list(table.rows(usable).groups(by))
+    readings = [joint_readings(estimator, rows, case) for _, rows in groups]
+    in_range = np.asarray([int(estimator.rows_in_range(**inputs).sum()) for inputs in readings])
+    estimate = Estimate.stack([estimator.run(**one) for one in readings], (len(readings),))
+    position = {name: i for i, (name, _) in enumerate(groups)}
+    answered = np.asarray([name in position for name in order])
+    index = np.asarray([position.get(name, 0) for name in order])
+    counts = np.asarray([len(rows) for _, rows in groups])
+    columns: dict[str, Any] = {
+        by: np.asarray(order),
+        "rows": np.where(answered, counts[index], 0),
+        "rows_in_range": np.where(answered, in_range[index], 0),
+    }
+    for key, values in estimate_columns(estimate).items():
+        columns[key] = np.where(answered, values[index], np.nan)
+    columns["in_range"] = answered & estimate.in_range[index]
+    names = [name for name, _ in groups]
+    second, second_notes = usual_answer(estimator, case, by, names, readings, estimate)
+    columns |= {key: np.where(answered, values[index], np.nan) for key, values in second.items()}
+    notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
+    notes += width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
+    if estimate.in_range.any():
+        name, rows = groups[i := widest_row(estimate)]
+        lines = advice_after_estimate(
+            estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
+        )
+        notes += [f"{by} {name}: {line}" for line in lines]
+    notes += refusal_notes(by, names, counts - in_range, counts, estimate)
+    return columns, notes + second_notes

@@ -1,0 +1,8 @@
+"""Names of the files that the output folder of a command receives."""
+
+#: Of `soilml climb`.
+CLIMB_FILES = ("climb.json", "curve.csv", "climbs.csv")
+#: Of `soilml gap`.
+GAP_FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
+#: A further file where causes are suspected but not named: the model with the first suspect.
+GAP_SUSPECTED = "model_suspected.toml"

@@ -1,0 +1,93 @@
+"""What a command loads before it has anything to do: help and errors of usage answer at once."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from soilml.cli.main import COMMANDS
+from soilml.onboard.multi_sensor import ACROSS_FILES
+
+#: Runs the command line with the arguments of the process, then lists the modules on the last line.
+LISTING = """\
+import sys
+before = set(sys.modules)
+from soilml.cli.main import main
+try:
+    main()
+except SystemExit as stop:
+    print("status", stop.code)
+print(*sorted(set(sys.modules) - before))
+"""
+OWN = ("soilml", "datagen", "training")
+
+
+def modules_after(*words, cwd=None):
+    """Modules that are not of the standard library, and what was printed before them."""
+    done = subprocess.run(
+        [sys.executable, "-c", LISTING, *map(str, words)], capture_output=True, text=True, cwd=cwd
+    )
+    assert done.returncode == 0, done.stderr
+    *printed, names = done.stdout.splitlines()
+    return {m for m in names.split() if m.split(".")[0] not in sys.stdlib_module_names}, printed
+
+
+def commands_among(modules):
+    return {name for name in COMMANDS if COMMANDS[name] in modules}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_error_of_usage_loads_no_library_and_no_other_command(command):
+    loaded, printed = modules_after(command, "--nonsense")
+    assert printed[-1] == "status 2"
+    assert {name.split(".")[0] for name in loaded} <= set(OWN)
+    assert commands_among(loaded) == {command}
+
+
+@pytest.mark.parametrize(
+    ("words", "commands"),
+    [(["--help"], set(COMMANDS)), (["--version"], set()), (["nonsense"], set())],
+)
+def test_help_version_and_unknown_commands_load_no_library(words, commands):
+    loaded, _ = modules_after(*words)
+    assert {name.split(".")[0] for name in loaded} <= set(OWN)
+    assert commands_among(loaded) == commands
+    assert not [name for name in loaded if name.startswith("soilml.cli.execution.")]
+
+
+def test_an_output_of_the_wrong_kind_is_refused_before_any_library_is_loaded():
+    loaded, _ = modules_after("identify", "model.toml", "runs.csv", "--out", "result.csv")
+    assert {name.split(".")[0] for name in loaded} <= set(OWN)
+
+
+def test_identify_loads_no_runtime_for_trained_models(model_file, tmp_path):
+    lines = ["run,slip,load_N,torque_Nm"]
+    lines += [f"a,{slip},{load},{slip * load / 10}" for slip in (0.2, 0.4) for load in (40, 90)]
+    (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
+    loaded, printed = modules_after("identify", model_file, tmp_path / "runs.csv")
+    assert "scipy" in loaded and '"method": "nonlinear"' in "".join(printed)
+    assert not loaded & {"onnxruntime", "torch", "sklearn", "pyarrow", "matplotlib", "rich"}
+
+
+def test_the_help_names_the_rules_of_fusion():
+    from soilml.cli.commands.estimate import FUSION_RULES
+
+    assert FUSION_RULES == ACROSS_FILES
+
+
+@pytest.mark.parametrize("chosen", [None, "0"])
+def test_loading_a_model_leaves_no_trace_of_telemetry(small_model, tmp_path, chosen):
+    """onnxruntime would write an identifier below the home folder, and look up a vendor's host."""
+    environment = {k: v for k, v in os.environ.items() if k != "ORT_DISABLE_TELEMETRY"}
+    environment |= {"HOME": str(tmp_path)} | ({"ORT_DISABLE_TELEMETRY": chosen} if chosen else {})
+    environment.pop("XDG_CACHE_HOME", None)
+    code = (
+        "import os, sys; from soilml import Estimator; Estimator.load(sys.argv[1]);"
+        "print(os.environ['ORT_DISABLE_TELEMETRY'])"
+    )
+    command = [sys.executable, "-c", code, str(small_model)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    assert done.stdout.strip() == (chosen or "1")
+    if chosen is None:
+        assert not [path for path in tmp_path.rglob("*") if path.is_file()]
