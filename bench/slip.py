@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.generate import generate, simulate_pieces
+from datagen.generate import generate
+from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, Recipe, packaged_file, read_recipe
 from soilml import Estimator
 from soilml.onboard.estimate import Estimate

@@ -1,49 +1,58 @@
-"""Simulate a recipe into a Parquet file, piece by piece."""
+"""Simulate a recipe into a Parquet file, or a folder of them, on all cores or on a cluster."""
 
 from __future__ import annotations
 
-import json
+import io
 import os
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datagen.draws import SampledRows, run_fractions, sample_rows
-from datagen.gear_sensors import GEAR_SENSORS
-from datagen.recipe import OPERATING_COLUMNS, Recipe
-from datagen.sensor_noise import noisy_readings, true_values
-from soilml.config.case import Case
+from datagen.engines.processes import process_map
+from datagen.pieces import PIECE, Piece, data_schema, failed_rows, pieces, simulate_batch
+from datagen.recipe import Recipe
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
-from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.quantities import COLUMNS, QUANTITIES
-from soilml.row_status import Status
 
-#: Rows of a piece: one row group of the file.
-PIECE = 16384
-#: Number of the first random stream of gear sensors; lower ones are those of `datagen.draws`.
-FIRST_STREAM = 4
+#: Settings of the Parquet files. A dictionary of numbers that do not repeat only takes time.
+WRITER: dict[str, Any] = {
+    "compression": "zstd",
+    "write_page_checksum": True,
+    "use_dictionary": ["run", "status"],
+}
+#: Rows that are simulated to estimate the size of a file.
+SAMPLE = 4096
+
+Progress = Callable[[int], None]
+#: A function of a function and items, which yields the results in the order of the items.
+Engine = Callable[[Callable[[Any], Any], Sequence[Any]], AbstractContextManager[Any]]
 
 
 @dataclass(frozen=True)
 class Generated:
-    """Number of rows in a file, and of those without equilibrium."""
+    """Number of rows written or kept, of those without equilibrium, and of those kept."""
 
     rows: int
     failed: int
+    kept: int = 0
 
 
 def generate(
     recipe: Recipe,
     path: str | os.PathLike[str],
-    progress: Callable[[int], None] = lambda rows: None,
+    progress: Progress = lambda rows: None,
+    engine: Engine = process_map,
 ) -> Generated:
     """Simulate a recipe and write its rows to a Parquet file, atomically.
 
-    The same recipe gives the same bytes on the same machine.
+    The same recipe gives the same bytes on the same machine, whatever the engine and its workers.
 
     Parameters
     ----------
@@ -54,6 +63,8 @@ def generate(
         status; the unit of each is in its metadata, the recipe in that of the file.
     progress
         Called with the number of rows written so far.
+    engine
+        Where rows are simulated: `process_map`, on all cores, by default.
 
     Returns
     -------
@@ -64,7 +75,8 @@ def generate(
     Raises
     ------
     InputError
-        Where more than half of the rows have no equilibrium, or the file cannot be written.
+        Where more than half of the rows have no equilibrium, the disk is too small, or the file
+        cannot be written.
 
     Examples
     --------
@@ -72,107 +84,51 @@ def generate(
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     generate(read_recipe("wheel").sized(rows=64, seed=1), f"{folder}/data.parquet")
-    Generated(rows=64, failed=0)
+    Generated(rows=64, failed=0, kept=0)
     """
-    schema = _schema(recipe)
+    schema, items = data_schema(recipe), pieces(recipe)
+    check_space(recipe, path)
     total = failed = 0
-    settings = {"compression": "zstd", "write_page_checksum": True}
-    with atomic_output(path) as part, pq.ParquetWriter(part, schema, **settings) as writer:
-        for columns in simulate_pieces(recipe):
-            bad = int(np.count_nonzero(columns["status"] != Status.OK.reason))
-            total, failed = total + len(columns["status"]), failed + bad
-            arrays = [_array(columns[name], schema.field(name).type) for name in schema.names]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+    with (
+        engine(partial(simulate_batch, recipe, schema), items) as batches,
+        atomic_output(path) as part,
+        pq.ParquetWriter(part, schema, **WRITER) as writer,
+    ):
+        for batch in batches:
+            total, failed = total + len(batch), failed + failed_rows(batch)
+            writer.write_table(pa.Table.from_batches([batch]))
             progress(total)
-        if failed > total / 2:
-            raise InputError(
-                f"{failed} of {total} rows have no equilibrium: lower load_N in [operating], or "
-                "raise kphi, or check [gear]"
-            )
+        check_failures(failed, total)
     return Generated(total, failed)
 
 
-def simulate_pieces(recipe: Recipe) -> Iterator[dict[str, np.ndarray]]:
-    """The rows as dictionaries of columns, one piece after the other."""
-    for block, size in enumerate(block_sizes(recipe)):
-        for first in range(0, size, PIECE):
-            yield simulate_rows(recipe, block, first, min(first + PIECE, size))
-
-
-def block_sizes(recipe: Recipe) -> list[int]:
-    """Rows of each block: complete runs, except that the block of the shortest gets the rest."""
-    shortest = min(range(len(recipe.blocks)), key=lambda i: recipe.blocks[i].rows)
-    sizes = [int(recipe.rows * b.share / b.rows) * b.rows for b in recipe.blocks]
-    sizes[shortest] = recipe.rows - sum(size for i, size in enumerate(sizes) if i != shortest)
-    return sizes
-
-
-def simulate_rows(recipe: Recipe, block: int, first: int, last: int) -> dict[str, np.ndarray]:
-    """Columns of the rows `first` to `last` (excluded) of a block, each (last - first,)."""
-    rows = sample_rows(recipe, block, first, last)
-    case = recipe.case.with_values(rows.soil)
-    at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
-    force = case.model(case.soil, at)
-    truth = true_values(rows.slip, rows.load, force)
-    sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
-    readings = noisy_readings(recipe, block, np.arange(first, last), rows.run, truth)
-    reasons = np.asarray([status.reason for status in Status])
-    names = {path: QUANTITIES[path].column if path in QUANTITIES else path for path in rows.soil}
-    return {
-        "run": np.asarray([f"{recipe.blocks[block].label}{number}" for number in rows.run]),
-        **readings,
-        **{COVARIATES[field]: values for field, values in rows.covariates.items()},
-        **{names[path]: values for path, values in rows.soil.items()},
-        **sensor_columns,
-        "status": reasons[force.status],
-    }
-
-
-def _add_gear_sensors(
-    recipe: Recipe, case: Case, block: int, rows: SampledRows, truth: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Add the readings of the recipe's gear sensors to `truth`; returns their further columns."""
-    columns: dict[str, np.ndarray] = {}
-    used = len(recipe.case.prior) + len(OPERATING_COLUMNS) + len(recipe.covariates)
-    for table, sensor in recipe.gear_sensors.items():
-        stream = FIRST_STREAM + list(GEAR_SENSORS).index(table)
-        u = run_fractions(recipe, block, rows.run, sensor.run_draws, stream, used)
-        used += sensor.run_draws
-        reading, own = sensor.simulate(case, rows.slip, rows.load, recipe.load.lower, u)
-        truth[sensor.sensor] = reading
-        columns |= own
-    return columns
-
-
-def _schema(recipe: Recipe) -> pa.Schema:
-    probe = simulate_rows(recipe, 0, 0, 1)
-    own = {name: parameter.unit for name, (parameter, _) in recipe.case.parameters().items()}
-    for sensor in recipe.gear_sensors.values():
-        own |= sensor.units
-    units = {name: COLUMNS[name].unit if name in COLUMNS else own[name] for name in probe}
-    fields = [
-        pa.field(
-            name,
-            pa.string() if values.dtype.kind == "U" else pa.float64(),
-            metadata={"unit": units[name]},
+def check_failures(failed: int, total: int) -> None:
+    """Raise `InputError` where more than half of the rows have no equilibrium."""
+    if failed > total / 2:
+        raise InputError(
+            f"{failed} of {total} rows have no equilibrium: lower load_N in [operating], or "
+            "raise kphi, or check [gear]"
         )
-        for name, values in probe.items()
-    ]
-    from soilml import __version__
-
-    versions = {"soilml": __version__, "numpy": np.__version__, "pyarrow": pa.__version__}
-    metadata = {
-        "soilml_recipe": recipe.text,
-        "soilml_recipe_sha256": recipe.sha256,
-        "soilml_seed": str(recipe.seed),
-        "soilml_rows": str(recipe.rows),
-        "soilml_units": json.dumps(units),
-        "soilml_versions": json.dumps(versions),
-    }
-    return pa.schema(fields, metadata=metadata)
 
 
-def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
-    if kind == pa.string():
-        return pa.array(values.tolist(), kind)
-    return pa.array(values, kind, from_pandas=True)
+def check_space(recipe: Recipe, path: str | os.PathLike[str], present: int = 0) -> None:
+    """Raise `InputError` where the disk of `path` is too small for the rows of a recipe.
+
+    Their size is estimated from a few rows. `present` bytes of it are on the disk already.
+    """
+    target = Path(path).absolute()
+    folder = target if target.is_dir() else target.parent
+    if recipe.rows <= PIECE or not folder.is_dir():
+        return
+    schema = data_schema(recipe)
+    sample = io.BytesIO()
+    with pq.ParquetWriter(sample, schema, **WRITER) as writer:
+        batch = simulate_batch(recipe, schema, Piece(0, 0, min(SAMPLE, len(pieces(recipe)[0]))))
+        writer.write_table(pa.Table.from_batches([batch]))
+    needed = sample.tell() / len(batch) * recipe.rows - present
+    free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise InputError(
+            f"{recipe.rows} rows take about {needed / 1e9:.3g} GB; {folder} has {free / 1e9:.3g} GB"
+            " free: ask for fewer rows, or write to another disk"
+        )

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.generate import simulate_pieces
+from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, read_recipe
 from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case

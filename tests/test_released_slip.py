@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.generate import simulate_pieces
+from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, read_recipe
 from soilml import Estimator
 from soilml.onboard.multi_sensor import fuse_estimates

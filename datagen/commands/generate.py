@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option
+from soilml.cli.options import InputFile, add_effects_option, add_workers_option
+from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
-HELP = "simulate measurements from a recipe, as a Parquet file"
+if TYPE_CHECKING:
+    from datagen.generate import Engine
+
+HELP = "simulate measurements from a recipe, as Parquet"
+#: Names of the engines: processes of this machine, or workers of dask.
+ENGINES = ("processes", "dask")
 DESCRIPTION = """\
 Simulate the rover of RECIPE.toml and write what its sensors would measure,
 with the true soil parameters in further columns.
 
   soilml generate recipe.toml data.parquet
   soilml generate wheel data.parquet --rows 20000 --seed 7
+  soilml generate wheel data/ --rows 100000000
+  soilml generate wheel data/ --rows 1000000000 --engine dask \
+      --scheduler tcp://10.0.0.1:8786
 
 `wheel` is a packaged recipe, like wheel_test, wheel_leg and benchmark.
 
@@ -35,7 +46,13 @@ A recipe is a model file (see README) with rows and seed at the top, and
 [soil.prior] gives the ranges of the parameters that vary. [stick_slip] adds
 the vibration of a wheel-leg: ranges of stiffness (N/m) and of drop (fraction
 of the friction angle that sliding soil loses), turning (rad/s), foot_mass
-(kg), ...; or law = "line" alone. The same recipe and seed give the same bytes.
+(kg), ...; or law = "line" alone. The same recipe and seed give the same bytes,
+on any number of processes (--workers) and with either engine.
+
+OUT is a file, or with a slash at its end a folder of files that the workers
+write. The same command completes a folder after an interruption: files that
+are there and right are kept. `soilml train` reads the folder like one file.
+docs/cluster.md describes generation on several machines.
 """
 
 
@@ -47,17 +64,39 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="RECIPE.toml",
         help="recipe file, or the name of a packaged recipe",
     )
-    parser.add_argument("out", metavar="OUT.parquet", help="file to write")
+    parser.add_argument(
+        "out", metavar="OUT.parquet", help="file to write, or with a slash at its end a folder"
+    )
     parser.add_argument("--rows", type=int, help="number of rows (default: that of the recipe)")
     parser.add_argument(
         "--seed", type=int, help="seed of the random numbers (default: that of the recipe)"
+    )
+    add_workers_option(parser)
+    parser.add_argument(
+        "--engine",
+        choices=ENGINES,
+        default=ENGINES[0],
+        help="who simulates: processes of this machine (default), or workers of dask",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="a running dask scheduler (default for --engine dask: one on this machine)",
     )
     add_effects_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return output_files(args.out, ".parquet")
+    """The files that the command writes, where they are not in a folder."""
+    if args.scheduler is not None and args.engine != "dask":
+        raise InputError("--scheduler is for --engine dask: add it, or omit --scheduler")
+    if args.scheduler is not None and args.workers is not None:
+        raise InputError("--workers is for this machine; a scheduler has its own: omit --workers")
+    return [] if _is_folder(args.out) else output_files(args.out, ".parquet")
+
+
+def _is_folder(out: str) -> bool:
+    return out.endswith(("/", os.sep)) or Path(out).is_dir()
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,19 +105,50 @@ def run(args: argparse.Namespace) -> int:
 
     need("datagen.generate", "generate")
     from datagen.generate import generate
+    from datagen.partitions import generate_folder
     from datagen.recipe import read_recipe
     from soilml.cli.option_values import available_effects
     from soilml.cli.progress import progress_bar
     from soilml.identification.discrepancy import ignored_discrepancy
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
-    with progress_bar("simulating", recipe.rows) as progress:
-        result = generate(recipe, args.out, progress)
+    write = generate_folder if _is_folder(args.out) else generate
+    done = 0
+    try:
+        with progress_bar("simulating", recipe.rows) as progress:
+
+            def advance(rows: int) -> None:
+                nonlocal done
+                done = rows
+                progress(rows)
+
+            result = write(recipe, args.out, advance, _engine(args))
+    except (KeyboardInterrupt, SystemExit) as stop:
+        if write is generate_folder and done:
+            stop.said = (  # type: ignore[union-attr]
+                f"interrupted; {done} of {recipe.rows} rows are in {args.out}: the same command "
+                "completes them"
+            )
+        raise
     consequence = (
         "errors of the model are neither in the rows nor in the intervals of files trained on them"
     )
     for line in ignored_discrepancy(recipe.case, "generate", consequence):
         print(line, file=sys.stderr)
     note = f", {result.failed} without equilibrium" if result.failed else ""
-    print(f"{result.rows} rows{note} written to {args.out}", file=sys.stderr)
+    kept = f", {result.kept} of them there before" if result.kept else ""
+    print(f"{result.rows} rows{note} written to {args.out}{kept}", file=sys.stderr)
     return 0
+
+
+def _engine(args: argparse.Namespace) -> Engine:
+    """The engine of the options."""
+    from functools import partial
+
+    from datagen.engines.dask_cluster import dask_map
+    from datagen.engines.processes import process_map
+
+    if args.engine == "dask":
+        return partial(dask_map, workers=args.workers, scheduler=args.scheduler)
+    forks = sys.platform == "linux"  # else processes cannot import the effects of a file
+    return partial(process_map, workers=args.workers if args.effects is None or forks else 1)

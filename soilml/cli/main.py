@@ -142,7 +142,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return fail(str(error), 2)
     except (KeyboardInterrupt, Terminated) as stop:
         code = stop.code if isinstance(stop, Terminated) else 128 + signal.SIGINT
-        return fail("interrupted; no output was written", int(code or 0))
+        said = getattr(stop, "said", "interrupted; no output was written")
+        return fail(said, int(code or 0))
     except BrokenPipeError:
         silence_stdout()
         return 0

@@ -65,3 +65,20 @@ def add_cost_option(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="cost of a kind of run to add, in any unit (default: 1); can be repeated",
     )
+
+
+def add_workers_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--workers`."""
+    parser.add_argument(
+        "--workers",
+        type=positive_number,
+        metavar="N",
+        help="number of processes (default: one for each core)",
+    )
+
+
+def positive_number(text: str) -> int:
+    """A whole number above zero; raises `ArgumentTypeError` for anything else."""
+    if not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
+    return int(text)

@@ -12,19 +12,42 @@ from soilml.errors import MissingLibraryError, TableError
 from soilml.io.table import TEXT, Column
 
 
-def read_parquet(file: Path) -> tuple[dict[str, Any], dict[str, str]]:
+def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     """Arrow columns by name, and the file's metadata; page checksums are verified if present.
 
-    Raises `OSError` where the file is missing, `TableError` where it is damaged or has a column
-    twice.
+    The path is a file, or a folder whose Parquet files are one table, in the order of their names.
+    Raises `OSError` where it is missing, `TableError` where a file is damaged or has a column
+    twice, or where a folder has no file, files of different tables, or fewer rows than it should.
     """
     try:
         import pyarrow as pa
-        import pyarrow.parquet as pq
     except ImportError:
         raise MissingLibraryError(
-            f"{file}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
+            f"{path}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
         ) from None
+    files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
+    if not files:
+        raise TableError(f"{path} is a folder without a Parquet file")
+    tables = [_read_file(file) for file in files]
+    first = _metadata(tables[0])
+    for file, table in zip(files, tables, strict=True):
+        if not table.schema.equals(tables[0].schema) or _metadata(table) != first:
+            raise TableError(f"{file} and {files[0]} are not of one table; read one of them")
+    arrow = pa.concat_tables(tables)
+    rows = first.get("soilml_rows", "")
+    if path.is_dir() and rows.isdecimal() and int(rows) != len(arrow):
+        raise TableError(
+            f"{path} has {len(arrow)} of {rows} rows: `soilml generate` was interrupted; the same "
+            "command completes it"
+        )
+    return dict(zip(arrow.column_names, arrow.columns, strict=True)), first
+
+
+def _read_file(file: Path) -> Any:
+    """The content of one file as an Arrow table."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     with file.open("rb") as opened:
         try:
             arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
@@ -35,11 +58,16 @@ def read_parquet(file: Path) -> tuple[dict[str, Any], dict[str, str]]:
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise TableError(f"{file}: column {twice} occurs twice")
-    metadata = {
+    return arrow
+
+
+def _metadata(table: Any) -> dict[str, str]:
+    """Metadata of a table, without what tells the files of a folder apart."""
+    return {
         key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (arrow.schema.metadata or {}).items()
+        for key, value in (table.schema.metadata or {}).items()
+        if key != b"soilml_part"
     }
-    return dict(zip(names, arrow.columns, strict=True)), metadata
 
 
 def own_columns(metadata: dict[str, str]) -> list[str]:

@@ -54,7 +54,8 @@ def read_table(
     Parameters
     ----------
     path
-        A Parquet file where the name ends in `.parquet`, otherwise a CSV file with a header and
+        A Parquet file where the name ends in `.parquet`, a folder of Parquet files that `soilml
+        generate` wrote, otherwise a CSV file with a header and
         comma as separator. Column names carry their units, such as load_N and torque_Nm.
     need
         Columns that must be present.
@@ -91,7 +92,7 @@ def read_table(
     (2, array([ 3., nan]))
     """
     file = Path(path)
-    read = _read_parquet if file.suffix == ".parquet" else _read_csv
+    read = _read_parquet if file.suffix == ".parquet" or file.is_dir() else _read_csv
     try:
         table = read(file, ignore_extra)
     except FileNotFoundError:

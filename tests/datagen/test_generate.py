@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
-from datagen.generate import block_sizes, generate, simulate_pieces, simulate_rows
+from datagen.generate import generate
+from datagen.pieces import block_sizes, simulate_pieces, simulate_rows
 from datagen.recipe import read_recipe
 from soilml import Model, Operating, Wheel, read_table, soil
 from soilml.errors import InputError

@@ -7,7 +7,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from datagen.draws import sample_rows
-from datagen.generate import generate, simulate_rows
+from datagen.generate import generate
+from datagen.pieces import simulate_rows
 from datagen.recipe import read_recipe
 from datagen.wheel_leg_vibration import normal_stiffness
 from soilml import read_table, soil

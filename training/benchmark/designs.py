@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.generate import block_sizes, simulate_rows
+from datagen.pieces import block_sizes, simulate_rows
 from datagen.recipe import Block, Recipe
 from soilml.config.case import Case
 from soilml.errors import InputError

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from soilml.cli.options import InputFile
+from soilml.cli.options import InputFile, positive_number
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, create_folder, output_files
 from soilml.optional_imports import need
@@ -65,7 +65,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
-        "--sets", type=_sets, metavar="N", help="use only the first N sets of each size"
+        "--sets", type=positive_number, metavar="N", help="use only the first N sets of each size"
     )
     parser.add_argument(
         "--limit",
@@ -80,18 +80,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--analytic-sets",
-        type=_sets,
+        type=positive_number,
         metavar="N",
         default=120,
         help="own data: number of sets of each size for the analytic methods (default: 120)",
     )
-
-
-def _sets(text: str) -> int:
-    """A number of sets; raises `ArgumentTypeError` for anything but a positive integer."""
-    if not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
-    return int(text)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

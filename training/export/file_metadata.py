@@ -64,7 +64,7 @@ def file_metadata(
         "spec": spec.text,
         "recipe": recipe,
         "recipe_sha256": hashlib.sha256(recipe.encode()).hexdigest(),
-        "data_sha256": hashlib.sha256(Path(data_path).read_bytes()).hexdigest(),
+        "data_sha256": _data_digest(Path(data_path)),
         "metrics": json.dumps(
             {
                 name: {
@@ -103,3 +103,13 @@ def _set_metadata(posterior: SetPosteriorGraph | None) -> dict[str, str]:
     if posterior is None:
         return {}
     return {"set": json.dumps(metadata_of(posterior, sets_only=False))}
+
+
+def _data_digest(path: Path) -> str:
+    """SHA-256 of a data file, or of the files of a folder one after the other."""
+    digest = hashlib.sha256()
+    for file in sorted(path.glob("*.parquet")) if path.is_dir() else [path]:
+        with file.open("rb") as opened:
+            while block := opened.read(1 << 20):
+                digest.update(block)
+    return digest.hexdigest()

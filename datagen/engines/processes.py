@@ -1,0 +1,124 @@
+"""The default engine: an ordered pool of processes of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing.connection import wait
+from typing import Any, TypeVar
+
+from datagen.engines.worker_setup import prepare_worker, usable_cores
+from soilml.errors import InputError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+#: Tasks that are submitted ahead of the result that is waited for, for each worker.
+AHEAD = 3
+#: Environment variables that limit threads of linear algebra in processes that are spawned.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@contextmanager
+def process_map(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int | None = None,
+    start_method: str | None = None,
+) -> Iterator[Iterator[Result]]:
+    """Results of a function of each item, in the order of the items, from several processes.
+
+    Leaving the block, also by an exception, ends all workers; if this process is killed they end
+    themselves.
+
+    Parameters
+    ----------
+    function
+        Of the items. Where processes cannot be forked, it must be picklable.
+    items
+        Its arguments, picklable. Results must be, too.
+    workers
+        Number of processes; all usable cores by default. With 1 the function is called here.
+    start_method
+        "fork" or "spawn"; on Linux "fork" by default, which starts in milliseconds.
+
+    Raises
+    ------
+    InputError
+        Where a worker was killed.
+    """
+    count = min(usable_cores() if workers is None else workers, len(items))
+    if count <= 1:
+        prepare_worker()
+        yield map(function, items)
+        return
+    method = start_method or ("fork" if sys.platform == "linux" else "spawn")
+    before = set(multiprocessing.active_children())
+    limited = {name: os.environ.setdefault(name, "1") for name in THREADS if name not in os.environ}
+    pool = ProcessPoolExecutor(
+        count, multiprocessing.get_context(method), initializer=_start, initargs=(function,)
+    )
+    try:
+        rest = iter(items)
+        first = deque(pool.submit(_call, item) for item in islice(rest, AHEAD * count))
+        yield _in_order(pool, first, rest)
+    except BaseException as error:
+        for process in set(multiprocessing.active_children()) - before:
+            process.kill()
+        if isinstance(error, BrokenProcessPool):
+            raise InputError(
+                f"one of {count} worker processes was killed, perhaps for want of memory; try "
+                "fewer with --workers"
+            ) from None
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name in limited:
+            os.environ.pop(name, None)
+
+
+def _in_order(
+    pool: ProcessPoolExecutor, pending: deque[Future[Any]], rest: Iterator[Any]
+) -> Iterator[Any]:
+    """Results in order; a task is submitted for each that is taken, which bounds their memory."""
+    while pending:
+        result = pending.popleft().result()
+        pending.extend(pool.submit(_call, item) for item in islice(rest, 1))
+        yield result
+
+
+#: The function of this worker process.
+_function: Callable[[Any], Any] | None = None
+
+
+def _start(function: Callable[[Any], Any]) -> None:
+    """Prepare a worker: the parent alone answers signals, and the worker ends with it."""
+    global _function
+    _function = function
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    prepare_worker()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _call(item: Any) -> Any:
+    assert _function is not None
+    return _function(item)

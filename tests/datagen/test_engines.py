@@ -1,0 +1,161 @@
+"""Processes: results in order and independent of their number, nothing left behind."""
+
+import functools
+import hashlib
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import RECIPE
+from scipy.stats import qmc
+
+from datagen.draws import _skip
+from datagen.engines.processes import process_map
+from datagen.generate import generate
+from datagen.pieces import pieces
+from datagen.recipe import read_recipe
+from soilml.errors import InputError
+
+
+def slow_first(number):
+    """The earliest items take longest, so that results arrive out of order."""
+    time.sleep(0.02 * (number < 3))
+    return number, os.getpid()
+
+
+def fail_at_five(number):
+    if number == 5:
+        raise InputError("five is too many")
+    return number
+
+
+def die_at_five(number):
+    if number == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_results_come_in_order_from_several_processes(method):
+    with process_map(slow_first, range(20), 2, start_method=method) as results:
+        numbers, processes = zip(*results, strict=True)
+    assert numbers == tuple(range(20))
+    assert len(set(processes)) == 2 and os.getpid() not in processes
+    assert not multiprocessing.active_children()
+
+
+def test_one_worker_is_this_process():
+    with process_map(slow_first, range(3), 1) as results:
+        assert {process for _, process in results} == {os.getpid()}
+
+
+def test_an_error_in_a_worker_is_that_of_the_function():
+    with (
+        pytest.raises(InputError, match="five is too many"),
+        process_map(fail_at_five, range(9), 2) as results,
+    ):
+        list(results)
+    assert not multiprocessing.active_children()
+
+
+def test_a_worker_that_is_killed_is_named():
+    with (
+        pytest.raises(InputError, match="one of 2 worker processes was killed"),
+        process_map(die_at_five, range(9), 2) as results,
+    ):
+        list(results)
+
+
+def test_workers_end_where_the_results_are_not_wanted_any_more():
+    with pytest.raises(KeyboardInterrupt), process_map(slow_first, range(99), 2) as results:
+        next(results)
+        assert multiprocessing.active_children()
+        raise KeyboardInterrupt
+    assert not multiprocessing.active_children()
+
+
+def is_alive(process):
+    """Whether a process that is not our child runs."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_workers_end_when_the_process_is_killed():
+    code = (
+        "import os, time\n"
+        "from datagen.engines.processes import process_map\n"
+        "def f(i):\n    time.sleep(0.2 * (i > 1)); return os.getpid()\n"
+        "with process_map(f, range(1000), 2) as found:\n"
+        "    print(next(found), next(found), flush=True); list(found)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    workers = process.stdout.readline().split()
+    assert workers and all(is_alive(worker) for worker in workers)
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 20
+    while any(is_alive(worker) for worker in workers):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 7, 1000, 65_537])
+def test_skipping_points_is_fast_forward(count):
+    fast, plain = (qmc.Sobol(5, scramble=True, rng=np.random.default_rng((3, 1))) for _ in "ab")
+    _skip(fast, count)
+    if count:
+        plain.fast_forward(count)
+    assert fast.num_generated == plain.num_generated == count
+    assert (fast.random(64) == plain.random(64)).all()
+
+
+def test_a_file_has_the_same_bytes_whatever_the_number_of_processes(tmp_path, monkeypatch):
+    monkeypatch.setattr("datagen.generate.pieces", functools.partial(pieces, size=256))
+    blocks = "[[runs]]\nrows = 1\nshare = 0.5\n[[runs]]\nrows = 8\nshare = 0.5\n"
+    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=2000, seed=1) + blocks)
+    recipe = read_recipe(tmp_path / "recipe.toml")
+    found = set()
+    for workers, method in ((1, None), (2, "fork"), (3, "fork"), (2, "spawn")):
+        done = []
+        engine = functools.partial(process_map, workers=workers, start_method=method)
+        generate(recipe, tmp_path / "d.parquet", done.append, engine)
+        assert done == sorted(done) and done[-1] == 2000 and len(done) == 8
+        found.add(hashlib.sha256((tmp_path / "d.parquet").read_bytes()).hexdigest())
+    assert len(found) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("out", ["data.parquet", "data/"])
+def test_interruption_ends_all_processes_with_one_line(tmp_path, out):
+    first = "[[runs]]\nrows = 1\nshare = 0.002\n[[runs]]\nrows = 2\nshare = 0.998\n"
+    (tmp_path / "recipe.toml").write_text(RECIPE.format(rows=4_000_000, seed=1) + first)
+    command = [sys.executable, "-m", "soilml", "generate", "recipe.toml", out, "--workers", "2"]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    patterns = ("data/part-000000.parquet", ".data.parquet.*.part")
+    deadline = time.monotonic() + 120
+    while not any(f.stat().st_size > 9999 for name in patterns for f in tmp_path.glob(name)):
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.2)
+    os.killpg(process.pid, signal.SIGINT)  # as from a terminal, which sends it to all
+    said = process.communicate()[1]
+    assert process.returncode == 130 and len(said.splitlines()) == 1, said
+    with pytest.raises(ProcessLookupError):
+        os.killpg(process.pid, 0)  # no process of the session is left
+    if out == "data/":
+        assert "the same command completes them" in said
+        assert not list(tmp_path.glob("data/.*.part"))
+    else:
+        assert "no output was written" in said
+        assert [file.name for file in tmp_path.iterdir()] == ["recipe.toml"]
