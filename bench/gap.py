@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -25,6 +23,7 @@ from gap_case import judged
 from gap_records import Judged, from_json
 
 from datagen.blind_sets.factorial_plan import Plan, benchmark_plans, plan_matrix
+from datagen.engines.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
@@ -62,7 +61,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--every", type=int, default=1, metavar="K", help="take each K-th plan")
     parser.add_argument("--tier", help="only sets of this tier")
     parser.add_argument("--design", help="only sets of this design")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="analyses at a time")
+    parser.add_argument("--jobs", type=int, help="analyses at a time (default: cores)")
     parser.add_argument("--keep", metavar="FILE.json", help="write the record of every set")
     parser.add_argument("--table", metavar="FILE.json", help="print the pages of kept records")
     parser.add_argument("--write", action="store_true", help="write BENCHMARKS.md and its picture")
@@ -78,12 +77,15 @@ def _plans(args: argparse.Namespace) -> list[Plan]:
     ]
 
 
-def _judge(plans: list[Plan], processes: int, keep: str | None) -> list[Judged]:
+def _judge(plans: list[Plan], processes: int | None, keep: str | None) -> list[Judged]:
     """The records of all plans, in their order."""
     jobs = list(enumerate(plans))
     sets: list[Judged] = []
-    with ProcessPoolExecutor(processes) as pool, progress_bar("analysing", len(jobs)) as done:
-        for record in pool.map(judged, jobs):
+    with (
+        process_map(judged, jobs, processes) as records,
+        progress_bar("analysing", len(jobs)) as done,
+    ):
+        for record in records:
             sets.append(record)
             done(len(sets))
             if keep and (len(sets) % KEEP_EVERY == 0 or len(sets) == len(jobs)):

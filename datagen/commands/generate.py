@@ -146,9 +146,10 @@ def _engine(args: argparse.Namespace) -> Engine:
     from functools import partial
 
     from datagen.engines.dask_cluster import dask_map
-    from datagen.engines.processes import process_map
+    from datagen.engines.processes import FORKS, process_map
 
     if args.engine == "dask":
         return partial(dask_map, workers=args.workers, scheduler=args.scheduler)
-    forks = sys.platform == "linux"  # else processes cannot import the effects of a file
-    return partial(process_map, workers=args.workers if args.effects is None or forks else 1)
+    if args.effects is not None and not FORKS:  # processes cannot import the effects of a file
+        return partial(process_map, workers=1)
+    return partial(process_map, workers=args.workers)

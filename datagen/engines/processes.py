@@ -16,12 +16,16 @@ from itertools import islice
 from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
-from datagen.engines.worker_setup import prepare_worker, usable_cores
+from threadpoolctl import threadpool_limits
+
+from datagen.engines.worker_setup import keep_freed_memory, prepare_worker, usable_cores
 from soilml.errors import InputError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+#: Whether workers have all that this process has; otherwise functions must be picklable.
+FORKS = sys.platform == "linux"
 #: Tasks that are submitted ahead of the result that is waited for, for each worker.
 AHEAD = 3
 #: Environment variables that limit threads of linear algebra in processes that are spawned.
@@ -47,7 +51,8 @@ def process_map(
     items
         Its arguments, picklable. Results must be, too.
     workers
-        Number of processes; all usable cores by default. With 1 the function is called here.
+        Number of processes; one for each usable core by default. With 1 the function is called
+        here.
     start_method
         "fork" or "spawn"; on Linux "fork" by default, which starts in milliseconds.
 
@@ -58,10 +63,11 @@ def process_map(
     """
     count = min(usable_cores() if workers is None else workers, len(items))
     if count <= 1:
-        prepare_worker()
-        yield map(function, items)
+        keep_freed_memory()
+        with threadpool_limits(1):
+            yield map(function, items)
         return
-    method = start_method or ("fork" if sys.platform == "linux" else "spawn")
+    method = start_method or ("fork" if FORKS else "spawn")
     before = set(multiprocessing.active_children())
     limited = {name: os.environ.setdefault(name, "1") for name in THREADS if name not in os.environ}
     pool = ProcessPoolExecutor(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 
 from threadpoolctl import threadpool_limits
@@ -15,21 +17,45 @@ _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 KEPT = 64 << 20
 
 
+#: Most workers that this process starts at a time; None is one for each core.
+_most: ContextVar[int | None] = ContextVar("most workers", default=None)
+
+
 def usable_cores() -> int:
-    """Cores that this process may use."""
+    """Workers that this process may start: its cores, or as many as `limited_workers` allows."""
+    if (most := _most.get()) is not None:
+        return most
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
+@contextmanager
+def limited_workers(most: int | None) -> Iterator[None]:
+    """Inside, engines start at most so many workers; None is one for each core."""
+    token = _most.set(most)
+    try:
+        yield
+    finally:
+        _most.reset(token)
+
+
 @cache
 def prepare_worker() -> None:
-    """One thread of linear algebra in this process, and freed memory kept for the next piece.
-
-    The GNU C library returns freed memory to the system, and clears it when it is asked for again:
-    that takes longer than the arithmetic on arrays of a piece. Nothing is done elsewhere.
-    """
+    """One thread in this process, and freed memory kept for the next task."""
+    _most.set(1)  # a task starts no workers of its own
     threadpool_limits(1)
+    keep_freed_memory()
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let the GNU C library keep freed memory of the size of a piece's arrays.
+
+    It would return it to the system, and have it cleared when it asks for it again: that takes
+    longer than the arithmetic, and more so under dask, whose workers trim memory on purpose.
+    Nothing is done elsewhere.
+    """
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):
             library = ctypes.CDLL(None)

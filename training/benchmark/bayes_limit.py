@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.engines.processes import process_map
 from datagen.recipe import Recipe
 from soilml.config.case import Case
 from soilml.identification.data.observations import read_observations
@@ -37,7 +36,6 @@ from training.benchmark.designs import (
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
-PROCESSES = 2
 TORQUE = "torque_Nm"
 #: Effects that no method of the benchmark models, the designs that are simulated with them, and
 #: the number of sets of each.
@@ -157,9 +155,9 @@ def unmodelled_sets(
 def compute_posteriors(
     sets: Sequence[BenchmarkSet], progress: Progress
 ) -> Iterator[PosteriorSummary]:
-    """The exact posterior of each set, in order, computed by two processes."""
-    with ProcessPoolExecutor(min(PROCESSES, os.cpu_count() or 1)) as pool:
-        for done, summary in enumerate(pool.map(_posterior_of, sets, chunksize=4), 1):
+    """The exact posterior of each set, in order, computed on all cores."""
+    with process_map(_posterior_of, sets) as found:
+        for done, summary in enumerate(found, 1):
             progress("the Bayes limit", done, len(sets))
             yield summary
 

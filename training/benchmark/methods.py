@@ -11,6 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.engines.processes import FORKS, process_map
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
@@ -121,17 +122,18 @@ class Method:
         q: int,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> MethodEstimates:
-        """Estimates of q parameters for every set, one call each as on board."""
+        """Estimates of q parameters for every set, one call each as on board.
+
+        Analytic methods, which are slow, run on all cores.
+        """
         failure = gaussian_estimate(np.full(q, np.nan), np.full((q, q), np.nan))
-        estimates = []
-        started = time.perf_counter()
-        for done, rows in enumerate(sets):
-            progress(done, len(sets))
-            try:
-                estimates.append(self.estimate(rows))
-            except FitError:
-                estimates.append(failure)
-        seconds = (time.perf_counter() - started) / max(len(sets), 1)
+        estimates, seconds = [], 0.0
+        workers = None if self.kind is MethodKind.ANALYTIC and FORKS else 1
+        with process_map(self._timed_estimate, sets, workers) as results:
+            for done, (estimate, duration) in enumerate(results):
+                progress(done, len(sets))
+                estimates.append(failure if estimate is None else estimate)
+                seconds += duration / len(sets)
         progress(len(sets), len(sets))
         return MethodEstimates(
             np.stack([e.mean for e in estimates]),
@@ -141,6 +143,15 @@ class Method:
             np.asarray([e.flagged for e in estimates]),
             seconds,
         )
+
+    def _timed_estimate(self, rows: Table) -> tuple[MethodEstimate | None, float]:
+        """The estimate of one set, None where there is none, and the wall time."""
+        started = time.perf_counter()
+        try:
+            estimate = self.estimate(rows)
+        except FitError:
+            estimate = None
+        return estimate, time.perf_counter() - started
 
 
 def interval_coverage(truth: Floats, ends: Floats) -> Floats:

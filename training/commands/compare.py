@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from soilml.cli.options import InputFile, positive_number
+from soilml.cli.options import InputFile, add_workers_option, positive_number
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, create_folder, output_files
 from soilml.optional_imports import need
@@ -45,7 +45,7 @@ time per estimate.
    gives the analytic methods their wheel, soil, priors and noise, which must
    equal those of the test data. Writes compare.md, compare.csv, compare.png.
 
-3. To recompute the Bayes limit of the benchmark (minutes, two processes)
+3. To recompute the Bayes limit of the benchmark (minutes, on all cores)
 
      soilml compare --limit limit.parquet
 """
@@ -85,6 +85,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=120,
         help="own data: number of sets of each size for the analytic methods (default: 120)",
     )
+    add_workers_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -104,9 +105,12 @@ def _has_test_data(args: argparse.Namespace) -> bool:
 def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
     need("training.benchmark.suite", "compare")
-    if args.limit is not None:
-        return _compute_limit(args)
-    return _compare_on_test_data(args) if _has_test_data(args) else _run_benchmark(args)
+    from datagen.engines.worker_setup import limited_workers
+
+    with limited_workers(args.workers):
+        if args.limit is not None:
+            return _compute_limit(args)
+        return _compare_on_test_data(args) if _has_test_data(args) else _run_benchmark(args)
 
 
 def _run_benchmark(args: argparse.Namespace) -> int:

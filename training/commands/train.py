@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import InputFile
+from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.optional_imports import need
@@ -57,9 +57,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         type=InputFile,
         metavar="DATA.parquet",
         nargs="?",
-        help="data written by soilml generate",
+        help="data written by soilml generate: a file, or a folder of files",
     )
     parser.add_argument("out", metavar="OUT.onnx", help="model file to write")
+    add_workers_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -70,15 +71,17 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
+    from datagen.engines.worker_setup import limited_workers
     from training.spec import is_any_wheel_spec
 
-    if is_any_wheel_spec(args.spec):
-        return _any_wheel(args)
-    if args.data is None:
-        raise InputError(
-            f"DATA.parquet is missing; {args.spec} is trained on data of soilml generate"
-        )
-    return _from_data(args)
+    with limited_workers(args.workers):
+        if is_any_wheel_spec(args.spec):
+            return _any_wheel(args)
+        if args.data is None:
+            raise InputError(
+                f"DATA.parquet is missing; {args.spec} is trained on data of soilml generate"
+            )
+        return _from_data(args)
 
 
 def _any_wheel(args: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from datagen.engines.processes import process_map
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, gemm, tanh
@@ -172,22 +174,37 @@ def _fit_polynomials(
     Coefficients (feasible, terms, channels), mean squared residuals (feasible, channels), and which
     designs (n,) are feasible: those with an equilibrium at all points.
     """
-    pseudo_inverse = np.linalg.pinv(basis)
-    coefficients, squared_error, feasible = [], [], []
-    for first in range(0, len(designs), SIMULATED_AT_A_TIME):
-        progress("simulating", first, len(designs))
-        y = respond(designs[first : first + SIMULATED_AT_A_TIME], x[None])
-        finite = np.isfinite(y).all(axis=(1, 2))
-        a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
-        coefficients.append(a)
-        squared_error.append(np.mean((basis @ a - y[finite]) ** 2, axis=1))
-        feasible.append(finite)
+    fit = partial(_fit_some, respond, x, basis, np.asarray(np.linalg.pinv(basis)))
+    parts = [
+        designs[first : first + SIMULATED_AT_A_TIME]
+        for first in range(0, len(designs), SIMULATED_AT_A_TIME)
+    ]
+    found = []
+    with process_map(fit, parts) as results:
+        for done, result in enumerate(results):
+            progress("simulating", done * SIMULATED_AT_A_TIME, len(designs))
+            found.append(result)
     progress("simulating", len(designs), len(designs))
+    coefficients, squared_error, feasible = zip(*found, strict=True)
     return (
         np.concatenate(coefficients),
         np.concatenate(squared_error),
         np.concatenate(feasible),
     )
+
+
+def _fit_some(
+    respond: Callable[[Floats, Floats], Floats],
+    x: Floats,
+    basis: Floats,
+    pseudo_inverse: Floats,
+    designs: Floats,
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """The result of `_fit_polynomials` for some of the designs, in one worker."""
+    y = respond(designs, x[None])
+    finite = np.asarray(np.isfinite(y).all(axis=(1, 2)))
+    a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
+    return a, np.mean((basis @ a - y[finite]) ** 2, axis=1), finite
 
 
 def _points(family: WheelFamily, count: int, seed: int) -> Floats:

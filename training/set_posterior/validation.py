@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from datagen.engines.processes import process_map
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
     ERROR_COLUMNS,
@@ -25,6 +27,7 @@ from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.sampler.posterior_summary import prior_summary
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 Progress = Callable[[str, int, int], None]
 
 #: Rows of the sets, and the number of sets of each size for calibration and for validation.
@@ -71,18 +74,30 @@ def calibrate_misfit_limits(
 ) -> SetPosteriorGraph:
     """The set posterior with misfit limits that refuse at most one consistent set in a hundred."""
     no_limits = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    session = posterior_session(SetPosteriorGraph(family, response, no_limits))
-    readings, misfit = [], []
-    for i, rows in enumerate(SET_SIZES):
-        progress("measuring misfit", i, len(SET_SIZES))
-        sets = family.sets(LIMIT_SETS, rows, LIMIT_SEED)
-        for k in range(len(sets.truth)):
-            outputs = graph_outputs(session, response, sets, k)
-            readings.append(outputs["counted_out"][0])
-            misfit.append(outputs["set_misfit"][0])
-    progress("measuring misfit", len(SET_SIZES), len(SET_SIZES))
-    limits = misfit_limits(np.asarray(readings), np.asarray(misfit))
-    return SetPosteriorGraph(family, response, limits)
+    task = partial(_misfits, SetPosteriorGraph(family, response, no_limits))
+    found = _by_size(task, "measuring misfit", progress)
+    readings, misfit = (np.concatenate(part) for part in zip(*found.values(), strict=True))
+    return SetPosteriorGraph(family, response, misfit_limits(readings, misfit))
+
+
+def _misfits(posterior: SetPosteriorGraph, rows: int) -> tuple[Floats, Floats]:
+    """Number of readings (sets,) and misfit (sets,) of simulated sets of one size."""
+    session = posterior_session(posterior)
+    sets = posterior.family.sets(LIMIT_SETS, rows, LIMIT_SEED)
+    found = [graph_outputs(session, posterior.response, sets, k) for k in range(len(sets.truth))]
+    readings, misfit = ([one[key][0] for one in found] for key in ("counted_out", "set_misfit"))
+    return np.asarray(readings), np.asarray(misfit)
+
+
+def _by_size(task: Callable[[int], T], text: str, progress: Progress) -> dict[int, T]:
+    """Results of a task for each size of sets, on all cores; the longest are begun first."""
+    found = {}
+    with process_map(task, SET_SIZES[::-1]) as results:
+        for done, (rows, result) in enumerate(zip(SET_SIZES[::-1], results, strict=True)):
+            progress(text, done, len(SET_SIZES))
+            found[rows] = result
+    progress(text, len(SET_SIZES), len(SET_SIZES))
+    return {rows: found[rows] for rows in SET_SIZES}
 
 
 def misfit_limits(readings: Floats, misfit: Floats) -> MisfitLimits:
@@ -107,30 +122,29 @@ def misfit_limits(readings: Floats, misfit: Floats) -> MisfitLimits:
 
 def validate_posterior(posterior: SetPosteriorGraph, progress: Progress) -> dict[int, SetFigures]:
     """Accuracy on independent sets, by rows of a set; refused sets count with the prior."""
-    session, figures = posterior_session(posterior), {}
-    for i, rows in enumerate(SET_SIZES):
-        progress("measuring errors", i, len(SET_SIZES))
-        sets = posterior.family.sets(FIGURE_SETS, rows, FIGURE_SEED)
-        outputs = [
-            graph_outputs(session, posterior.response, sets, k) for k in range(len(sets.truth))
-        ]
-        mean, low, high, cov = (
-            np.stack([a[f"set_{key}"] for a in outputs]).astype(np.float64)
-            for key in ("mean", "low", "high", "covariance")
-        )
-        error = sets.truth - mean
-        precision = np.linalg.pinv(cov, hermitian=True)
-        mahalanobis = np.einsum("ni,nij,nj->n", error, precision, error)  # squared
-        prior_std = _prior_std(posterior.family, sets)
-        figures[rows] = SetFigures(
-            sets=len(error),
-            relative=np.sqrt(np.mean((error / prior_std) ** 2, axis=0)),
-            cover90=np.mean((sets.truth >= low) & (sets.truth <= high), axis=0),
-            joint90=float(np.mean(mahalanobis <= chi2.ppf(0.9, error.shape[1]))),
-            refused=1.0 - float(np.mean([a["set_in_range"][0] for a in outputs])),
-        )
-    progress("measuring errors", len(SET_SIZES), len(SET_SIZES))
-    return figures
+    return _by_size(partial(_figures, posterior), "measuring errors", progress)
+
+
+def _figures(posterior: SetPosteriorGraph, rows: int) -> SetFigures:
+    """Accuracy on simulated sets of one size."""
+    session = posterior_session(posterior)
+    sets = posterior.family.sets(FIGURE_SETS, rows, FIGURE_SEED)
+    outputs = [graph_outputs(session, posterior.response, sets, k) for k in range(len(sets.truth))]
+    mean, low, high, cov = (
+        np.stack([a[f"set_{key}"] for a in outputs]).astype(np.float64)
+        for key in ("mean", "low", "high", "covariance")
+    )
+    error = sets.truth - mean
+    precision = np.linalg.pinv(cov, hermitian=True)
+    mahalanobis = np.einsum("ni,nij,nj->n", error, precision, error)  # squared
+    prior_std = _prior_std(posterior.family, sets)
+    return SetFigures(
+        sets=len(error),
+        relative=np.sqrt(np.mean((error / prior_std) ** 2, axis=0)),
+        cover90=np.mean((sets.truth >= low) & (sets.truth <= high), axis=0),
+        joint90=float(np.mean(mahalanobis <= chi2.ppf(0.9, error.shape[1]))),
+        refused=1.0 - float(np.mean([a["set_in_range"][0] for a in outputs])),
+    )
 
 
 def _prior_std(family: WheelFamily, sets: SimulatedSets) -> Floats:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.engines.processes import process_map
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
 from training.benchmark.bayes_limit_file import BayesLimit
 from training.benchmark.sets.posterior_comparison import GaussianEstimates, PosteriorComparison
-from training.benchmark.sets.reference_sets import PROCESSES, ReferenceSet
+from training.benchmark.sets.reference_sets import ReferenceSet
 from training.benchmark.sets.set_unknowns import RankedPosterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
 
@@ -33,15 +33,14 @@ def compare_with_exact(
     limit: BayesLimit,
     progress: Progress = lambda text, done, total: None,
 ) -> list[PosteriorComparison]:
-    """Compare a model file with exact posteriors, by design, in two processes.
+    """Compare a model file with exact posteriors, by design, on all cores.
 
     `limit` has the exact posteriors of `references` in the same order.
     """
     groups = [list(group) for _, group in groupby(references, key=lambda r: r.design)]
     comparisons: list[PosteriorComparison] = []
     start = 0
-    with ProcessPoolExecutor(min(PROCESSES, os.cpu_count() or 1)) as pool:
-        outcomes = pool.map(partial(_run_file, str(path)), groups)
+    with process_map(partial(_run_file, str(path)), groups) as outcomes:
         for done, (group, (estimates, posteriors)) in enumerate(
             zip(groups, outcomes, strict=True), 1
         ):

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
+from datagen.engines.processes import process_map
 from datagen.recipe import read_recipe
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
@@ -33,7 +32,6 @@ SEED = 4711
 CANDIDATES = 3
 #: Labels of the two families; they are part of the stored design keys.
 ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
-PROCESSES = 2
 
 
 @dataclass(frozen=True)
@@ -101,9 +99,9 @@ def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
 def compute_reference_posteriors(
     references: Sequence[ReferenceSet], progress: Progress
 ) -> Iterator[RankedPosterior]:
-    """The exact posterior of each set, in order, computed by two processes."""
-    with ProcessPoolExecutor(min(PROCESSES, os.cpu_count() or 1)) as pool:
-        for done, summary in enumerate(pool.map(_exact, references, chunksize=4), 1):
+    """The exact posterior of each set, in order, computed on all cores."""
+    with process_map(_exact, references) as found:
+        for done, summary in enumerate(found, 1):
             progress("exact posteriors", done, len(references))
             yield summary
 
