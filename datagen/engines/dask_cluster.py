@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -28,7 +28,7 @@ Result = TypeVar("Result")
 #: Seconds to wait for the scheduler, and for a worker to appear again when none is left.
 PATIENCE, WORKERLESS = 10, 60
 #: Tasks that are submitted ahead of the result that is waited for, for each worker.
-AHEAD = 3
+AHEAD = 6
 #: Libraries whose versions must be those of this process, because they may change digits.
 SAME_VERSIONS = ("numpy", "scipy", "pyarrow")
 
@@ -70,13 +70,14 @@ def dask_map(
         or a worker has other versions of the libraries.
     """
     try:
-        import dask
         from distributed import Client, LocalCluster
     except ImportError:
         raise MissingLibraryError(
             "--engine dask needs dask, which is not installed: pip install 'soilml[cluster]'"
         ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # errors are told in one line
+    for name in list(logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":  # errors are told in one line
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     count = usable_cores() if workers is None else workers
     with ExitStack() as stack:
         if scheduler is not None:
@@ -91,14 +92,7 @@ def dask_map(
                 silence_logs=logging.CRITICAL,
             )
             address = stack.enter_context(cluster)
-        dask.config.set({"distributed.comm.timeouts.connect": PATIENCE})
-        try:
-            client = Client(address, timeout=PATIENCE, set_as_default=False)
-        except OSError:
-            raise InputError(
-                f"--scheduler {scheduler}: what answers is no dask scheduler"
-            ) from None
-        stack.enter_context(client)
+        client = stack.enter_context(Client(address, timeout=PATIENCE, set_as_default=False))
         yield _in_order(client, function, items)
 
 
@@ -149,15 +143,16 @@ def _result(client: Any, future: Any) -> Any:
             what = (
                 f"a worker lacks the package {error.name}: install soilml[ground] there"
                 if isinstance(error, ModuleNotFoundError)
-                else "the connection to the scheduler was lost"
+                else "the connection to the scheduler was lost: start it and its workers again"
             )
-            raise InputError(f"{what}; then repeat the command") from None
+            raise InputError(f"{what}, then repeat the command") from None
 
 
 def _workers(client: Any) -> int:
     return len(client.scheduler_info(n_workers=-1)["workers"])
 
 
+@cache
 def own_versions() -> dict[str, str]:
     """Versions of the libraries of this process that may change digits."""
     from soilml import __version__
@@ -216,11 +211,13 @@ def run_task(content: _Content, item: Any, needed: dict[str, str]) -> Any:
 
 
 def _check_address(scheduler: str) -> None:
-    """Raise `InputError` where nothing answers at an address; the client itself waits for long."""
+    """Raise `InputError` where no scheduler answers at an address; the client waits for long."""
     host, _, port = scheduler.rpartition("://")[2].rpartition(":")
     try:
-        with socket.create_connection((host.strip("[]"), int(port)), PATIENCE):
-            return
+        with socket.create_connection((host.strip("[]"), int(port)), PATIENCE) as connection:
+            if scheduler.startswith("tls") or connection.recv(1):  # a scheduler speaks first
+                return
+            why = "what answers is something else"
     except (OSError, ValueError, OverflowError) as error:
         why = getattr(error, "strerror", None) or str(error)
     raise InputError(

@@ -119,6 +119,17 @@ def test_a_scheduler_that_is_not_there_is_named():
             pass
 
 
+def test_what_answers_may_be_something_else(monkeypatch):
+    monkeypatch.setattr(dask_cluster, "PATIENCE", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        with (
+            pytest.raises(InputError, match="no dask scheduler answers there"),
+            dask_map(abs, range(3), scheduler=address),
+        ):
+            pass
+
+
 def test_a_scheduler_without_workers_is_not_waited_for_in_vain(monkeypatch):
     monkeypatch.setattr(dask_cluster, "WORKERLESS", 0.5)
     with (

@@ -1,0 +1,87 @@
+"""Training and comparison on several processes: the numbers are those of one."""
+
+import numpy as np
+import pytest
+
+from datagen.engines.processes import FORKS, process_map
+from datagen.engines.worker_setup import limited_workers, usable_cores
+from datagen.recipe import read_recipe
+from soilml.quantities import SHEAR
+from training.benchmark.bayes_limit import benchmark_sets
+from training.benchmark.methods import analytic_method
+from training.set_posterior import response_surface, validation
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.monomials import monomial_terms, monomials
+
+pytestmark = pytest.mark.skipif(not FORKS, reason="changes constants in this process")
+
+
+def of_both(function):
+    """A result with one worker and with three."""
+    found = []
+    for workers in (1, 3):
+        with limited_workers(workers):
+            found.append(function())
+    return found
+
+
+def cores_there(_):
+    return usable_cores()
+
+
+def test_a_limit_holds_inside_its_block_and_tasks_start_no_workers():
+    with limited_workers(3):
+        assert usable_cores() == 3
+        with process_map(cores_there, range(4)) as found:
+            assert list(found) == [1] * 4
+    with limited_workers(1), process_map(cores_there, range(4)) as found:
+        assert list(found) == [1] * 4
+    assert usable_cores() >= 1
+
+
+def test_polynomials_of_designs_are_the_same(monkeypatch):
+    monkeypatch.setattr(response_surface, "SIMULATED_AT_A_TIME", 8)
+    family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
+    terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
+    x = response_surface._points(family, 2 * len(terms), 1)
+    designs, seen = family.designs(40, 1), []
+
+    def fit():
+        progress = lambda text, done, total: seen.append((done, total))  # noqa: E731
+        return response_surface._fit_polynomials(family, designs, x, monomials(x, terms), progress)
+
+    one, three = of_both(fit)
+    for a, b in zip(one, three, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert len(one[2]) == 40 and one[2].any()
+    assert seen[0] == (0, 40) and seen[-1] == (40, 40) and len(seen) == 12
+
+
+@pytest.mark.slow
+def test_limits_and_figures_of_a_set_posterior_are_the_same(wheel_posterior, monkeypatch):
+    monkeypatch.setattr(validation, "LIMIT_SETS", 40)
+    monkeypatch.setattr(validation, "FIGURE_SETS", 10)
+    monkeypatch.setattr(validation, "LEAST_NEIGHBOURS", 30)
+    monkeypatch.setattr(validation, "SET_SIZES", (1, 4, 16))
+    family, response = wheel_posterior.family, wheel_posterior.response
+    limits = of_both(
+        lambda: validation.calibrate_misfit_limits(family, response, lambda *_: None).limits
+    )
+    np.testing.assert_array_equal(limits[0].readings, limits[1].readings)
+    np.testing.assert_array_equal(limits[0].misfit, limits[1].misfit)
+    figures = of_both(lambda: validation.validate_posterior(wheel_posterior, lambda *_: None))
+    assert list(figures[0]) == list(figures[1]) == [1, 4, 16]
+    for one, three in zip(figures[0].values(), figures[1].values(), strict=True):
+        assert one.sets == three.sets == 10
+        np.testing.assert_array_equal(one.relative, three.relative)
+        np.testing.assert_array_equal(one.cover90, three.cover90)
+
+
+def test_analytic_estimates_are_the_same_and_failures_too():
+    recipe = read_recipe("benchmark")
+    tables = [one.table for one in benchmark_sets(recipe, SHEAR, 2)][:10]
+    method = analytic_method(recipe.case, "nonlinear", SHEAR)
+    one, three = of_both(lambda: method.estimate_sets(tables, len(SHEAR)))
+    np.testing.assert_array_equal(one.mean, three.mean)
+    np.testing.assert_array_equal(one.covariance, three.covariance)
+    assert one.seconds > 0.0 and three.seconds > 0.0
