@@ -22,11 +22,11 @@ from soilml.identification.predictions import (
 )
 from soilml.numerics.noise_and_process import Whitener
 from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.numerics.sobol_points import sobol_points
 
 Floats = NDArray[np.float64]
 
-#: Sobol points of the prior that are evaluated, and how many of the best are descended from.
-SOBOL_POINTS = 64
+#: How many of the best of the Sobol points of the prior are descended from.
 STARTS = 4
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
@@ -118,14 +118,9 @@ class LeastSquaresProblem:
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:
     """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
     free = problem.free
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    sobol = qmc.Sobol(len(free), scramble=True, rng=7).random(SOBOL_POINTS)
-    starts = np.vstack([nominal, sobol])
+    starts = np.vstack([nominal, sobol_points(len(free))])
     prediction = problem.predict(starts)
     if np.isnan(prediction).any(axis=1).all():
         raise FitError(
@@ -148,7 +143,10 @@ def descend(problem: LeastSquaresProblem, start: Floats, *, with_prior: bool = F
     With `with_prior`, uniform priors are included too, as Gaussian ones of the same variance about
     their middle.
     """
-    from scipy.optimize import least_squares
+    try:
+        from scipy.optimize import least_squares
+    except ImportError:
+        raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
 
     latest: dict[bytes, tuple[Floats, Floats]] = {}  # scipy asks for residual and Jacobian apart
 
