@@ -113,21 +113,14 @@ def run(args: argparse.Namespace) -> int:
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
     write = generate_folder if _is_folder(args.out) else generate
-    done = 0
     try:
         with progress_bar("simulating", recipe.rows) as progress:
-
-            def advance(rows: int) -> None:
-                nonlocal done
-                done = rows
-                progress(rows)
-
-            result = write(recipe, args.out, advance, _engine(args))
+            result = write(recipe, args.out, progress, _engine(args))
     except (KeyboardInterrupt, SystemExit) as stop:
-        if write is generate_folder and done:
+        if write is generate_folder and (files := len(list(Path(args.out).glob("part-*.parquet")))):
             stop.said = (  # type: ignore[union-attr]
-                f"interrupted; {done} of {recipe.rows} rows are in {args.out}: the same command "
-                "completes them"
+                f"interrupted; {files} complete files are in {args.out}: the same command adds the "
+                "others"
             )
         raise
     consequence = (
