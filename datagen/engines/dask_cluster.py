@@ -171,10 +171,13 @@ class _Content:
     def of(cls, function: Callable[[Any], Any]) -> _Content:
         import cloudpickle
 
-        modules = [m for name, m in list(sys.modules.items()) if name.startswith(OWN_EFFECTS)]
-        files = [Path(str(module.__file__)) for module in modules]
-        texts = tuple((file.name, file.read_text(encoding="utf-8")) for file in files)
-        return cls(cloudpickle.dumps(function), texts)
+        content = cloudpickle.dumps(function)
+        files = [
+            Path(str(module.__file__))
+            for name, module in list(sys.modules.items())
+            if name.startswith(OWN_EFFECTS) and name.encode() in content
+        ]
+        return cls(content, tuple((f.name, f.read_text(encoding="utf-8")) for f in files))
 
 
 @lru_cache(maxsize=4)

@@ -96,6 +96,9 @@ def test_effects_of_a_file_reach_the_workers(scheduler, tmp_path):
     from soilml.physics.effects.user_effects import load_effects
 
     (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "other.py").write_text("1 / 0")  # which nothing here refers to
+    with pytest.raises(InputError, match="ZeroDivisionError"):
+        load_effects(tmp_path / "other.py")
     text = RECIPE.format(rows=64, seed=1) + '[[effect]]\nname = "half-torque"\nshare = 0.5\n'
     (tmp_path / "recipe.toml").write_text(text)
     effects = {**EFFECTS, **load_effects(tmp_path / "mine.py")}

@@ -29,6 +29,15 @@ def slow_first(number):
     return number, os.getpid()
 
 
+def wait_for_another(folder, number):
+    """Where this item is done, once two processes have begun one."""
+    (folder / str(os.getpid())).touch()
+    deadline = time.monotonic() + 60
+    while len(list(folder.iterdir())) < 2 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return number, os.getpid()
+
+
 def fail_at_five(number):
     if number == 5:
         raise InputError("five is too many")
@@ -42,8 +51,9 @@ def die_at_five(number):
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_results_come_in_order_from_several_processes(method):
-    with process_map(slow_first, range(20), 2, start_method=method) as results:
+def test_results_come_in_order_from_several_processes(method, tmp_path):
+    task = functools.partial(wait_for_another, tmp_path)
+    with process_map(task, range(20), 2, start_method=method) as results:
         numbers, processes = zip(*results, strict=True)
     assert numbers == tuple(range(20))
     assert len(set(processes)) == 2 and os.getpid() not in processes

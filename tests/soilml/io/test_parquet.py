@@ -101,10 +101,11 @@ def test_a_changed_byte_of_a_generated_file_is_found(tmp_path, small_data):
     assert len(read_table(tmp_path / "plain.parquet")) == len(content)  # none written, none asked
 
 
-def test_a_folder_is_no_table(tmp_path):
+def test_a_folder_without_parquet_files_is_no_table(tmp_path):
     (tmp_path / "folder.parquet").mkdir()
-    for path in (tmp_path, tmp_path / "folder.parquet"):
-        with pytest.raises(TableError, match="Is a directory"):
-            read_table(path)
+    with pytest.raises(TableError, match="Is a directory"):
+        read_table(tmp_path)
+    with pytest.raises(TableError, match="is a folder without a Parquet file"):
+        read_table(tmp_path / "folder.parquet")
     with pytest.raises(TableError, match="no such file"):
         read_table(tmp_path / "none.parquet")
