@@ -26,7 +26,7 @@ from soilml.errors import InputError, TableError
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
-from soilml.onboard.estimate import Estimate, Reason
+from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.fusion.joint_errors import are_comparable
 from soilml.onboard.multi_sensor import CORRELATED, fuse_estimates
