@@ -106,9 +106,9 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
         parts = xp.reshape(shear, (contact.repeats, *strength.shape))
         shear = xp.reshape(parts * strength, shear.shape)
     else:
-        shear *= strength
+        shear = shear * strength
     if signed:
-        shear *= shear_direction(contact, at)
+        shear = shear * shear_direction(contact, at)
     return Stress(contact=contact, normal=normal, shear=shear)
 
 
@@ -155,9 +155,7 @@ def integrate(stress: Stress) -> tuple[Array, Array, Array]:
     """
     xp, contact = namespace(stress.normal), stress.contact
     normal, shear = stress.normal, stress.shear
-    pull = shear * contact.horizontal_area
-    pull -= normal * contact.frontal_area
-    pull = xp.sum(pull, axis=0)
+    pull = xp.sum(shear * contact.horizontal_area - normal * contact.frontal_area, axis=0)
     if contact.normal_lever_arm is None and contact.shear_lever_arm.ndim < 2:
         torque = contact.shear_lever_arm * xp.sum(shear * contact.area, axis=0)
         return vertical_load(stress), pull, torque
@@ -170,6 +168,5 @@ def integrate(stress: Stress) -> tuple[Array, Array, Array]:
 def vertical_load(stress: Stress) -> Array:
     """Vertical load (N) that the stresses carry, (batch,); see `integrate`."""
     xp, contact = namespace(stress.normal), stress.contact
-    load = stress.normal * contact.horizontal_area
-    load += stress.shear * contact.frontal_area
+    load = stress.normal * contact.horizontal_area + stress.shear * contact.frontal_area
     return xp.sum(load, axis=0)
