@@ -39,12 +39,12 @@ def latency() -> str:
         estimator = for_simulated_case(Estimator.load(file), case)
         size = f"| {file.name} | {file.stat().st_size / 1e3:.0f} "
         alone = estimator.sets is not None and estimator.sets.sets_only
-        whole = _timed(lambda e=estimator: e(**_reading()))
+        whole = timed(lambda e=estimator: e(**reading()))
         if alone:
             lines.append(f"{size}| | | {whole[0]:.0f} | {whole[1]:.0f} {_set_latency(estimator)}")
             continue
-        feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
-        raw = _timed(lambda e=estimator, f=feed: e.session.run(OUTPUTS, f))
+        feed = {n: np.asarray([v], np.float32) for n, v in reading().items()}
+        raw = timed(lambda e=estimator, f=feed: e.session.run(OUTPUTS, f))
         lines.append(
             f"{size}| {raw[0]:.0f} | {raw[1]:.0f} | {whole[0]:.0f} | {whole[1]:.0f} "
             f"{_set_latency(estimator)}"
@@ -54,17 +54,23 @@ def latency() -> str:
 
 def _set_latency(estimator: Estimator) -> str:
     """Cells for 16 readings: onnxruntime, `run`, and one more reading by `step`."""
-    many = _readings()
-    run = _timed(lambda: estimator.run(**many), CALLS // 8)
+    many = readings()
+    run = timed(lambda: estimator.run(**many), CALLS // 8)
     if estimator.sets is None:
         return f"| | {run[0]:.0f} | |"
-    sets = estimator.sets
-    feed = sets.feed(sets.rows(many), sets.start())
-    names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
-    raw = _timed(lambda: estimator.session.run(names, feed), CALLS // 8)
+    raw = set_in_runtime(estimator)
     _, memory = estimator.step(estimator.start(), **many)
-    step = _timed(lambda: estimator.step(memory, **_reading()), CALLS // 8)
+    step = timed(lambda: estimator.step(memory, **reading()), CALLS // 8)
     return f"| {raw[0]:.0f} | {run[0]:.0f} | {step[0]:.0f} |"
+
+
+def set_in_runtime(estimator: Estimator) -> tuple[float, float]:
+    """Median and p99 (us) of onnxruntime for 16 readings, of a file with a set posterior."""
+    sets = estimator.sets
+    assert sets is not None
+    feed = sets.feed(sets.rows(readings()), sets.start())
+    names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
+    return timed(lambda: estimator.session.run(names, feed), CALLS // 8)
 
 
 def cold_start() -> str:
@@ -86,11 +92,11 @@ def cold_start() -> str:
     )
 
 
-def _reading() -> dict[str, float]:
+def reading() -> dict[str, float]:
     return {"slip": 0.3, "torque": 3.0, "load": 60.0}
 
 
-def _readings() -> dict[str, np.ndarray]:
+def readings() -> dict[str, np.ndarray]:
     """Sixteen readings of one soil."""
     slip, load = np.linspace(0.08, 0.55, 16), np.tile([40.0, 75.0, 110.0, 90.0], 4)
     force = Model(Wheel(radius=0.15, width=0.12))(
@@ -99,7 +105,8 @@ def _readings() -> dict[str, np.ndarray]:
     return {"slip": slip, "load": load, "torque": force.torque}
 
 
-def _timed(call, count: int = CALLS) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def timed(call, count: int = CALLS) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+    """Median and p99 (us) of a call."""
     for _ in range(50):
         call()
     taken = np.empty(count)

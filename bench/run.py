@@ -25,6 +25,7 @@ import physics
 import prospects
 import slip
 import streams
+import summary
 import systems
 from benchmarks_file import FILE, MARK, ROOT
 
@@ -69,6 +70,13 @@ class Part:
 
 
 PARTS = (
+    Part(
+        "summary",
+        "At a glance",
+        "The best of several calls in one run, on the machine named above. The sections below have "
+        "the details.",
+        lambda folder: summary.text(),
+    ),
     Part(
         "accuracy",
         "Accuracy of the rigid wheel",
