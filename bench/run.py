@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import re
 import subprocess
 import sys
@@ -11,7 +9,6 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -27,24 +24,9 @@ import slip
 import streams
 import summary
 import systems
-from benchmarks_file import FILE, MARK, ROOT
+from benchmarks_file import FILE, MARK, ROOT, machine
 
 from soilml.io.atomic_files import save_text
-
-
-def machine() -> str:
-    """Processor, cores and versions."""
-    name = platform.processor() or platform.machine()
-    cpu = Path("/proc/cpuinfo")
-    if cpu.exists():
-        names = [x.split(":")[1].strip() for x in cpu.read_text().splitlines() if "model name" in x]
-        name = names[0] if names else name
-    libraries = ("numpy", "scipy", "scikit-learn", "torch", "onnx", "onnxruntime", "pyarrow")
-    versions = ", ".join(f"{n} {version(n).split('+')[0]}" for n in libraries)
-    return (
-        f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}, Python "
-        f"{platform.python_version()}; {versions}. One thread for each process."
-    )
 
 
 def wall_time(target: str) -> str:
