@@ -40,9 +40,13 @@ def limited_workers(most: int | None) -> Iterator[None]:
         _most.reset(token)
 
 
-@cache
 def prepare_worker() -> None:
     """One thread in this process, and freed memory kept for the next task."""
+    _prepare(os.getpid())  # a process that is forked from a prepared one is not prepared itself
+
+
+@cache
+def _prepare(process: int) -> None:
     _most.set(1)  # a task starts no workers of its own
     threadpool_limits(1)
     keep_freed_memory()

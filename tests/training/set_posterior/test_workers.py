@@ -1,10 +1,12 @@
 """Training and comparison on several processes: the numbers are those of one."""
 
+from contextvars import copy_context
+
 import numpy as np
 import pytest
 
 from datagen.engines.processes import FORKS, process_map
-from datagen.engines.worker_setup import limited_workers, usable_cores
+from datagen.engines.worker_setup import limited_workers, prepare_worker, usable_cores
 from datagen.recipe import read_recipe
 from soilml.quantities import SHEAR
 from training.benchmark.bayes_limit import benchmark_sets
@@ -30,6 +32,7 @@ def cores_there(_):
 
 
 def test_a_limit_holds_inside_its_block_and_tasks_start_no_workers():
+    copy_context().run(prepare_worker)  # as a worker thread of this process may have done
     with limited_workers(3):
         assert usable_cores() == 3
         with process_map(cores_there, range(4)) as found:
@@ -48,7 +51,9 @@ def test_polynomials_of_designs_are_the_same(monkeypatch):
 
     def fit():
         progress = lambda text, done, total: seen.append((done, total))  # noqa: E731
-        return response_surface._fit_polynomials(family, designs, x, monomials(x, terms), progress)
+        return response_surface._fit_polynomials(
+            family.responses, designs, x, monomials(x, terms), progress
+        )
 
     one, three = of_both(fit)
     for a, b in zip(one, three, strict=True):
