@@ -11,7 +11,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from board import OUTPUTS, _reading, _readings, _timed
+from board import OUTPUTS, reading, readings, timed
 from compiled_c import COMPILERS, ROOT, CompiledModel, compile_library
 from simulated_rows import context_of, rows_of
 
@@ -75,7 +75,7 @@ def latency_table(models: dict[str, CompiledModel]) -> str:
     for name, model in models.items():
         estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), case)
         for what, by_runtime, by_c in _tasks(name, model, estimator):
-            times = (*_timed(by_runtime, CALLS), *_timed(by_c, CALLS))
+            times = (*timed(by_runtime, CALLS), *timed(by_c, CALLS))
             lines.append(f"| {name} | {what} | {' | '.join(f'{t:.0f}' for t in times)} |")
     return "\n".join(lines)
 
@@ -86,8 +86,8 @@ def _tasks(name, model, estimator):  # type: ignore[no-untyped-def]
     session, work = estimator.session, reference(model.work)
     sets = estimator.sets
     if not (sets and sets.sets_only):
-        feed = {n: np.asarray([v], np.float32) for n, v in _reading().items()}
-        row, estimate = model.row(**_reading()), model.new("estimate")
+        feed = {n: np.asarray([v], np.float32) for n, v in reading().items()}
+        row, estimate = model.row(**reading()), model.new("estimate")
         single = getattr(library, f"{name}_single")
         arguments = reference(row), reference(estimate), work
         yield "one reading", lambda: session.run(OUTPUTS, feed), lambda: single(*arguments)
@@ -95,7 +95,7 @@ def _tasks(name, model, estimator):  # type: ignore[no-untyped-def]
         return
     names = [*(SET_PREFIX + output for output in SET_OUTPUTS), *MEMORY_OUTPUTS]
     update = getattr(library, f"{name}_set_update")
-    found, many = model.new("set_estimate"), _readings()
+    found, many = model.new("set_estimate"), readings()
     for what, before, count in (("set of 16", 0, 16), ("step at 8", 8, 1), ("step at 200", 200, 1)):
         rows = {k: np.resize(v, before + count).astype(np.float32) for k, v in many.items()}
         own, memory = model.start(**sets.context_values), estimator.start()
