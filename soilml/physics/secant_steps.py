@@ -67,7 +67,9 @@ def _secant_steps(
     unsolved = xp.full_like(new.status, int(Status.NOT_CONVERGED))
     status = xp.where(close, new.status, unsolved)
     force = Force(load=load + 0.0 * change, status=status, **parts)
-    others = xp.nonzero(~close)[0]
+    # a row whose log ratio is not finite stays so: its next step is not defined
+    go_on = ~close & xp.isfinite(new_log_ratio)
+    others = xp.nonzero(go_on)[0]
     if evaluations == 1 or not others.shape[0]:
         return force, secant
     nearer, nearer_slope = _secant_steps(
@@ -78,4 +80,4 @@ def _secant_steps(
         evaluations - 1,
     )
     slopes = xp.concat([secant, nearer_slope], axis=0)
-    return merge_rows(force, close, nearer), xp.take(slopes, merged_position(close), axis=0)
+    return merge_rows(force, ~go_on, nearer), xp.take(slopes, merged_position(~go_on), axis=0)

@@ -22,6 +22,11 @@ from soilml.physics.merged_rows import merge_rows
 from soilml.physics.secant_steps import forces_near
 from soilml.row_status import Status
 
+#: Stages of an effect that depend on the sinkage; the others act before or after the search.
+STAGES_AT_SINKAGE = ("on_contact", "on_stress", "on_force")
+#: A row is too heavy without a scan where the load still rises from this fraction of the largest
+#: sinkage.
+BELOW_LARGEST = 0.99
 #: A row has converged where the soil carries the load to this relative accuracy.
 LOAD_TOLERANCE = 1e-7
 #: The search begins at this fraction of the largest sinkage: light wheels on firm soil sink little.
@@ -77,22 +82,26 @@ def _solve_in_turn(load_case: LoadCase, searches: Sequence[Search]) -> Force:
 
 
 def load_rises_with_sinkage(load_case: LoadCase) -> bool:
-    """Whether the load that the soil carries rises with sinkage in all rows.
+    """Whether the load that the soil carries rises with sinkage, up to one peak, in all rows.
 
     The shear under a driving wheel lifts it everywhere in front of the axle. Under a braking wheel
     shear pulls down, and so it does behind the axle of a driving one, which an effect may bring
-    into contact.
+    into contact. A peak is possible close to the hub of a linear wheel only, where n is small and
+    the maximum stress far forward.
     """
-    xp = namespace(load_case.at.slip)
-    return not load_case.effects and not bool(xp.any(load_case.at.slip < 0))
+    xp, effects = namespace(load_case.at.slip), load_case.effects
+    if any(effect.overrides(stage) for effect in effects for stage in STAGES_AT_SINKAGE):
+        return False
+    return not bool(xp.any(load_case.at.slip < 0))
 
 
 def _too_heavy(load_case: LoadCase) -> tuple[Force, Array]:
-    """Forces at the largest sinkage, and which rows are too heavy even there."""
+    """Forces at the largest sinkage, and which rows are too heavy there and below."""
     xp = namespace(load_case.at.load)
     largest = xp.log(load_case.gear.largest_sinkage() + 0.0 * load_case.at.load)
     force = forces_at_sinkage(load_case, xp.exp(largest))  # to the bit as the scan has it
-    heavy = (force.load < load_case.at.load) & (force.status == 0)
+    below = load_at_sinkage(load_case, BELOW_LARGEST * xp.exp(largest))
+    heavy = (below < force.load) & (force.load < load_case.at.load) & (force.status == 0)
     status = xp.where(heavy, 0 * force.status + int(Status.TOO_HEAVY), force.status)
     return replace(force, status=status), heavy
 
@@ -101,6 +110,8 @@ def _solve_from_coarse(load_case: LoadCase) -> tuple[Force, Array]:
     """Forces at the root next to that of a few points, and which rows need no further search."""
     force, slope = forces_near(load_case, coarse_estimate(load_case))
     solved = force.status == 0
+    if not bool(namespace(slope).any(solved)):
+        return force, solved
     return force, solved & ~earlier_equilibrium_possible(load_case, force, slope)
 
 
@@ -114,6 +125,8 @@ def _solve_by_secant(load_case: LoadCase) -> tuple[Force, Array]:
     power = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
     smallest = largest + math.log(SMALLEST_FRACTION)
     force, balanced, slope = _root_between(load_case, smallest, largest, initial, power)
+    if not bool(xp.any(balanced)):
+        return force, balanced
     return force, balanced & ~earlier_equilibrium_possible(load_case, force, slope)
 
 
