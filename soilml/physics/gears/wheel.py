@@ -21,7 +21,7 @@ from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
 #: quadrature.
-DRIVING_NODES = 14
+DRIVING_NODES = 16
 BRAKING_NODES = 24
 #: A nearly locked wheel mobilises the shear strength close to its entry. Where the travel ratio is
 #: more than twice this number, a part of the contact ends at this number over the ratio, as a
