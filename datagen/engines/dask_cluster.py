@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import signal
 import socket
 import sys
 import threading
@@ -84,16 +85,33 @@ def dask_map(
             _check_address(scheduler)
             address: Any = scheduler
         else:
-            cluster = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                memory_limit=None,
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )
+            with _ignored_by_children(signal.SIGINT):
+                cluster = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    memory_limit=None,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                )
             address = stack.enter_context(cluster)
         client = stack.enter_context(Client(address, timeout=PATIENCE, set_as_default=False))
         yield _in_order(client, function, items)
+
+
+@contextmanager
+def _ignored_by_children(number: signal.Signals) -> Iterator[None]:
+    """Processes that are started inside ignore a signal: this one answers it and ends them.
+
+    A terminal sends Ctrl-C to all processes; a worker would print a traceback of its own.
+    """
+    if threading.current_thread() is not threading.main_thread():  # handlers are that thread's
+        yield
+        return
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
 
 
 def _in_order(client: Any, function: Callable[[Any], Any], items: Sequence[Any]) -> Iterator[Any]:
