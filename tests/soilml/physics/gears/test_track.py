@@ -163,7 +163,6 @@ def test_same_answers_in_another_array_library(library, effects):
     assert np.asarray(found.status).tolist() == expected.status.tolist() == 9 * [0] + [1]
     for name in FIELDS:
         values = np.asarray(getattr(found, name))
-        # the libraries round the estimate in single precision differently
         np.testing.assert_allclose(values, getattr(expected, name), rtol=1e-9, atol=1e-15)
 
 
