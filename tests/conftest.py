@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -179,16 +178,17 @@ def _exported(folder: Path, family, posterior, noise) -> Path:
 
 def _fitted(factory: pytest.TempPathFactory, name: str, family, settings):
     """The set posterior of a family, with a response surface that is fitted once."""
+    from response_arrays import load_response, save_response
+
     from training.set_posterior.graph import SetPosteriorGraph
     from training.set_posterior.response_surface import fit_response
     from training.set_posterior.sampler.misfit_test import MisfitLimits
 
     def fill(folder: Path) -> None:
-        fit = fit_response(family, settings, lambda *_: None)
-        (folder / "response.pickle").write_bytes(pickle.dumps(fit))
+        save_response(folder / "response.npz", fit_response(family, settings, lambda *_: None))
 
     folder = shared_folder(factory, name, fill)
-    response = pickle.loads((folder / "response.pickle").read_bytes())
+    response = load_response(folder / "response.npz")
     return SetPosteriorGraph(family, response, MisfitLimits(*map(np.asarray, LENIENT)))
 
 

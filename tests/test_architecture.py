@@ -82,10 +82,14 @@ def test_public_functions_and_classes_are_described():
 
 
 def test_nothing_is_unpickled():
-    for file in FILES:
+    """But for tasks that a dask scheduler hands to its workers: dask has no other form for them."""
+    modules = r"\b(pickle|cloudpickle|dill|joblib|marshal|shelve)\b|torch\.(load|save)\("
+    unpickling = [file for file in FILES if re.search(modules, file.read_text())]
+    assert unpickling == [ROOT / "datagen" / "engines" / "dask_cluster.py"]
+    tests = [file for file in (ROOT / "tests").rglob("*.py") if file != Path(__file__)]
+    for file in [*FILES, *tests]:
         text = file.read_text()
-        assert not re.search(r"\b(pickle|joblib|marshal|shelve)\b|torch\.(load|save)\(", text), file
-        assert not re.search(r"allow_pickle\s*=\s*True", text), file
+        assert not re.search(r"allow_pickle\s*=\s*True|\bpickle\.loads?\(", text), file
 
 
 def test_importing_soilml_loads_nothing_else():
