@@ -18,8 +18,8 @@ SMALL_STEP = 0.02
 MAX_LAST_STEP = 0.3
 #: Changes of log sinkage below this leave the slope as it is: rounding would spoil it.
 MIN_CHANGE = 3e-3
-#: The estimate stays below the largest sinkage by this much in log sinkage.
-MARGIN = 0.1
+#: The search starts below the largest sinkage by this much in log sinkage at least.
+INITIAL_MARGIN = 0.1
 #: Bounds of the slope of log load against log sinkage, and of a step.
 SLOPES, MAX_STEP = (0.05, 20.0), 3.0
 
@@ -43,8 +43,8 @@ def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
     xp = namespace(load_case.at.load)
     single = single_precision(load_case)
     soil, at, gear = single.soil, single.at, single.gear
-    most = xp.log(gear.largest_sinkage() + 0.0 * at.load) - MARGIN
-    x = xp.minimum(xp.log(gear.initial_sinkage(soil, at)), most)
+    largest = xp.log(gear.largest_sinkage() + 0.0 * at.load)
+    x = xp.minimum(xp.log(gear.initial_sinkage(soil, at)), largest - INITIAL_MARGIN)
     slope = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
     log_load = xp.log(at.load)
     step = last_x = last_y = x
@@ -57,7 +57,7 @@ def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
             slope = xp.where(usable, secant, slope)
         last_x, last_y = x, y
         step = xp.clip(-y / slope, -MAX_STEP, MAX_STEP)
-        x = xp.minimum(x + step, most + MARGIN)
+        x = xp.minimum(x + step, largest)
         if number > 0 and bool(xp.all(xp.abs(step) < SMALL_STEP)):
             break
     x = xp.where(xp.abs(step) < MAX_LAST_STEP, x, xp.full_like(x, math.nan))

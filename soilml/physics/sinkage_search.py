@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
-from soilml.physics.coarse_search import coarse_estimate
+from soilml.physics.coarse_search import INITIAL_MARGIN, coarse_estimate
 from soilml.physics.contact import Force, vertical_load
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage, stresses_at_sinkage
 from soilml.physics.load_case import LoadCase, rows, single_precision
@@ -31,8 +31,6 @@ BELOW_LARGEST = 0.99
 LOAD_TOLERANCE = 1e-7
 #: The search begins at this fraction of the largest sinkage: light wheels on firm soil sink little.
 SMALLEST_FRACTION = 1e-14
-#: The initial sinkage stays below the largest by this much in log sinkage.
-INITIAL_MARGIN = 0.1
 #: Loads below this fraction of the one to be carried count as this fraction, so that the log of
 #: their ratio stays finite where the soil carries nothing or pulls the gear down.
 SMALLEST_RATIO = 1e-3
