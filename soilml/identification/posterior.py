@@ -1,4 +1,4 @@
-"""The exact posterior of the full model, by importance sampling."""
+"""The posterior of the full model, by importance sampling."""
 
 from __future__ import annotations
 
@@ -12,23 +12,16 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
 from soilml.identification.diagnostics import with_warnings
-from soilml.identification.discrepancy import discrepancy_columns
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.predictions import (
-    noise_at_prediction,
-    predict_channels,
-    propagated_input_noise,
-    stack_channels,
-    stacked_readings,
-)
+from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.chi_squared import chi_squared_quantile
-from soilml.numerics.importance_sampling import (
+from soilml.numerics.sampling.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
     importance_sample,
 )
-from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
+from soilml.numerics.sampling.surface_sampling import surface_sample
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -40,8 +33,11 @@ INTERVAL = np.asarray([0.05, 0.95])
 LEAST_USABLE_SIZE = 50.0
 #: Normal quantile of 0.999.
 Z_999 = 3.09
-#: Most model evaluations in one call, which bounds memory.
-MOST_EVALUATIONS = 200_000
+#: Readings from which on polynomials take the place of the model: few readings may leave a region
+#: with edges, and need few evaluations.
+FEWEST_READINGS = 8
+#: Rows from which on a part of them, of the second number, is sampled first.
+MANY_ROWS, FIRST_ROWS = 512, 256
 
 
 @dataclass(frozen=True)
@@ -72,6 +68,11 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
     integrated out: its covariance is added to that of the noise. A parameter that the rows do not
     determine has its prior as posterior.
+
+    From eight readings on, polynomials of the parameters take the place of the model in the region
+    of the posterior. They are used if they change the log density there by at most 0.1 (one
+    standard deviation), at points that they were not fitted to; otherwise the model itself is
+    sampled, which takes tens of times longer.
 
     Where the residuals exceed the declared noise significantly (one data set in a thousand does by
     chance), noise and discrepancy are multiplied by the root of the misfit and the posterior is
@@ -157,8 +158,10 @@ def sample_posterior(
     the sample of largest weight; with a discrepancy, weighted by the inverse covariance. Raises
     `FitError` as `posterior` does.
     """
-    density = _LogDensity(case, data, free, noise_scale)
-    sample = importance_sample(density, len(free))
+    density = PosteriorDensity(case, data, free, noise_scale)
+    sample = _from_surface(density)
+    if sample is None:
+        sample = importance_sample(density, len(free))
     if not np.isfinite(sample.evidence):
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
@@ -173,70 +176,22 @@ def sample_posterior(
     return sample, cost / max(data.reading_count - len(free), 1)
 
 
-class _LogDensity:
-    """Log posterior density (sets,), up to a constant, of fractions of the priors (sets, p)."""
+def _from_surface(density: PosteriorDensity) -> ImportanceSample | None:
+    """Weighted samples with polynomials in place of the model, or None where these do not serve.
 
-    def __init__(
-        self,
-        case: Case,
-        data: Observations,
-        free: Sequence[FreeParameter],
-        noise_scale: float = 1.0,
-    ) -> None:
-        undeclared = [column(c.name) for c in data.channels if not c.declared]
-        if undeclared:
-            raise FitError(
-                f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
-                "[noise]"
-            )
-        self.case, self.data, self.free, self.noise_scale = case, data, free, noise_scale
-        self.reading = stacked_readings(data)[0]
-        self.columns = discrepancy_columns(case, data)
-        #: noise that slip and load cause, (k,); linearised at the best of the first samples
-        self.input_std: Floats | None = None
-
-    def __call__(self, u: Floats) -> Floats:
-        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
-        blocks = [self._of_block(u[i : i + size]) for i in range(0, len(u), size)]
-        return np.concatenate(blocks) if blocks else np.zeros(0)
-
-    def squared_residuals(self, u: Floats) -> float:
-        """Sum of squared residuals in declared standard deviations, of one parameter set (1, p)."""
-        return float(self._squares_and_log_determinant(*self._predict(u))[0].sum())
-
-    def _of_block(self, u: Floats) -> Floats:
-        squares, log_determinant = self._squares_and_log_determinant(*self._predict(u))
-        # the factor on all noise enters the determinant as a constant, which does not matter
-        logs = -0.5 * squares / self.noise_scale**2 - log_determinant
-        return np.where(np.isfinite(logs), logs, -np.inf)
-
-    def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
-        """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
-        squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
-        for columns in self.columns:
-            start, stop = stop, stop + len(columns)
-            own = squared_residuals_and_log_determinant(
-                y[:, start:stop] - self.reading[start:stop], std[:, start:stop], columns
-            )
-            squares, log_determinant = squares + own[0], log_determinant + own[1]
-        return squares, log_determinant
-
-    def _predict(self, u: Floats) -> tuple[Floats, Floats]:
-        """Predictions and standard deviations of the readings under each set, (sets, k)."""
-        channels = predict_channels(self.case, self.free, u, self.data.at)
-        y = stack_channels(self.data, channels)
-        std = noise_at_prediction(self.case, self.data, y)
-        if self.input_std is None:
-            squares = self._squares_and_log_determinant(y, std)[0]
-            self.input_std = self._propagated(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
-        return y, np.asarray(np.hypot(std, self.input_std))
-
-    def _propagated(self, u: Floats) -> Floats:
-        data = self.data
-        noise = propagated_input_noise(
-            self.case, self.free, u, data.at, data.slip_std, data.load_std
-        )
-        return np.asarray(stack_channels(data, noise)[0])
+    Of many rows, a part shows the region in which all are evaluated.
+    """
+    data, p = density.data, len(density.free)
+    if data.reading_count < FEWEST_READINGS:
+        return None
+    start: ImportanceSample | None = None
+    if len(data.slip) > MANY_ROWS:
+        part = np.random.default_rng(0).permutation(len(data.slip))[:FIRST_ROWS]
+        start = _from_surface(density.of_rows(np.sort(part)))
+    sample = surface_sample(density, p, start)
+    if sample is not None and density.linearise_input_noise(sample):
+        sample = surface_sample(density, p, sample)
+    return sample
 
 
 def _sampling_warnings(sample: ImportanceSample) -> tuple[str, ...]:

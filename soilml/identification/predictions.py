@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -14,14 +14,16 @@ from soilml.identification.data.observations import Observations
 from soilml.identification.data.operating_points import rows_by_gear
 from soilml.identification.free_parameters import FreeParameter
 from soilml.physics.contact import Force
+from soilml.physics.linear_response import linear_response
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
+Predictor = Callable[[Case, Sequence[FreeParameter], Floats, Operating], dict[str, Floats]]
 
-#: Step of central differences, as a fraction of the prior: rounding errors of the equilibrium
-#: (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
-STEP = 1e-4
+#: Step of differences, as a fraction of the prior: rounding errors of a reading at given sinkage
+#: (1e-14 of it) and curvature then both stay below 1e-5 of a derivative.
+STEP = 1e-6
 
 
 def predict_channels(
@@ -29,15 +31,22 @@ def predict_channels(
 ) -> dict[str, Floats]:
     """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
     if case.gears:
-        return _predict_by_gear(case, free, u, at)
-    values = {f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)}
-    changed = case.with_values(values)
+        return _by_gear(predict_channels, case, free, u, at)
+    changed = _changed(case, free, u)
     force = changed.model(changed.soil, at)
-    shape = (len(u), np.shape(at.slip)[0])
+    return _channels(force, np.shape(force.torque), len(u))
+
+
+def _changed(case: Case, free: Sequence[FreeParameter], u: Floats) -> Case:
+    """The case at parameter sets `u` (sets, p), its free parameters of shape (sets, 1)."""
+    return case.with_values({f.path: f.prior.at(u[:, i])[:, None] for i, f in enumerate(free)})
+
+
+def _channels(force: Force, shape: tuple[int, ...], sets: int) -> dict[str, Floats]:
+    """Each channel (sets, rows) of forces whose shape is (sets, rows), (1, rows) or (rows,)."""
     return {
-        "torque": np.broadcast_to(force.torque, shape),
-        "drawbar_pull": np.broadcast_to(force.drawbar_pull, shape),
-        "sinkage": np.broadcast_to(force.sinkage, shape),
+        name: np.broadcast_to(np.reshape(getattr(force, name), shape), (sets, shape[-1]))
+        for name in CHANNELS
     }
 
 
@@ -57,15 +66,15 @@ def forces(case: Case, at: Operating) -> Force:
     return Force(**joined)
 
 
-def _predict_by_gear(
-    case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
+def _by_gear(
+    predict: Predictor, case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
 ) -> dict[str, Floats]:
-    """The same for rows of several gears, with one call of the model for each gear."""
+    """The same for rows of several gears, with one call for each gear."""
     total = {name: np.full((len(u), np.shape(at.slip)[0]), np.nan) for name in CHANNELS}
     for part in rows_by_gear(case, at):
         kept = [i for i, f in enumerate(free) if f.path in part.paths]
         own = [replace(free[i], path=part.paths[free[i].path]) for i in kept]
-        for name, values in predict_channels(part.case, own, u[:, kept], part.at).items():
+        for name, values in predict(part.case, own, u[:, kept], part.at).items():
             total[name][:, part.rows] = values
     return total
 
@@ -91,34 +100,46 @@ def noise_at_prediction(case: Case, data: Observations, prediction: Floats) -> F
     and so do those of readings without a prediction or with a predicted deviation of zero.
     """
     declared = stacked_readings(data)[1]
-    std, stop = np.broadcast_to(declared, prediction.shape).copy(), 0
+    parts, stop = [], 0
     for channel in data.channels:
         measured = np.isfinite(channel.reading)
         start, stop = stop, stop + int(measured.sum())
         noise = case.noise.get(column(channel.name))
-        if noise is None:
-            continue
         own = declared[start:stop]
+        if noise is None or noise.share == 0.0:
+            parts.append(np.broadcast_to(own, (len(prediction), len(own))))
+            continue
         from_case = own == noise.std(channel.reading[measured])
         expected = noise.std(prediction[:, start:stop])
-        std[:, start:stop] = np.where(from_case & (expected > 0), expected, own)
-    return std
+        parts.append(np.where(from_case & (expected > 0), expected, own))
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def linearise(
     case: Case, data: Observations, free: Sequence[FreeParameter], u: Floats
 ) -> tuple[Floats, Floats]:
-    """Predictions (k,) at `u` (p,) and their Jacobian (k, p), by central differences.
+    """Predictions (k,) at `u` (p,) and their Jacobian (k, p), by the implicit function theorem.
 
-    All parameter sets go through the model in one call. At a bound the difference is one-sided.
+    One search for equilibrium, and one evaluation for each parameter at the sinkage found; see
+    `soilml.physics.linear_response`. The steps point away from a bound.
     """
-    p = len(u)
-    up, down = np.minimum(u + STEP, 1.0), np.maximum(u - STEP, 0.0)
-    sets = np.tile(u, (2 * p + 1, 1))
-    sets[np.arange(p), np.arange(p)] = up
-    sets[p + np.arange(p), np.arange(p)] = down
-    y = stack_channels(data, predict_channels(case, free, sets, data.at))
-    return y[-1], np.asarray(((y[:p] - y[p:-1]) / (up - down)[:, None]).T)
+    step = np.where(u + STEP <= 1.0, STEP, -STEP)
+    sets = np.concatenate([u[None, :], u + np.diag(step)])
+    y = stack_channels(data, _response_of_channels(case, free, sets, data.at))
+    return y[0], np.asarray(((y[1:] - y[0]) / step[:, None]).T)
+
+
+def _response_of_channels(
+    case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
+) -> dict[str, Floats]:
+    """Each channel (sets, rows), linear in the distance of `u` (sets, p) from its first row."""
+    if case.gears:
+        return _by_gear(_response_of_channels, case, free, u, at)
+    changed = _changed(case, free, u)
+    load_case, shape = changed.model.load_case(changed.soil, at)
+    # without a free parameter that acts here, all sets are the first one
+    base = np.tile(np.arange(shape[-1]), shape[0] if len(shape) == 2 else 1)
+    return _channels(linear_response(load_case, base).reading, shape, len(u))
 
 
 def propagated_input_noise(

@@ -7,13 +7,13 @@ from soilml.numerics.estimate_fusion import (
     pairwise,
     shrink_correlation,
 )
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights, prior_quantiles
 from soilml.numerics.prior import Prior
 from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_start, gauss
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 from soilml.numerics.root_finding import first_bracket, rising_root
+from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.subspaces import column_space, project_out
 
 __all__ = [

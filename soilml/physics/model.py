@@ -92,7 +92,7 @@ class Model:
         InputError
             For a value outside its bounds, or a missing field that an effect needs.
         """
-        load_case, shape = self._load_case(soil, at)
+        load_case, shape = self.load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
             force = in_chunks(load_case, sensor_readings)
@@ -111,7 +111,7 @@ class Model:
         InputError
             As a call of the model does.
         """
-        load_case, shape = self._load_case(soil, at)
+        load_case, shape = self.load_case(soil, at)
         xp = namespace(load_case.at.slip)
         with np.errstate(all="ignore"):
             sinkage = in_chunks(
@@ -121,7 +121,11 @@ class Model:
         parts = (angle, stresses.normal, stresses.shear)
         return Profile(*(xp.reshape(part, (part.shape[0], *shape)) for part in parts))
 
-    def _load_case(self, soil: Soil, at: Operating) -> tuple[LoadCase, tuple[int, ...]]:
+    def load_case(self, soil: Soil, at: Operating) -> tuple[LoadCase, tuple[int, ...]]:
+        """All rows as arrays (batch,), or () where shared, once checked; and their shape.
+
+        Raises `InputError` as a call of the model does.
+        """
         check(at)
         check(soil, "soil ")
         check(self)

@@ -17,8 +17,8 @@ from soilml.identification.free_parameters import select_free
 from soilml.identification.posterior import misfit_limit
 from soilml.identification.predictions import stacked_readings
 from soilml.io.table import Table
-from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.sampling.importance_sampling import importance_sample
 from training.benchmark.bayes_limit_file import (
     FRACTIONS,
     HPD_DRAWS,

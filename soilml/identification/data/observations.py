@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.operating_points import operating_points
+from soilml.identification.data.operating_points import operating_points, operating_points_of_rows
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
@@ -71,6 +71,18 @@ class Observations:
     def reading_count(self) -> int:
         """Number of readings k of all channels."""
         return sum(int(np.isfinite(c.reading).sum()) for c in self.channels)
+
+    def of_rows(self, rows: NDArray[np.int64]) -> Observations:
+        """Some of the rows."""
+        return replace(
+            self,
+            at=operating_points_of_rows(self.at, rows),
+            slip_std=self.slip_std[rows],
+            load_std=self.load_std[rows],
+            channels=tuple(
+                replace(c, reading=c.reading[rows], std=c.std[rows]) for c in self.channels
+            ),
+        )
 
 
 def read_observations(case: Case, table: Table) -> Observations:

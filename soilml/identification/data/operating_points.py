@@ -64,10 +64,12 @@ def rows_by_gear(case: Case, at: Operating) -> Iterator[GearRows]:
     for name in case.gears:
         rows = np.flatnonzero(driven == name)
         if rows.size:
-            yield GearRows(case.of_gear(name), rows, _rows(at, rows), case.paths_of_gear(name))
+            own = replace(operating_points_of_rows(at, rows), gear=None)
+            yield GearRows(case.of_gear(name), rows, own, case.paths_of_gear(name))
 
 
-def _rows(at: Operating, rows: NDArray[np.int64]) -> Operating:
-    values = {field: getattr(at, field) for field in ("slip", "load", *COVARIATES)}
+def operating_points_of_rows(at: Operating, rows: NDArray[np.int64]) -> Operating:
+    """Operating points of some rows."""
+    values = {field: getattr(at, field) for field in ("slip", "load", "gear", *COVARIATES)}
     taken = {k: np.asarray(v)[rows] if np.ndim(v) else v for k, v in values.items()}
-    return replace(at, gear=None, **taken)
+    return replace(at, **taken)

@@ -1,6 +1,7 @@
 """The posterior: equal to brute force, calibrated, and never worse than least squares."""
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.io.table import Table
-from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.sampling.importance_sampling import importance_sample
 
 SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
 LOADS = np.repeat([40.0, 100.0], 4)
@@ -124,12 +125,52 @@ def test_noise_that_nobody_declared_is_asked_for(case):
 
 
 def test_a_posterior_too_narrow_to_sample_is_refused_and_never_given_as_certain(case, monkeypatch):
-    monkeypatch.setattr("soilml.numerics.importance_sampling.MOST_ROUNDS", 2)
+    monkeypatch.setattr(import_module("soilml.identification.posterior"), "FEWEST_READINGS", 1000)
+    monkeypatch.setattr("soilml.numerics.sampling.importance_sampling.MOST_ROUNDS", 2)
     case = replace(case, noise={"torque_Nm": Noise(share=1e-4)})
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, SLIPS, LOADS, seed=1)
     with pytest.raises(FitError, match="too narrow a part of the prior; use --method nonlinear"):
         identify(case, table, None, "posterior")
+
+
+def without_polynomials(monkeypatch):
+    monkeypatch.setattr(import_module("soilml.identification.posterior"), "FEWEST_READINGS", 10**6)
+
+
+def test_polynomials_in_place_of_the_model_give_the_same_posterior(case, monkeypatch):
+    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    table = measured(case, truth, SLIPS, LOADS, seed=5)
+    quick = identify(case, table, None, "posterior")
+    without_polynomials(monkeypatch)
+    fit = identify(case, table, None, "posterior")
+    # two standard errors of samples whose effective size is 2500
+    assert np.all(np.abs(quick.values - fit.values) < 0.08 * fit.std)
+    np.testing.assert_allclose(quick.std, fit.std, rtol=0.08)
+    assert np.all(np.abs(quick.low - fit.low) < 0.15 * fit.std)
+
+
+def test_many_rows_are_sampled_in_the_region_of_a_part_of_them(case, monkeypatch):
+    rng = np.random.default_rng(2)
+    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    slip, load = rng.uniform(0.05, 0.6, 700), rng.choice([40.0, 70.0, 100.0], 700)
+    table = measured(case, truth, slip, load, seed=6)
+    fit = identify(case, table, None, "posterior")
+    least_squares = identify(case, table, None, "nonlinear")
+    # so many rows determine the parameters that the posterior is normal about the least squares
+    assert np.all(np.abs(fit.values - least_squares.values) < 0.15 * least_squares.std)
+    np.testing.assert_allclose(fit.std, least_squares.std, rtol=0.08)
+
+
+def test_noise_of_slip_is_linearised_where_the_posterior_is(case):
+    truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
+    case = replace(case, noise=case.noise | {"slip": Noise(constant=0.02)})
+    table = measured(case, truth, SLIPS, LOADS, seed=7)
+    fit = identify(case, table, None, "posterior")
+    exact = identify(
+        replace(case, noise={"torque_Nm": Noise(share=0.02)}), table, None, "posterior"
+    )
+    assert np.all(fit.std > 1.1 * exact.std)
 
 
 def test_dead_corners_of_the_prior_are_passed_over_in_silence(recwarn):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
 from training.benchmark.bayes_limit_file import (
     FRACTIONS,
     HPD_DRAWS,

@@ -61,7 +61,10 @@ class ImportanceSample:
 
 
 def importance_sample(
-    log_density: Callable[[Floats], Floats], p: int, seed: int = 0
+    log_density: Callable[[Floats], Floats],
+    p: int,
+    seed: int = 0,
+    least_effective_size: float = LEAST_EFFECTIVE_SIZE,
 ) -> ImportanceSample:
     r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
@@ -83,6 +86,8 @@ def importance_sample(
         Dimension.
     seed
         Of the random numbers.
+    least_effective_size
+        Effective sample size at which sampling ends.
 
     References
     ----------
@@ -97,7 +102,7 @@ def importance_sample(
     proposals = np.full(len(u), float(FIRST_ROUND))
     sample = _weighted(u, logs, proposals)
     for _ in range(MOST_ROUNDS):
-        if sample.effective_size >= LEAST_EFFECTIVE_SIZE or not np.isfinite(logs).any():
+        if sample.effective_size >= least_effective_size or not np.isfinite(logs).any():
             break
         mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
         trial = mixture.draw(LATER_ROUND, rng)
@@ -165,7 +170,7 @@ class _Mixture:
         constant -= 0.5 * p * math.log(FREEDOM * math.pi)
         total = np.full(len(u), UNIFORM)
         for centre, factor, share in zip(self.centres, self.factors, self.mixing, strict=True):
-            white = np.linalg.solve(factor, (u - centre).T)
+            white = np.linalg.inv(factor) @ (u - centre).T
             log = constant - np.log(np.diag(factor)).sum()
             log = log - 0.5 * (FREEDOM + p) * np.log1p((white**2).sum(axis=0) / FREEDOM)
             total += (1.0 - UNIFORM) * share * np.exp(log)
@@ -217,5 +222,5 @@ def _responsibilities(
 def _gaussian(u: Floats, centre: Floats, scale: Floats) -> Floats:
     """Gaussian density (n,), up to a factor that all components share."""
     factor = np.linalg.cholesky(scale)
-    white = np.linalg.solve(factor, (u - centre).T)
+    white = np.linalg.inv(factor) @ (u - centre).T
     return np.asarray(np.exp(-0.5 * (white**2).sum(axis=0)) / np.prod(np.diag(factor)))

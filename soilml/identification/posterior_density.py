@@ -1,0 +1,118 @@
+"""Log density of the posterior of soil parameters, from a model's predictions of the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import FitError
+from soilml.identification.data.observations import Observations
+from soilml.identification.discrepancy import discrepancy_columns
+from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.predictions import (
+    noise_at_prediction,
+    predict_channels,
+    propagated_input_noise,
+    stack_channels,
+    stacked_readings,
+)
+from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
+from soilml.numerics.sampling.importance_sampling import ImportanceSample
+from soilml.quantities import column
+
+Floats = NDArray[np.float64]
+
+#: Most model evaluations in one call, which bounds memory.
+MOST_EVALUATIONS = 200_000
+
+
+class PosteriorDensity:
+    """Log posterior density (sets,), up to a constant, of fractions of the priors (sets, p)."""
+
+    def __init__(
+        self,
+        case: Case,
+        data: Observations,
+        free: Sequence[FreeParameter],
+        noise_scale: float = 1.0,
+    ) -> None:
+        undeclared = [column(c.name) for c in data.channels if not c.declared]
+        if undeclared:
+            raise FitError(
+                f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
+                "[noise]"
+            )
+        self.case, self.data, self.free, self.noise_scale = case, data, free, noise_scale
+        self.reading = stacked_readings(data)[0]
+        self.columns = discrepancy_columns(case, data)
+        self.noisy_input = bool(np.any(data.slip_std > 0.0) or np.any(data.load_std > 0.0))
+        #: noise that slip and load cause, (k,); linearised at the best of the first samples
+        self.input_std: Floats | None = None
+
+    def __call__(self, u: Floats) -> Floats:
+        """Log density (sets,) of parameter sets `u` (sets, p)."""
+        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
+        blocks = [
+            self.of_predictions(self.predict(u[i : i + size])) for i in range(0, len(u), size)
+        ]
+        return np.concatenate(blocks) if blocks else np.zeros(0)
+
+    def of_rows(self, rows: NDArray[np.int64]) -> PosteriorDensity:
+        """The density of some of the rows alone."""
+        return PosteriorDensity(self.case, self.data.of_rows(rows), self.free, self.noise_scale)
+
+    def squared_residuals(self, u: Floats) -> float:
+        """Sum of squared residuals in declared standard deviations, of one parameter set (1, p)."""
+        y = self.predict(u)
+        return float(self._squares_and_log_determinant(y, self._std(y))[0].sum())
+
+    def predict(self, u: Floats) -> Floats:
+        """Readings (sets, k) that parameter sets `u` (sets, p) predict."""
+        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
+        y = np.concatenate([self._predict(u[i : i + size]) for i in range(0, len(u), size)])
+        if self.noisy_input and self.input_std is None:
+            squares = self._squares_and_log_determinant(y, self._std(y))[0]
+            self.input_std = self._propagated(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
+        return y
+
+    def linearise_input_noise(self, sample: ImportanceSample) -> bool:
+        """Linearise noise of slip and load at the mean of samples; False where there is none."""
+        if self.noisy_input:
+            self.input_std = self._propagated(sample.mean(sample.u))
+        return self.noisy_input
+
+    def of_predictions(self, y: Floats) -> Floats:
+        """Log posterior density (sets,) of parameters that predict these readings (sets, k)."""
+        squares, log_determinant = self._squares_and_log_determinant(y, self._std(y))
+        # the factor on all noise enters the determinant as a constant, which does not matter
+        logs = -0.5 * squares / self.noise_scale**2 - log_determinant
+        return np.where(np.isfinite(logs), logs, -np.inf)
+
+    def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
+        """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
+        squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
+        for columns in self.columns:
+            start, stop = stop, stop + len(columns)
+            own = squared_residuals_and_log_determinant(
+                y[:, start:stop] - self.reading[start:stop], std[:, start:stop], columns
+            )
+            squares, log_determinant = squares + own[0], log_determinant + own[1]
+        return squares, log_determinant
+
+    def _std(self, y: Floats) -> Floats:
+        """Standard deviations (sets, k) of the readings where these are predicted."""
+        std = noise_at_prediction(self.case, self.data, y)
+        return std if self.input_std is None else np.asarray(np.hypot(std, self.input_std))
+
+    def _predict(self, u: Floats) -> Floats:
+        return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
+
+    def _propagated(self, u: Floats) -> Floats:
+        data = self.data
+        noise = propagated_input_noise(
+            self.case, self.free, u, data.at, data.slip_std, data.load_std
+        )
+        return np.asarray(stack_channels(data, noise)[0])

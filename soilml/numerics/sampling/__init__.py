@@ -1,0 +1,1 @@
+"""Weighted samples of densities over the unit cube."""

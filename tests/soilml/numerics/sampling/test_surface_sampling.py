@@ -1,0 +1,116 @@
+"""Sampling with polynomials in place of a model, against grids and against the model itself."""
+
+import numpy as np
+import pytest
+
+from soilml.numerics.sampling.importance_sampling import importance_sample
+from soilml.numerics.sampling.polynomial_surface import Scaling, fit_surface, monomials, term_count
+from soilml.numerics.sampling.surface_sampling import surface_sample
+from soilml.numerics.sampling.surrogate_density import Region
+
+SLIP = np.linspace(0.1, 0.9, 12)
+
+
+class Bent:
+    """Readings a (1 - exp(-slip / b)) of two parameters, with normal noise; evaluations counted."""
+
+    def __init__(self, noise=0.01, truth=(0.6, 0.3), missing=None, kink=0.0):
+        self.noise, self.missing, self.kink, self.evaluations = noise, missing, kink, 0
+        self.reading = self.model(np.asarray([truth]))[0]
+        self.evaluations = 0
+
+    def model(self, u):
+        a, b = 0.5 + u[:, :1], 0.05 + u[:, 1:]
+        y = a * (1.0 - np.exp(-SLIP / b)) + self.kink * np.abs(u[:, :1] - 0.6)
+        if self.missing is not None:
+            y = np.where(u[:, :1] > self.missing, np.nan, y)
+        return y
+
+    def predict(self, u):
+        self.evaluations += len(u)
+        return self.model(u)
+
+    def of_predictions(self, y):
+        return -0.5 * (((y - self.reading) / self.noise) ** 2).sum(axis=1)
+
+    def __call__(self, u):
+        logs = self.of_predictions(self.model(u))
+        return np.where(np.isfinite(logs), logs, -np.inf)
+
+
+def moments_by_grid(density, middle, half, count=401):
+    axes = [np.linspace(max(m - half, 0), min(m + half, 1), count) for m in middle]
+    u = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    weights = np.exp(density(u))
+    cell = np.prod([axis[1] - axis[0] for axis in axes])
+    evidence = np.log(weights.sum() * cell)
+    weights /= weights.sum()
+    mean = weights @ u
+    return mean, ((u - mean).T * weights) @ (u - mean), evidence
+
+
+@pytest.mark.parametrize(("noise", "half"), [(0.1, 1.0), (0.01, 0.3), (1e-4, 0.003)])
+def test_moments_and_evidence_are_those_of_the_density(noise, half):
+    density = Bent(noise)
+    sample = surface_sample(density, 2)
+    mean, covariance, evidence = moments_by_grid(Bent(noise), (0.6, 0.3), half)
+    std = np.sqrt(np.diag(covariance))
+    assert np.abs(sample.mean(sample.u) - mean).max() < 0.1 * std.min()
+    deviation = sample.u - sample.mean(sample.u)
+    found = (deviation.T * sample.weights) @ deviation
+    assert found == pytest.approx(covariance, rel=0.1, abs=0.1 * std.min() ** 2)
+    assert sample.evidence == pytest.approx(evidence, abs=0.1)
+    assert density.evaluations < 1000  # sampling the model takes several thousand
+
+
+def test_a_kink_in_the_posterior_is_left_to_sampling_of_the_model():
+    assert surface_sample(Bent(1e-3, kink=2.0), 2) is None
+    smooth_elsewhere = Bent(1e-3, truth=(0.2, 0.3), kink=2.0)  # the posterior is far from the kink
+    assert surface_sample(smooth_elsewhere, 2) is not None
+
+
+def test_an_edge_in_the_posterior_is_left_to_sampling_of_the_model():
+    assert surface_sample(Bent(0.05, missing=0.605), 2) is None
+    assert surface_sample(Bent(0.01, missing=0.9), 2) is not None
+    nowhere = Bent(0.05)
+    nowhere.missing = -1.0
+    assert surface_sample(nowhere, 2) is None
+
+
+def test_a_start_that_is_off_is_left():
+    density = Bent(1e-3)
+    start = importance_sample(Bent(5e-3, truth=(0.63, 0.33)), 2)
+    sample = surface_sample(density, 2, start)
+    mean, covariance, _ = moments_by_grid(Bent(1e-3), (0.6, 0.3), 0.03)
+    assert np.abs(sample.mean(sample.u) - mean).max() < 0.1 * np.sqrt(np.diag(covariance)).min()
+
+
+def test_leave_one_out_errors_are_those_of_fits_without_the_point():
+    rng = np.random.default_rng(3)
+    u = rng.random((30, 2))
+    y = np.stack([np.exp(u[:, 0]), np.sin(3.0 * u[:, 1])], axis=1)
+    scaling = Region.cube(2).scaling
+    surface, errors = fit_surface(scaling, 3, u, y)
+    assert surface(u) == pytest.approx(y, abs=0.05)
+    for i in (0, 7, 29):
+        others = np.arange(30) != i
+        without, _ = fit_surface(scaling, 3, u[others], y[others])
+        assert errors[i] == pytest.approx((y[i] - without(u[[i]]))[0], rel=1e-6)
+
+
+def test_monomials_are_all_up_to_the_degree():
+    z = np.asarray([[2.0, 3.0, 5.0]])
+    assert sorted(monomials(z, 2)[0]) == [1, 2, 3, 4, 5, 6, 9, 10, 15, 25]
+    assert [term_count(3, d) for d in (1, 2, 6)] == [4, 10, 84]
+
+
+def test_a_scaling_gives_unit_covariance_and_can_be_undone():
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal((500, 3)) @ np.asarray([[1.0, 0.9, 0.0], [0.0, 0.1, 0.2], [0, 0, 3.0]])
+    weights = rng.random(500)
+    weights /= weights.sum()
+    scaling = Scaling.of(u, weights)
+    z = scaling(u)
+    assert weights @ z == pytest.approx(np.zeros(3), abs=1e-9)
+    assert (z.T * weights) @ z == pytest.approx(np.eye(3), abs=1e-6)
+    assert scaling.back(z) == pytest.approx(u, abs=1e-9)
