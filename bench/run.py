@@ -94,8 +94,8 @@ PARTS = (
         "polynomials in place of the model; *model itself*: every sample is solved. The second "
         "table compares the two on simulated sets, in standard deviations of the posterior: "
         "samples of an effective size of 2500 differ by 0.03 (rms) in a mean, and by about twice "
-        "that in an end of the 90 % interval. Sets for which no polynomial was accurate enough are left out; "
-        "`identify` samples the model for them.",
+        "that in an end of the 90 % interval. Sets for which no polynomial was accurate enough "
+        "are left out; `identify` samples the model for them.",
         lambda folder: identification.text(),
     ),
     Part(
