@@ -8,12 +8,14 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import wait as futures_wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from itertools import islice
 from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -28,6 +30,8 @@ Result = TypeVar("Result")
 FORKS = sys.platform == "linux"
 #: Tasks that are submitted ahead of the result that is waited for, for each worker.
 AHEAD = 3
+#: Seconds without a result after which dead workers are looked for, and are given up.
+GRACE = 2.0
 #: Environment variables that limit threads of linear algebra in processes that are spawned.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -73,13 +77,14 @@ def process_map(
     pool = ProcessPoolExecutor(
         count, multiprocessing.get_context(method), initializer=_start, initargs=(function,)
     )
+    workers_here: list[BaseProcess] = []
     try:
         rest = iter(items)
         first = deque(pool.submit(_call, item) for item in islice(rest, AHEAD * count))
-        yield _in_order(pool, first, rest)
+        workers_here += set(multiprocessing.active_children()) - before
+        yield _in_order(pool, first, rest, workers_here)
     except BaseException as error:
-        for process in set(multiprocessing.active_children()) - before:
-            process.kill()
+        _end(pool, workers_here or set(multiprocessing.active_children()) - before)
         if isinstance(error, BrokenProcessPool):
             raise InputError(
                 f"one of {count} worker processes was killed, perhaps for want of memory; try "
@@ -92,14 +97,45 @@ def process_map(
             os.environ.pop(name, None)
 
 
+def _end(pool: ProcessPoolExecutor, workers: Iterable[BaseProcess]) -> None:
+    """Kill the workers, and let the pool see it.
+
+    A worker that is killed while it writes leaves part of a result, for whose rest the pool would
+    wait for ever: with the pool's own, unused end of the pipe closed, the part is the last.
+    """
+    for process in workers:
+        process.kill()
+    results = getattr(pool, "_result_queue", None)
+    if results is not None:
+        results._writer.close()
+
+
 def _in_order(
-    pool: ProcessPoolExecutor, pending: deque[Future[Any]], rest: Iterator[Any]
+    pool: ProcessPoolExecutor,
+    pending: deque[Future[Any]],
+    rest: Iterator[Any],
+    workers: Sequence[BaseProcess],
 ) -> Iterator[Any]:
     """Results in order; a task is submitted for each that is taken, which bounds their memory."""
     while pending:
-        result = pending.popleft().result()
+        result = _result(pending.popleft(), workers)
         pending.extend(pool.submit(_call, item) for item in islice(rest, 1))
         yield result
+
+
+def _result(future: Future[Any], workers: Sequence[BaseProcess]) -> Any:
+    """The result of a task; `BrokenProcessPool` where a worker has died and nothing comes.
+
+    The pool itself does not notice a worker that died while it wrote a result.
+    """
+    while True:
+        done, _ = futures_wait([future], timeout=GRACE)
+        if done:
+            return future.result()
+        if not all(process.is_alive() for process in workers):
+            done, _ = futures_wait([future], timeout=GRACE)
+            if not done:
+                raise BrokenProcessPool
 
 
 #: The function of this worker process.

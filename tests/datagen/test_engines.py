@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -176,3 +177,47 @@ def test_interruption_ends_all_processes_with_one_line(tmp_path, out, engine):
     else:
         assert "no output was written" in said
         assert [file.name for file in tmp_path.iterdir()] == ["recipe.toml"]
+
+
+@pytest.fixture
+def no_endless_wait():
+    """Ends a test that waits for ever."""
+
+    def end(number, frame):
+        raise AssertionError("the pool waits for ever")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def large_result(number):
+    return bytes(20_000_000)
+
+
+@pytest.mark.slow
+def test_workers_killed_while_they_write_are_not_waited_for(no_endless_wait):
+    for _ in range(10):
+        with pytest.raises(KeyboardInterrupt), process_map(large_result, range(40), 2) as results:
+            next(results)
+            raise KeyboardInterrupt
+        assert not multiprocessing.active_children()
+
+
+def killed_while_writing(delay):
+    threading.Timer(delay, os.kill, (os.getpid(), signal.SIGKILL)).start()
+    return bytes(200_000_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.03, 0.06, 0.09, 0.12])
+def test_a_worker_that_dies_while_it_writes_is_told(no_endless_wait, delay):
+    with (
+        pytest.raises(InputError, match="worker processes was killed"),
+        process_map(killed_while_writing, [delay] * 8, 2) as results,
+    ):
+        for _ in results:
+            pass
+    assert not multiprocessing.active_children()
