@@ -76,7 +76,12 @@ _ALL = (
         "angle", "theta", "rad", "place on the rim, from straight down; rotation of a shear ring"
     ),
     Quantity("normal", "sigma_s", "Pa", "normal stress that a sensor on the rim reads"),
-    Quantity("wheel", "", "-", "which wheel of a rover: front or rear"),
+    Quantity(
+        "wheel",
+        "",
+        "-",
+        "which wheel of a rover, by its name in [rover.wheels]; front or rear for climb",
+    ),
     Quantity("test", "", "-", "name of the plate or shear test"),
     Quantity("plate_radius", "", "m", "radius of the round plate that was pressed into the soil"),
     Quantity("plate_width", "b", "m", "width of the plate, its smaller dimension"),

@@ -30,6 +30,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/gap/html/svg_image.py": {"matplotlib"},
     "soilml/gap/html/prediction_curves.py": {"matplotlib"},
     "soilml/traction/plot.py": {"matplotlib"},
+    "soilml/traction/rover/plot.py": {"matplotlib"},
     "soilml/optional_imports.py": {"tomli"},  # before Python 3.11
 }
 

@@ -19,6 +19,7 @@ from soilml.config.model_settings import (
     take_priors,
 )
 from soilml.config.sensor_bias import take_bias
+from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
@@ -51,6 +52,8 @@ class Case:
         effect replaces a shared one of the same name. Empty where there is one gear.
     bias
         Errors that all readings of a sensor share, by column name: `torque_Nm`, `slip`.
+    rover
+        The vehicle on such gears, where the file describes it.
     """
 
     model: Model
@@ -60,6 +63,7 @@ class Case:
     discrepancy: dict[str, Discrepancy] = field(default_factory=dict)
     gears: dict[str, Model] = field(default_factory=dict)
     bias: dict[str, Noise] = field(default_factory=dict)
+    rover: WheeledRover | None = None
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value.
@@ -143,7 +147,7 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
     ----------
     path
         The file: tables [gear] or several [gears.NAME], [soil] with [soil.prior], [[effect]],
-        [noise] and [discrepancy].
+        [noise], [discrepancy] and [rover].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
 
@@ -247,7 +251,8 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
     discrepancy = take_discrepancy(settings.table("discrepancy"))
-    return Case(model, own_soil, prior, noise, discrepancy, gears)
+    rover = take_rover(settings.table("rover"), gears) if "rover" in settings else None
+    return Case(model, own_soil, prior, noise, discrepancy, gears, rover=rover)
 
 
 def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.config.wheeled_rover import WheeledRover
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.effects import Effect
@@ -42,6 +45,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         lines += ["", "[discrepancy]"]
         settings = discrepancy_as_settings(case.discrepancy)
         lines += [f"{key} = {_setting(value)}" for key, value in settings.items()]
+    if case.rover is not None:
+        lines += ["", *_rover_lines(case.rover)]
     for effect in case.model.effects:
         lines += ["", *_effect_lines(case, effect, "effect", effect.name)]
     return "\n".join(lines) + "\n"
@@ -68,6 +73,23 @@ def _gear_lines(gear: Gear) -> list[str]:
     braking = getattr(gear, "braking", RigidWheel.braking)
     law = [f'braking = "{braking}"'] if braking != RigidWheel.braking else []
     return [f'type = "{gear.name}"', *dimensions, *law]
+
+
+def _rover_lines(rover: WheeledRover) -> list[str]:
+    lines = ["[rover]", f"mass = {_number(rover.mass)}"]
+    lines += [f"centre_of_mass = {_setting(list(rover.centre_of_mass))}"]
+    lines += [f"gravity = {_number(rover.gravity)}", "", "[rover.wheels]"]
+    for name, wheel in rover.wheels.items():
+        own = {"position": [wheel.forward, wheel.left]}
+        lines.append(
+            f"{_key(name)} = {_setting(own | ({'gear': wheel.gear} if wheel.gear else {}))}"
+        )
+    return lines
+
+
+def _key(name: str) -> str:
+    """A name as a bare key where TOML permits it, else in quotes."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name)
 
 
 def _effect_lines(case: Case, effect: Effect, table: str, path: str) -> list[str]:

@@ -9,21 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.observations import read_observations
 from soilml.identification.data.operating_points import operating_points
-from soilml.identification.diagnostics import EXCESS_RESIDUALS
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 from soilml.traction.by_load import LoadPrediction, measured_loads, predictions_by_load, slip_grid
+from soilml.traction.measured_soil import measured_soil
 from soilml.traction.messages import MeasuredRange, limitations
-from soilml.traction.onboard_draws import onboard_draws
 from soilml.traction.pull_and_slope import EXCLUDED_KINDS
 from soilml.traction.pull_discrepancy import draw_pull_discrepancy
-from soilml.traction.soil_draws import posterior_draws, prior_draws
+from soilml.traction.soil_draws import prior_draws
 
 Floats = NDArray[np.float64]
 
@@ -93,28 +89,8 @@ def pull_report(
     FitError, TableError
         As `identify` with the posterior method.
     """
-    warnings: list[str] = []
-    noise_scale = None
-    if estimator is None:
-        unknown = select_free(case, free)
-        data = read_observations(case, table)
-        posterior = posterior_draws(case, data, unknown)
-        draws, noise_scale = posterior.draws, posterior.samples.noise_scale
-        warnings += data.notes
-        if [c.name for c in data.channels] == ["torque"]:
-            warnings.append(
-                "torque alone hardly reveals errors of the model: measure pull or sinkage too"
-            )
-        if posterior.samples.noise_inflated:
-            allowed = f"{EXCESS_RESIDUALS}{' and discrepancy' if case.discrepancy else ''}"
-            warnings.append(
-                f"residuals are {posterior.samples.noise_scale:.1f} {allowed}: the model lacks an "
-                "effect or the noise is understated; bands are widened and may be biased"
-            )
-    else:
-        check_wheel_size(case, table)
-        unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
-        warnings += notes
+    soil = measured_soil(case, table, free, estimator)
+    draws, unknown, warnings = soil.draws, soil.unknown, list(soil.warnings)
     excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
     if excluded:
         warnings.append(f"effects of rig and sensors are excluded: {', '.join(excluded)}")
@@ -128,7 +104,7 @@ def pull_report(
     }
     loads = measured_loads(table["load_N"]) if loads is None else loads
     slip = slip_grid(slip_limit, measured_range)
-    error = draw_pull_discrepancy(case, table, draws, loads, slip, noise_scale=noise_scale)
+    error = draw_pull_discrepancy(case, table, draws, loads, slip, noise_scale=soil.noise_scale)
     predictions = predictions_by_load(
         case, draws, prior_draws(unknown), loads, slip, measured_range, covariates, error
     )

@@ -35,6 +35,13 @@ component of its load normal to the slope and pulls the component along it. The
 bands include errors of the model where [discrepancy] states that of the pull,
 but neither load transfer nor side slopes.
 
+A model file with [rover] answers for the whole rover, unless --load or --gear
+names one wheel: the slip that slopes need, the margin of pull, the work of the
+wheels for each metre, the steepest slope and the best slip, with the load of
+each wheel on the slope. --gravity moves it to another planet.
+
+  soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
+
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. A value with a warning that it is not known is no more accurate
 than the prior. The CSV file has a row for each load and slip, in SI units.
@@ -50,6 +57,10 @@ def add(parser: argparse.ArgumentParser) -> None:
         "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
     )
     parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
+    parser.add_argument("--slope", metavar="A,B,...", help="slopes of a rover in degrees")
+    parser.add_argument(
+        "--gravity", metavar="G", help="gravity of a rover: earth, moon, mars, or in m/s^2"
+    )
     parser.add_argument("--slip-limit", type=float, metavar="S", help="largest slip considered")
     parser.add_argument(
         "--free", metavar="A,B,...", help="unknown parameters (default: those with a prior)"

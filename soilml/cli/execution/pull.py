@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from soilml.cli.option_values import available_effects, parse_names, parse_numbers, read_rows
 from soilml.cli.output import is_terminal, write_stdout
-from soilml.config.case import read_case_of_one_gear
+from soilml.config.case import Case, read_case, read_case_of_one_gear
+from soilml.config.wheeled_rover import read_gravity
 from soilml.errors import FitError, InputError
 from soilml.io.atomic_files import atomic_outputs
 from soilml.io.read_table import RUNS
+from soilml.io.table import Table
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 
 if TYPE_CHECKING:
     from soilml.numerics.quantile_band import QuantileBand
+    from soilml.onboard.estimator import Estimator
     from soilml.traction.by_load import LoadPrediction
     from soilml.traction.report import PullReport
+
+Report = TypeVar("Report")
 
 #: The printed curve has every second slip; largest number of loads.
 PRINTED_STEP, MAX_LOADS = 2, 8
@@ -33,24 +39,78 @@ def run(args: argparse.Namespace) -> int:
     from soilml.traction.report import pull_report
 
     _check(args)
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     table = read_rows(args, RUNS)
+    if args.load is None and args.gear is None:
+        whole = read_case(args.model, available_effects(args))
+        if whole.rover is not None:
+            return _run_rover(args, whole, table)
+    for option in ("slope", "gravity"):
+        if getattr(args, option) is not None:
+            raise InputError(
+                f"--{option} needs a model file with [rover], and neither --load nor --gear"
+            )
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     options: dict[str, Any] = {
         "loads": None if args.load is None else parse_numbers("--load", args.load).tolist(),
         "slip_limit": args.slip_limit,
         "free": parse_names(args.free),
+        "estimator": _estimator(args),
     }
     if len(options["loads"] or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(options['loads'])} loads; at most {MAX_LOADS}")
-    if args.trained is not None:
-        need("onnxruntime", "pull")
-        from soilml.onboard.estimator import Estimator
+    found, failed = _by_group(args, table, lambda rows: pull_report(case, rows, **options))
+    _write(args, found)
+    _tell_failed(args, failed)
+    return 0
 
-        options["estimator"] = Estimator.load(args.trained)
+
+def _run_rover(args: argparse.Namespace, case: Case, table: Table) -> int:
+    """The same for a whole rover."""
+    from soilml.cli.rover_text import rover_columns, rover_text
+    from soilml.traction.rover.report import rover_report, with_gravity
+
+    if args.gravity is not None:
+        case = with_gravity(case, read_gravity(args.gravity))
+    slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
+    options: dict[str, Any] = {"slopes": slopes, "slip_limit": args.slip_limit}
+    options |= {"free": parse_names(args.free), "estimator": _estimator(args)}
+    found, failed = _by_group(args, table, lambda rows: rover_report(case, rows, **options))
+    parts = [
+        ({args.by: np.full(len(report.performance.slope), name)} if args.by else {})
+        | rover_columns(report)
+        for name, report in found.items()
+    ]
+    text = csv_text({key: np.concatenate([part[key] for part in parts]) for key in parts[0]})
+    rover = case.rover
+    assert rover is not None
+    with atomic_outputs(args.outputs(args)) as files:
+        for part in files:
+            if args.picture is not None and part == files[-1]:
+                from soilml.traction.rover.plot import save_figure
+
+                save_figure(found[""], part)
+            else:
+                part.write_text(text, encoding="utf-8")
+    heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
+    if args.out is None and not is_terminal():
+        write_stdout(text)
+        for name, report in found.items():
+            for line in report.warnings:
+                print(f"{heads[name]}{line}", file=sys.stderr)
+    else:
+        print("\n\n".join(heads[name] + rover_text(rover, r) for name, r in found.items()))
+    _tell_failed(args, failed)
+    return 0
+
+
+def _by_group(
+    args: argparse.Namespace, table: Table, answer: Callable[[Table], Report]
+) -> tuple[dict[str, Report], dict[str, str]]:
+    """The answer for each group of --by that has one, and why the others have none."""
     found, failed = {}, {}
     for name, rows in [("", table)] if args.by is None else table.groups(args.by):
         try:
-            found[name] = pull_report(case, rows, **options)
+            found[name] = answer(rows)
         except FitError as error:
             if args.by is None:
                 raise
@@ -58,10 +118,22 @@ def run(args: argparse.Namespace) -> int:
     if not found:
         name, why = next(iter(failed.items()))
         raise FitError(f"no {args.by} has a result; {args.by} {name}: {why}")
-    _write(args, found)
+    return found, failed
+
+
+def _tell_failed(args: argparse.Namespace, failed: dict[str, str]) -> None:
     for name, why in failed.items():
         print(f"{args.by} {name} has no result: {why}", file=sys.stderr)
-    return 0
+
+
+def _estimator(args: argparse.Namespace) -> Estimator | None:
+    """The trained file of --from."""
+    if args.trained is None:
+        return None
+    need("onnxruntime", "pull")
+    from soilml.onboard.estimator import Estimator
+
+    return Estimator.load(args.trained)
 
 
 def _check(args: argparse.Namespace) -> None:

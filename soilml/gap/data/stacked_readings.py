@@ -13,6 +13,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.identification.data.levels import Levels, load_levels, rows_driven_alike, slip_levels
 from soilml.identification.data.observations import declared_std
 from soilml.identification.data.operating_points import gear_numbers, operating_points
+from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
@@ -150,6 +151,7 @@ def stack_readings(case: Case, table: Table) -> StackedReadings:
     Noise is that of `<column>_std`, else of [noise] in the case; a standard deviation that is not
     positive counts as undeclared.
     """
+    table = with_rover_columns(case, table)
     names = tuple(
         name
         for name in CHANNELS

@@ -11,6 +11,7 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.data.operating_points import operating_points, operating_points_of_rows
+from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
@@ -99,6 +100,7 @@ def read_observations(case: Case, table: Table) -> Observations:
     FitError
         Where no row or no reading remains, or all standard deviations of a channel are zero.
     """
+    table = with_rover_columns(case, table)
     dropped = int(np.count_nonzero(~table.answered))
     if dropped == len(table):
         raise FitError(f"{table.source}: no row has the status ok")

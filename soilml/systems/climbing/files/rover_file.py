@@ -44,6 +44,11 @@ def read_rover(path: str | os.PathLike[str]) -> RoverFile:
     """Read [rover], [soil] and [noise]; raises `InputError` naming file, table and key."""
     settings = read_settings(path)
     own = settings.table("rover")
+    if "wheels" in own:
+        own.fail(
+            "a rover by its wheels is for soilml pull; climb needs mass, radius and width of four "
+            "equal wheels"
+        )
     names = [f.name for f in fields(Rover)]
     needed = ("mass", "radius", "width")
     values = {name: own.number(name) for name in names if name in own or name in needed}

@@ -1,0 +1,209 @@
+"""A rover by its wheels: where they stand, what they carry on a slope, whose rut they run in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.io.toml_settings import Settings
+from soilml.parameters import Parameter
+from soilml.physics.model import Model
+
+Floats = NDArray[np.float64]
+
+#: Gravity by name, m/s^2: standard gravity (BIPM 2019), and the equatorial surface values of the
+#: Moon and Mars (NASA planetary fact sheets).
+GRAVITY = {"earth": 9.80665, "moon": 1.62, "mars": 3.71}
+#: Loads below this share of the mean one count as a wheel that leaves the ground.
+LEAST_LOAD_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class RoverWheel:
+    """A wheel: place of its contact (m; forward, to the left), and its gear's name or None."""
+
+    forward: float
+    left: float
+    gear: str | None = None
+
+
+@dataclass(frozen=True)
+class WheeledRover:
+    """Driven wheels under a rigid body; all rims have one speed, and so all wheels one slip.
+
+    Attributes
+    ----------
+    mass
+        Of the whole rover, kg.
+    centre_of_mass
+        Forward, to the left, and above the ground, m, in the frame of the wheels.
+    wheels
+        By name.
+    gravity
+        m/s^2.
+
+    Examples
+    --------
+    >>> wheels = {"front": RoverWheel(0.5, 0.0), "rear": RoverWheel(-0.5, 0.0)}
+    >>> rover = WheeledRover(10.0, (0.0, 0.0, 0.25), wheels, gravity=10.0)
+    >>> rover.loads(0.0).round(1).tolist()  # N
+    [50.0, 50.0]
+    >>> rover.loads(np.deg2rad(20.0)).round(1).tolist()
+    [38.4, 55.5]
+    """
+
+    mass: float
+    centre_of_mass: tuple[float, float, float]
+    wheels: Mapping[str, RoverWheel]
+    gravity: float = GRAVITY["earth"]
+
+    @property
+    def weight(self) -> float:
+        """Weight, N."""
+        return self.mass * self.gravity
+
+    def loads(self, slope: Any) -> Floats:
+        r"""Load perpendicular to the ground on each wheel, N (wheels, ...), straight up a slope.
+
+        .. math::
+            \sum W_i = m g \cos\alpha, \quad \sum W_i x_i = m g (x_c \cos\alpha - h \sin\alpha),
+            \quad \sum W_i y_i = m g\, y_c \cos\alpha
+
+        at constant speed, with the offset of the wheel forces from the wheel's middle neglected. Of
+        the loads that balance, those of the least sum of squares: those of equally stiff wheels
+        under a rigid body. A suspension that shares the load otherwise is not described.
+
+        Raises
+        ------
+        InputError
+            Where wheels in one line do not carry the moment, or a wheel would leave the ground.
+        """
+        slope = np.asarray(slope, dtype=np.float64)
+        x, y, height = self.centre_of_mass
+        across, along = np.cos(slope), np.sin(slope)
+        places = np.asarray([(1.0, w.forward, w.left) for w in self.wheels.values()]).T
+        needed = self.weight * np.stack([across, x * across - height * along, y * across])
+        loads = np.tensordot(np.linalg.pinv(places), needed, axes=1)
+        missing = np.tensordot(places, loads, axes=1) - needed
+        if np.abs(missing).max() > 1e-9 * self.weight * max(1.0, np.abs(places).max()):
+            raise InputError(
+                "[rover]: wheels in one line do not carry a centre of mass beside it; check "
+                "centre_of_mass and the positions of the wheels"
+            )
+        least = LEAST_LOAD_SHARE * self.weight / len(self.wheels)
+        for name, own in zip(self.wheels, loads, strict=True):
+            if np.any(own < least):
+                steepest = float(np.rad2deg(np.min(slope[own < least])))
+                raise InputError(
+                    f"[rover]: the wheel {name} leaves the ground on a slope of {steepest:.3g} "
+                    "deg; check centre_of_mass and the positions of the wheels"
+                )
+        return np.asarray(loads)
+
+    def tipping_slope(self, largest: float) -> float:
+        """The slope (rad), up to `largest`, at which the first wheel leaves the ground."""
+        low, high = 0.0, largest
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            try:
+                self.loads(middle)
+                low = middle
+            except InputError:
+                high = middle
+        return low
+
+    def pass_numbers(self, width: Mapping[str, float]) -> dict[str, int]:
+        """Pass of each wheel: 1, and 1 more for each wheel ahead of it whose rut it runs in.
+
+        `width` (m) of each wheel tells which ruts overlap.
+        """
+        return {
+            name: 1
+            + sum(
+                other.forward > wheel.forward
+                and abs(other.left - wheel.left) < 0.5 * (width[name] + width[ahead])
+                for ahead, other in self.wheels.items()
+            )
+            for name, wheel in self.wheels.items()
+        }
+
+
+_MASS = Parameter("kg", 0.01, 1e5, "mass of the whole rover")
+_GRAVITY = Parameter("m/s^2", 0.01, 30.0, "gravity")
+
+
+def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
+    """Read `[rover]`: mass, centre_of_mass, gravity and [rover.wheels].
+
+    Raises `InputError` for a missing or misspelt key, a value out of bounds, an unknown gear, or
+    fewer than two wheels.
+    """
+    if "wheels" not in settings and "radius" in settings:
+        settings.fail(
+            "a rover of four equal wheels is for soilml climb; here each wheel stands in "
+            "[rover.wheels], as front-left = { position = [0.4, 0.3] }"
+        )
+    mass = _bounded(settings, "mass", settings.number("mass"), _MASS)
+    centre = _place(settings, "centre_of_mass", 3, "[forward, left, height] in m")
+    gravity = read_gravity(settings.take("gravity", (int, float, str), _NEEDED, "earth"), settings)
+    entries = settings.table("wheels")
+    wheels = {}
+    for name in entries.content:
+        own = entries.table(name)
+        forward, left = _place(own, "position", 2, "[forward, left] in m")
+        gear = own.text("gear", "") or None
+        if gear is not None and gear not in gears:
+            known = ", ".join(gears) or "none; write [gears.NAME] in place of [gear]"
+            own.fail(f"gear is {gear!r}; gears of this file: {known}")
+        own.finish()
+        wheels[name] = RoverWheel(forward, left, gear)
+    if len(wheels) < 2:
+        settings.fail(
+            "[rover.wheels] needs two wheels or more, each as "
+            "front-left = { position = [0.4, 0.3] }"
+        )
+    settings.finish()
+    return WheeledRover(mass, (centre[0], centre[1], centre[2]), wheels, gravity)
+
+
+_NEEDED = "a number in m/s^2, or one of earth, moon, mars"
+
+
+def read_gravity(value: float | str, settings: Settings | None = None) -> float:
+    """Gravity (m/s^2) from a number or a name; raises `InputError` for another."""
+    where = f"{settings.where}: " if settings is not None else ""
+    if isinstance(value, str):
+        if value.lower() in GRAVITY:
+            return GRAVITY[value.lower()]
+        try:
+            value = float(value)
+        except ValueError:
+            raise InputError(f"{where}gravity is {value!r}; needed is {_NEEDED}") from None
+    if not _GRAVITY.lower <= value <= _GRAVITY.upper:
+        raise InputError(
+            f"{where}gravity is {value:g} m/s^2; needed is {_GRAVITY.lower:g} to {_GRAVITY.upper:g}"
+        )
+    return float(value)
+
+
+def _bounded(settings: Settings, key: str, value: float, bounds: Parameter) -> float:
+    if not bounds.lower <= value <= bounds.upper:
+        settings.fail(
+            f"{key} is {value:g} {bounds.unit}; needed is {bounds.lower:g} to {bounds.upper:g}"
+        )
+    return value
+
+
+def _place(settings: Settings, key: str, count: int, needed: str) -> tuple[float, ...]:
+    values = settings.take(key, list, needed)
+    numbers = [v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)]
+    if len(values) != count or len(numbers) != count or not np.isfinite(numbers).all():
+        settings.fail(f"{key} is {values!r}; needed is {needed}")
+    if max(abs(v) for v in numbers) > 100.0:
+        settings.fail(f"{key} is {values!r}; needed are lengths in m, up to 100")
+    return tuple(float(v) for v in numbers)

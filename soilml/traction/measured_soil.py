@@ -1,0 +1,57 @@
+"""Draws of the soil that rows were measured on: by the posterior, or by a trained file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from soilml.config.case import Case
+from soilml.identification.compatibility import check_wheel_size
+from soilml.identification.data.observations import read_observations
+from soilml.identification.diagnostics import EXCESS_RESIDUALS
+from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.io.table import Table
+from soilml.onboard.estimator import Estimator
+from soilml.traction.onboard_draws import onboard_draws
+from soilml.traction.soil_draws import SoilDraws, posterior_draws
+
+
+@dataclass(frozen=True)
+class MeasuredSoil:
+    """Draws of the soil, the parameters that were unknown, and warnings.
+
+    `noise_scale` is the factor on the declared noise; None for the estimate of a trained file.
+    """
+
+    draws: SoilDraws
+    unknown: Sequence[FreeParameter]
+    warnings: tuple[str, ...]
+    noise_scale: float | None
+
+
+def measured_soil(
+    case: Case,
+    table: Table,
+    free: Sequence[str] | None = None,
+    estimator: Estimator | None = None,
+) -> MeasuredSoil:
+    """The soil of the rows of a table; raises as `pull_report` does."""
+    if estimator is not None:
+        check_wheel_size(case, table)
+        unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
+        return MeasuredSoil(draws, unknown, tuple(notes), None)
+    unknown = select_free(case, free)
+    data = read_observations(case, table)
+    posterior = posterior_draws(case, data, unknown)
+    warnings = list(data.notes)
+    if [c.name for c in data.channels] == ["torque"]:
+        warnings.append(
+            "torque alone hardly reveals errors of the model: measure pull or sinkage too"
+        )
+    if posterior.samples.noise_inflated:
+        allowed = f"{EXCESS_RESIDUALS}{' and discrepancy' if case.discrepancy else ''}"
+        warnings.append(
+            f"residuals are {posterior.samples.noise_scale:.1f} {allowed}: the model lacks an "
+            "effect or the noise is understated; bands are widened and may be biased"
+        )
+    return MeasuredSoil(posterior.draws, unknown, tuple(warnings), posterior.samples.noise_scale)

@@ -1,0 +1,206 @@
+"""What a rover does on slopes of a soil that is known by draws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.identification.data.rover_rows import wheel_passes
+from soilml.numerics.root_finding import rising_root
+from soilml.traction.rover.wheel_curves import WheelCurves, wheel_curves
+from soilml.traction.soil_draws import SoilDraws
+
+Floats = NDArray[np.float64]
+
+#: Steepest slope that is looked at, rad (60 degrees).
+LARGEST_SLOPE = np.deg2rad(60.0)
+#: Slips below the first of a grid, as shares of it: pull rises steeply there.
+FIRST_SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)
+
+
+@dataclass(frozen=True)
+class RoverPerformance:
+    """A rover straight up m slopes at constant speed, for n draws of the soil.
+
+    Attributes
+    ----------
+    slope
+        Slopes (m,), rad.
+    slip
+        Slip that the slope needs, (n, m); NaN where no slip up to the limit suffices.
+    margin
+        Largest pull up to the slip limit less the weight along the slope, N (n, m).
+    energy
+        Mechanical work of the wheels for each metre of travel, J/m (n, m).
+    loads
+        Of each wheel, N (m,).
+    torque, sinkage
+        Of each wheel at the needed slip, N m and m (n, m).
+    passes
+        Pass of each wheel.
+    steepest_slope
+        Of each draw, rad (n,); NaN where the rover does not move on level ground.
+    best_slip
+        Slip of the best ratio of pulling power to wheel power on level ground, (n,).
+    slip_limit
+        Highest slip considered.
+    """
+
+    slope: Floats
+    slip: Floats
+    margin: Floats
+    energy: Floats
+    loads: Mapping[str, Floats]
+    torque: Mapping[str, Floats]
+    sinkage: Mapping[str, Floats]
+    passes: Mapping[str, int]
+    steepest_slope: Floats
+    best_slip: Floats
+    slip_limit: float
+
+    @property
+    def climbed(self) -> Floats:
+        """Probability that each slope is climbed, (m,)."""
+        return np.asarray(np.mean(self.margin >= 0.0, axis=0))
+
+
+def rover_performance(
+    case: Case,
+    draws: SoilDraws,
+    slopes: Floats,
+    slip: Floats,
+    speed: float | None = None,
+) -> RoverPerformance:
+    r"""Slip, margin, energy, torque and sinkage on slopes, and the steepest slope.
+
+    .. math:: \sum_i DP_i(s, W_i(\alpha)) = m g \sin\alpha
+
+    at the least slip s that all wheels share, since their rims have one speed.
+
+    Parameters
+    ----------
+    case
+        With a rover, see `WheeledRover`.
+    draws
+        Draws (n, p) of the soil.
+    slopes
+        Slopes (m,) from 0 to 60 degrees, rad.
+    slip
+        Increasing slips up to the limit.
+    speed
+        Travel speed, m/s, where an effect needs it.
+
+    Raises
+    ------
+    InputError
+        For a slope outside these bounds, on which a wheel leaves the ground, or under which more
+        than half of the draws do not carry a wheel.
+
+    Notes
+    -----
+    Does not hold across a slope, in turns, for a suspension that shares the load otherwise than
+    equal springs, nor where the slope itself is close to sliding. Soil parameters are taken as
+    they are: whether those measured under one gravity hold under another is not known.
+
+    References
+    ----------
+    Wong, Theory of Ground Vehicles, chapters 2 and 3.
+    """
+    rover = case.rover
+    if rover is None:
+        raise InputError("the model file has no [rover]")
+    if not np.all((slopes >= 0.0) & (slopes <= LARGEST_SLOPE)):
+        raise InputError("slopes of a rover must lie between 0 and 60 degrees")
+    slip = np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
+    names, on_slope = list(rover.wheels), []
+    for slope in slopes:
+        curves = wheel_curves(case, draws, np.asarray(slope), slip, speed)
+        if np.mean(~np.isfinite(curves.total_pull[:, 0])) > 0.5:
+            heaviest = float(rover.loads(float(slope)).max())
+            raise InputError(
+                f"the soil does not carry a wheel of {heaviest:.4g} N; check [rover], kphi and n"
+            )
+        on_slope.append(_at_needed_slip(curves, slip, rover.weight * np.sin(slope)))
+    joined = {key: np.stack([one[key] for one in on_slope], axis=-1) for key in on_slope[0]}
+    loads = rover.loads(slopes)
+    level = wheel_curves(case, draws, np.zeros(1), slip, speed)
+    return RoverPerformance(
+        slope=slopes,
+        slip=joined["slip"],
+        margin=joined["margin"],
+        energy=joined["energy"],
+        loads=dict(zip(names, loads, strict=True)),
+        torque=dict(zip(names, joined["torque"], strict=True)),
+        sinkage=dict(zip(names, joined["sinkage"], strict=True)),
+        passes=wheel_passes(case),
+        steepest_slope=_steepest(case, draws, slip, speed, level),
+        best_slip=_best_slip(level, slip),
+        slip_limit=float(slip[-1]),
+    )
+
+
+def _at_needed_slip(curves: WheelCurves, slip: Floats, needed: float) -> dict[str, Floats]:
+    """What holds at the least slip whose pull is the needed one (N), each with n draws."""
+    pull = curves.total_pull
+    enough = np.nan_to_num(pull, nan=-np.inf) >= needed
+    index = np.argmax(enough, axis=1)
+    known = enough.any(axis=1)
+    draw = np.arange(len(pull))
+    before = np.maximum(index - 1, 0)
+    low, high = pull[draw, before], pull[draw, index]
+    rise = np.where(high > low, high - low, 1.0)
+    share = np.where(index > 0, (needed - low) / rise, 1.0)
+
+    def between(values: Floats) -> Floats:
+        """Values (..., n, m) interpolated at the needed slip, (..., n)."""
+        start, end = values[..., draw, before], values[..., draw, index]
+        return np.asarray(np.where(known, start + share * (end - start), np.nan))
+
+    return {
+        "slip": between(np.broadcast_to(slip, pull.shape)),
+        "margin": np.where(np.isfinite(pull).any(axis=1), _largest(pull) - needed, np.nan),
+        "energy": between(curves.energy(slip)),
+        "torque": between(curves.torque),
+        "sinkage": between(curves.sinkage),
+    }
+
+
+def _best_slip(curves: WheelCurves, slip: Floats) -> Floats:
+    """Slip of the largest ratio of pull to work for each metre, (n,)."""
+    ratio = np.nan_to_num(curves.total_pull / curves.energy(slip), nan=-np.inf)
+    return np.where(ratio.max(axis=1) > 0.0, slip[np.argmax(ratio, axis=1)], np.nan)
+
+
+def _steepest(
+    case: Case, draws: SoilDraws, slip: Floats, speed: float | None, level: WheelCurves
+) -> Floats:
+    """Steepest slope of each draw, rad (n,); at most the slope where a wheel leaves the ground."""
+    rover = case.rover
+    assert rover is not None
+    share = _largest(level.total_pull) / rover.weight
+    moving = np.flatnonzero(share > 0.0)
+    steepest = np.full(len(share), np.nan)
+    if not moving.size:
+        return steepest
+    own = SoilDraws(draws.names, draws.values[moving])
+
+    def excess(slope: Floats) -> Floats:
+        """Weight along the slope less the largest pull there, over the weight."""
+        pull = wheel_curves(case, own, slope, slip, speed).total_pull
+        return np.asarray(np.sin(slope) - _largest(pull) / rover.weight)
+
+    end = np.full(moving.size, rover.tipping_slope(float(LARGEST_SLOPE)))
+    guess = np.arcsin(np.clip(share[moving], 0.0, np.sin(end)))
+    root = rising_root(excess, np.zeros(moving.size), end, guess, np.ones(moving.size))
+    steepest[moving] = root.x
+    return steepest
+
+
+def _largest(pull: Floats) -> Floats:
+    """The largest pull of each draw up to the slip limit, N (n,); below any where none is."""
+    return np.asarray(np.nan_to_num(pull, nan=-np.inf).max(axis=1))

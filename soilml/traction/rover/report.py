@@ -1,0 +1,144 @@
+"""A rover's performance on the soil of measured rows, with warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.config.wheeled_rover import GRAVITY
+from soilml.errors import InputError
+from soilml.identification.data.rover_rows import with_rover_columns
+from soilml.io.table import Table
+from soilml.onboard.estimator import Estimator
+from soilml.quantities import column
+from soilml.traction.by_load import slip_grid
+from soilml.traction.measured_soil import measured_soil
+from soilml.traction.messages import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange
+from soilml.traction.pull_and_slope import EXCLUDED_KINDS
+from soilml.traction.rover.performance import LARGEST_SLOPE, RoverPerformance, rover_performance
+from soilml.traction.soil_draws import SoilDraws, prior_draws
+
+Floats = NDArray[np.float64]
+
+#: Slopes that are looked at by default, rad.
+SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])
+#: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
+EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
+
+
+@dataclass(frozen=True)
+class RoverReport:
+    """A rover's performance by the posterior, the steepest slope by the prior (rad), warnings."""
+
+    rows: int
+    measured_range: MeasuredRange
+    performance: RoverPerformance
+    prior_steepest: Floats
+    warnings: tuple[str, ...]
+
+
+def rover_report(
+    case: Case,
+    table: Table,
+    *,
+    free: Sequence[str] | None = None,
+    slopes: Floats | None = None,
+    slip_limit: float | None = None,
+    estimator: Estimator | None = None,
+) -> RoverReport:
+    """Performance of the case's rover on the soil that the rows were measured on.
+
+    Parameters
+    ----------
+    case
+        With a rover. `soilml.config.case.Case` describes the rest.
+    table
+        Measured rows of one soil. A column `wheel` that names wheels of the rover stands for the
+        gear and the pass of its rows.
+    free
+        Paths of the unknown parameters; by default those with a prior.
+    slopes
+        From 0 to 60 degrees, rad; by default 0 to 20 degrees in steps of 5, where all wheels stay
+        on the ground.
+    slip_limit
+        Highest slip; by default the highest measured one, at least 0.6.
+    estimator
+        Trained estimator whose estimate replaces the posterior.
+
+    Raises
+    ------
+    InputError
+        As `rover_performance` does, or for a slip limit outside (0, 1).
+    FitError, TableError
+        As `identify` with the posterior method.
+    """
+    if case.rover is None:
+        raise InputError("the model file has no [rover]")
+    if slopes is None:
+        tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
+        slopes = SLOPES[tipping >= SLOPES]
+    table = with_rover_columns(case, table)
+    soil = measured_soil(case, table, free, estimator)
+    table = table.rows(table.answered)
+    measured = MeasuredRange.of(table["slip"], table["load_N"])
+    slip = slip_grid(slip_limit, measured)
+    key = column("speed")
+    speed = float(np.nanmedian(table[key])) if key in table else None
+    found = rover_performance(case, soil.draws, slopes, slip, speed)
+    before = _steepest_before(case, prior_draws(soil.unknown), slip, speed)
+    warnings = (*soil.warnings, *_warnings(case, found, measured))
+    return RoverReport(len(table), measured, found, before, warnings)
+
+
+def with_gravity(case: Case, gravity: float) -> Case:
+    """The case with its rover under another gravity, m/s^2."""
+    if case.rover is None:
+        raise InputError("--gravity needs a model file with [rover]")
+    return replace(case, rover=replace(case.rover, gravity=gravity))
+
+
+def _steepest_before(case: Case, draws: SoilDraws, slip: Floats, speed: float | None) -> Floats:
+    """Steepest slope by the prior, (n,); NaN where most of its soils do not carry the rover."""
+    try:
+        return rover_performance(case, draws, np.zeros(1), slip, speed).steepest_slope
+    except InputError:
+        return np.full(len(draws.values), np.nan)
+
+
+def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> list[str]:
+    assert case.rover is not None
+    texts = []
+    loads = np.stack(list(found.loads.values()))
+    if loads.max() > LOAD_FACTOR * measured.load[1] or loads.min() < measured.load[0] / LOAD_FACTOR:
+        texts.append(
+            f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
+            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
+            "whose error is not in the bands"
+        )
+    if found.slip_limit > measured.slip[1] + SLIP_MARGIN:
+        texts.append(
+            f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up to "
+            f"{found.slip_limit:.2g}"
+        )
+    if abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
+        texts.append(
+            f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the parameters "
+            "that the rows show"
+        )
+    tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
+    if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:
+        texts.append(f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
+    excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
+    if excluded:
+        texts.append(f"effects of rig and sensors are excluded: {', '.join(excluded)}")
+    if case.discrepancy:
+        texts.append("[discrepancy] widens the soil's parameters, not the bands of the rover")
+    texts.append(
+        "bands include the uncertainty of the soil and the noise, not errors of the model; all "
+        "wheels driven at one slip, loads of equally stiff wheels, no side slope"
+    )
+    return texts

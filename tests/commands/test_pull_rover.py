@@ -1,0 +1,56 @@
+"""`soilml pull` of a whole rover: text, files, options that belong together."""
+
+import csv
+
+import pytest
+
+from soilml.cli import main
+
+ROVER = """
+[rover]
+mass = 28
+centre_of_mass = [0.0, 0.0, 0.3]
+[rover.wheels]
+front-left = { position = [0.4, 0.3] }
+front-right = { position = [0.4, -0.3] }
+rear-left = { position = [-0.4, 0.3] }
+rear-right = { position = [-0.4, -0.3] }
+"""
+RUNS = "run,slip,load_N,torque_Nm\na,0.1,40,1.513\na,0.2,80,4.826\nb,0.3,40,2.777\n"
+
+
+@pytest.fixture
+def files(model_file, tmp_path):
+    model_file.write_text(model_file.read_text() + ROVER)
+    runs = tmp_path / "runs.csv"
+    runs.write_text(RUNS)
+    return [str(model_file), str(runs)]
+
+
+def test_a_rover_is_answered_for_as_a_whole(files, tmp_path, capsys):
+    out, picture = tmp_path / "rover.csv", tmp_path / "rover.png"
+    outputs = ["--out", str(out), "--picture", str(picture)]
+    assert main(["pull", *files, "--slope", "0,8", "--gravity", "moon", *outputs]) == 0
+    said = capsys.readouterr().out
+    assert "rover of 28 kg on 4 wheels, gravity 1.62 m/s^2" in said
+    assert "steepest slope" in said and "rear-left" in said
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert [round(float(row["slope_rad"]), 3) for row in rows] == [0.0, 0.14]
+    assert float(rows[1]["slip"]) > float(rows[0]["slip"])
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_load_asks_for_one_wheel(files, tmp_path, capsys):
+    assert main(["pull", *files, "--load", "60", "--out", str(tmp_path / "wheel.csv")]) == 0
+    assert "load 60 N" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("option", [["--slope", "5"], ["--gravity", "moon"]])
+def test_options_of_a_rover_need_one(files, option, capsys):
+    assert main(["pull", *files, "--load", "60", *option]) == 2
+    assert f"{option[0]} needs a model file with [rover]" in capsys.readouterr().err
+
+
+def test_a_slope_that_no_rover_stands_on_is_refused(files, capsys):
+    assert main(["pull", *files, "--slope", "58"]) == 2
+    assert "leaves the ground on a slope of 58 deg" in capsys.readouterr().err

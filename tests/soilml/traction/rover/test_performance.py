@@ -1,0 +1,141 @@
+"""A rover on slopes: the balance of forces, ruts, gears of its own, gravity, and known soils."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Operating, Wheel, identify, read_case
+from soilml.config.wheeled_rover import RoverWheel, WheeledRover
+from soilml.errors import InputError, TableError
+from soilml.identification.data.rover_rows import with_rover_columns
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
+from soilml.physics.model import Model
+from soilml.traction.rover import rover_performance
+from soilml.traction.rover.report import rover_report, with_gravity
+from soilml.traction.soil_draws import SoilDraws
+
+NAMES = ("cohesion", "friction_angle", "shear_modulus")
+SOIL = np.asarray([900.0, 0.6, 0.012])
+FOUR = {
+    "front-left": RoverWheel(0.4, 0.3),
+    "front-right": RoverWheel(0.4, -0.3),
+    "rear-left": RoverWheel(-0.4, 0.3),
+    "rear-right": RoverWheel(-0.4, -0.3),
+}
+SLIP = np.linspace(0.025, 0.6, 24)
+SLOPES = np.deg2rad([0.0, 6.0, 12.0])
+
+
+@pytest.fixture
+def case(model_file):
+    return replace(read_case(model_file), rover=WheeledRover(28.0, (0.05, 0.0, 0.3), FOUR))
+
+
+def draws(*soils):
+    return SoilDraws(NAMES, np.asarray(soils or [SOIL]))
+
+
+def total_pull(case, slip, slope, number=(1, 1, 2, 2)):
+    """Pull of all wheels, each solved for itself, N."""
+    true = case.with_values(dict(zip(NAMES, SOIL, strict=True)))
+    at = Operating(slip=slip, load=case.rover.loads(slope), pass_number=np.asarray(number, float))
+    return float(true.model(true.soil, at).drawbar_pull.sum())
+
+
+def test_at_the_needed_slip_the_wheels_pull_the_weight_along_the_slope(case):
+    found = rover_performance(case, draws(), SLOPES, SLIP)
+    for slope, slip in zip(SLOPES, found.slip[0], strict=True):
+        weight = case.rover.weight * np.sin(slope)
+        assert total_pull(case, slip, slope) == pytest.approx(weight, abs=0.005 * case.rover.weight)
+    assert np.all(np.diff(found.slip[0]) > 0.0)
+    assert np.all(np.diff(found.energy[0]) > 0.0)
+
+
+def test_the_steepest_slope_takes_all_the_pull_there_is(case):
+    found = rover_performance(case, draws(), SLOPES, SLIP)
+    slope = float(found.steepest_slope[0])
+    pull = max(total_pull(case, slip, slope) for slip in SLIP)
+    assert pull == pytest.approx(case.rover.weight * np.sin(slope), rel=1e-6)
+    beyond = rover_performance(case, draws(), np.asarray([slope * 1.01]), SLIP)
+    assert beyond.climbed[0] == 0.0 and np.isnan(beyond.slip[0, 0]) and beyond.margin[0, 0] < 0.0
+
+
+def test_the_work_is_torque_over_the_distance_that_is_travelled(case):
+    found = rover_performance(case, draws(), SLOPES, SLIP)
+    torque = sum(found.torque[name][0] for name in FOUR)
+    assert found.energy[0] == pytest.approx(torque / 0.15 / (1.0 - found.slip[0]), rel=0.01)
+
+
+def test_a_soil_that_lets_nothing_move_has_no_slope(case):
+    found = rover_performance(case, draws([0.0, 0.05, 0.012], SOIL), SLOPES, SLIP)
+    assert np.isnan(found.steepest_slope[0]) and np.isfinite(found.steepest_slope[1])
+    assert np.all(found.climbed <= 0.5)
+
+
+def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
+    again = replace(case, model=case.model + EFFECTS["multipass"]())
+    found = rover_performance(again, draws(), SLOPES, SLIP)
+    assert found.passes == {"front-left": 1, "front-right": 1, "rear-left": 2, "rear-right": 2}
+    apart = {k: replace(w, left=2.0 * w.left) if "rear" in k else w for k, w in FOUR.items()}
+    beside = replace(again, rover=replace(case.rover, wheels=apart))
+    assert set(rover_performance(beside, draws(), SLOPES, SLIP).passes.values()) == {1}
+
+
+def test_wheels_have_gears_of_their_own(case):
+    gears = {k: Model(Wheel(radius=r, width=0.12)) for k, r in (("small", 0.1), ("large", 0.15))}
+    wheels = {k: replace(w, gear="small" if "front" in k else "large") for k, w in FOUR.items()}
+    both = replace(case, gears=gears, rover=replace(case.rover, wheels=wheels))
+    found = rover_performance(both, draws(), SLOPES, SLIP)
+    assert found.sinkage["front-left"][0, 0] > found.sinkage["rear-left"][0, 0]
+    equal = {k: replace(w, gear="large") for k, w in FOUR.items()}
+    same = replace(both, rover=replace(case.rover, wheels=equal))
+    expected = rover_performance(case, draws(), SLOPES, SLIP)
+    assert rover_performance(same, draws(), SLOPES, SLIP).slip == pytest.approx(expected.slip)
+
+
+def test_slopes_out_of_range_and_rovers_too_heavy_are_refused(case):
+    with pytest.raises(InputError, match="between 0 and 60 degrees"):
+        rover_performance(case, draws(), np.asarray([-0.1]), SLIP)
+    heavy = replace(case, rover=replace(case.rover, mass=50_000.0))
+    with pytest.raises(InputError, match="does not carry a wheel of"):
+        rover_performance(heavy, draws(), SLOPES, SLIP)
+
+
+def measured(case, wheels):
+    true = case.with_values(dict(zip(NAMES, SOIL, strict=True)))
+    slip, load = np.linspace(0.1, 0.5, len(wheels)), case.rover.loads(0.0)[: len(wheels)]
+    force = true.model(true.soil, Operating(slip=slip, load=load, pass_number=1.0))
+    return Table(
+        {
+            "run": np.full(len(wheels), "a"),
+            "slip": slip,
+            "load_N": load,
+            "torque_Nm": force.torque,
+            "wheel": np.asarray(wheels),
+        }
+    )
+
+
+def test_a_column_of_wheels_stands_for_gear_and_pass(case):
+    table = with_rover_columns(case, measured(case, ["front-left", "rear-left"]))
+    assert table["pass"].tolist() == [1.0, 2.0]
+    with pytest.raises(TableError, match=r"'nose'; wheels of \[rover\] are: front-left"):
+        with_rover_columns(case, measured(case, ["front-left", "nose"]))
+    again = replace(case, model=case.model + EFFECTS["multipass"]())
+    identify(again, measured(again, list(FOUR)), None, "nonlinear")  # the effect needs the pass
+
+
+def test_the_report_knows_what_the_rows_tell(case):
+    table = measured(case, list(FOUR))
+    found = rover_report(case, table, slopes=SLOPES)
+    truth = rover_performance(case, draws(), SLOPES, SLIP)
+    low, high = np.quantile(found.performance.steepest_slope, [0.005, 0.995])
+    assert low < truth.steepest_slope[0] < high
+    before = np.nanquantile(found.prior_steepest, [0.05, 0.95])
+    after = np.quantile(found.performance.steepest_slope, [0.05, 0.95])
+    assert np.ptp(after) < 0.8 * np.ptp(before)
+    light = rover_report(with_gravity(case, 1.62), table, slopes=SLOPES)
+    assert any("gravity is 1.62" in text for text in light.warnings)
+    assert any("wheels carry" in text for text in light.warnings)
