@@ -41,6 +41,9 @@ EPILOG = "`soilml COMMAND --help` explains one command with an example."
 #: The commands of this distribution, in the order of the help text; they are present where the
 #: packages can be imported, installed or not. Others come by the entry point `soilml.commands`.
 COMMANDS = {
+    "init": "soilml.cli.commands.setup.init",
+    "models": "soilml.cli.commands.setup.models",
+    "doctor": "soilml.cli.commands.setup.doctor",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",
     "simulate": "soilml.cli.commands.simulate",

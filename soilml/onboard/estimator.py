@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, NoReturn, final
 
 import numpy as np
@@ -16,7 +15,7 @@ from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
-from soilml.onboard.model_file import open_model, read_fields, read_prior, read_probe
+from soilml.onboard.model_file import find_model, open_model, read_fields, read_prior, read_probe
 from soilml.onboard.probe import reproduces
 from soilml.onboard.row_estimates import run_rows
 from soilml.onboard.session import Session
@@ -66,7 +65,7 @@ class Estimator:
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Estimator:
-        """Read and verify a model file.
+        """Read and verify a model file, by its path or the short name of a released one.
 
         The checksums are compared, and the file's probe is run: readings with their known answers,
         which also tests the ONNX runtime of this machine.
@@ -82,7 +81,7 @@ class Estimator:
         """
         if not isinstance(path, str | os.PathLike):
             raise InputError(f"path is a {type(path).__name__}; needed is the name of a model file")
-        file = Path(path)
+        file = find_model(path)
         session, metadata = open_model(file)
         try:
             fields, probe = read_fields(metadata), read_probe(metadata)

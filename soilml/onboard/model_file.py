@@ -30,6 +30,36 @@ PATTERN_KEYS = {
 }
 
 
+def released_models() -> dict[str, Path]:
+    """The released model files of this installation by their short names.
+
+    They lie in the package, or beside it in a checkout of the project.
+    """
+    package = Path(__file__).parents[1]
+    found: dict[str, Path] = {}
+    for folder in (package / "released", package.parent / "exported"):
+        for file in sorted(folder.glob("*.onnx")):
+            found.setdefault(file.stem, file)
+    return found
+
+
+def find_model(path: str | os.PathLike[str]) -> Path:
+    """The file of a path, or the released one of a short name such as "wheel".
+
+    Raises `ModelFileError` for a short name that is neither a file nor released.
+    """
+    file = Path(path)
+    if file.suffix or file.name != str(path) or file.exists():
+        return file
+    released = released_models()
+    if file.name not in released:
+        raise ModelFileError(
+            f"{file}: no such file, and no released model of this name; there are: "
+            f"{', '.join(released) or 'none in this installation'}"
+        )
+    return released[file.name]
+
+
 def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     """Open a model file and verify its checksums.
 
@@ -46,7 +76,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         For a file that cannot be read, was not written by `soilml train`, has another format, or
         is damaged.
     """
-    file = Path(path)
+    file = find_model(path)
     content = _read_content(file)
     session, metadata = _create_session(file, content)
     if "soilml_format" not in metadata:

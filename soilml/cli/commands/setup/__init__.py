@@ -1,0 +1,1 @@
+"""Commands about the installation and the first files: one that declares its arguments each."""

@@ -1,0 +1,1 @@
+"""What the commands about the installation and the first files do."""

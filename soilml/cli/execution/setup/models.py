@@ -1,0 +1,42 @@
+"""`soilml models`: the released model files."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from soilml.errors import ModelFileError
+from soilml.io.text_tables import format_table
+from soilml.onboard.estimator import Estimator
+from soilml.onboard.model_file import released_models
+from soilml.optional_imports import need
+from soilml.quantities import QUANTITIES, SHEAR
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the list."""
+    need("onnxruntime", "models")
+    files = released_models()
+    if not files:
+        raise ModelFileError(
+            "this installation has no released model files; train one with soilml train"
+        )
+    header = ("name", "gear", "reads", "estimates", "several readings", "kB")
+    rows = []
+    for name, file in files.items():
+        estimator = Estimator.load(file)
+        gear = dict(json.loads(estimator.metadata["gear"]))
+        sizes = [f"{k[0]} {gear[k]:g} m" for k in ("radius", "width") if gear.get(k)]
+        rows.append(
+            (
+                name,
+                f"{gear.get('type', '')} {', '.join(sizes) or 'of any size'}",
+                ", ".join(estimator.inputs),
+                ", ".join(QUANTITIES[n].symbol if n in SHEAR else n for n in estimator.names),
+                "one by one" if estimator.sets is None else "together",
+                f"{file.stat().st_size / 1000:.0f}",
+            )
+        )
+    print(format_table(header, rows, text_columns=5))
+    print("r, w: radius and width; c, phi, K: cohesion, friction angle, shear modulus")
+    return 0
