@@ -20,8 +20,10 @@ from training.calibration.metrics import compute_metrics
 from training.data.dataset import read_dataset, split_by_run
 from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.lssvm import GAMMAS, LSSVM, KernelEigensystem
-from training.regressors.rbf_kernel import rbf
+from training.regressors.kernel.exact_solution import GAMMAS
+from training.regressors.kernel.kernel_eigensystem import KernelEigensystem
+from training.regressors.kernel.rbf_kernel import rbf
+from training.regressors.lssvm import LSSVM
 
 ROOT = Path(__file__).parents[1]
 FEATURES = ("slip", "torque/load", "load")
