@@ -204,7 +204,7 @@ def _fit_some(
     """The result of `_fit_polynomials` for some of the designs, in one worker."""
     y = respond(designs, x[None])
     finite = np.asarray(np.isfinite(y).all(axis=(1, 2)))
-    a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
+    a = (y[finite].swapaxes(1, 2) @ pseudo_inverse.T).swapaxes(1, 2)
     return a, np.mean((basis @ a - y[finite]) ** 2, axis=1), finite
 
 
