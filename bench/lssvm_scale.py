@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,16 +23,22 @@ from training.regressors.lssvm import LSSVM
 from training.spec import read_spec
 
 PICTURE = Path(__file__).parents[1] / "docs" / "lssvm.png"
-#: Tasks: recipe, and the spec whose features and targets are used.
+#: Tasks: recipe, the spec whose features and targets are used, and the most rows solved exactly.
 TASKS = {
-    "soil from one reading of a wheel": ("wheel", "lssvm"),
-    "soil from torque, vibration and sinkage of a wheel-leg": ("wheel_leg", "leg_soil"),
+    "soil from one reading of a wheel": ("wheel", "lssvm", 20_000),
+    "soil from torque, vibration and sinkage of a wheel-leg": ("wheel_leg", "leg_soil", 5000),
 }
-EXACT = (500, 2000, 5000, 10_000, 20_000)
+EXACT = (500, 2000, 5000, 20_000)
 FIXED = (1000, 10_000, 100_000, 1_000_000)
 PROTOTYPES = (50, 150, 500)
 #: Rows of another seed that hyperparameters are selected on, that are calibrated on, and scored.
 VALIDATION, CALIBRATION, SCORED = 4000, 4000, 20_000
+ABOUT = (
+    "![Error and time against the number of rows](docs/lssvm.png)\n\n"
+    "Rows with a soil of their own each; hyperparameters from "
+    f"{VALIDATION} validation rows, intervals recalibrated on {CALIBRATION} others. *Memory*: of "
+    "the fit beyond its data, as it is stated before, and the largest resident size measured."
+)
 
 
 @dataclass(frozen=True)
@@ -70,14 +77,15 @@ def tables(folder: Path) -> str:
     return "\n\n".join(parts) + f"\n\nMeans over targets, on {SCORED} rows of another seed."
 
 
-def _fits(folder: Path, recipe: str, spec: str) -> Iterator[Fit]:
+def _fits(folder: Path, recipe: str, spec: str, most: int) -> Iterator[Fit]:
     data = _rows(folder, recipe, spec, FIXED[-1], 1)
     held_out = _rows(folder, recipe, spec, VALIDATION + CALIBRATION + SCORED, 2)
     cuts = np.split(np.arange(len(held_out)), [VALIDATION, VALIDATION + CALIBRATION])
     others = [held_out.rows(cut) for cut in cuts]
-    sizes = [("exact", n, 1) for n in EXACT]
+    sizes = [("exact", n, 1) for n in EXACT if n <= most]
     sizes += [("fixed-size", n, m) for m in PROTOTYPES for n in FIXED if n > m]
     for solution, rows, prototypes in sizes:
+        print(f"  {solution}, {rows} rows", file=sys.stderr)
         yield _fit(solution, data.rows(np.arange(min(rows, len(data)))), prototypes, others)
 
 

@@ -147,25 +147,8 @@ PARTS = (
         "Largest difference between the float32 file and the float64 estimator. Goal: 1e-4.",
         lambda folder: learning.parity(),
     ),
-    Part(
-        "lssvm",
-        "LS-SVM against size",
-        "![Error and time against the number of rows](docs/lssvm.png)\n\n"
-        "Rows with a soil of their own each; hyperparameters from "
-        f"{lssvm_scale.VALIDATION} validation rows, intervals recalibrated on "
-        f"{lssvm_scale.CALIBRATION} others. *Memory*: of the fit beyond its data, as it is stated "
-        "before, and the largest resident size that was measured.",
-        lssvm_scale.tables,
-    ),
-    Part(
-        "training",
-        "Time of training",
-        "`soilml train fused` on rows of the recipe `wheel`, and `soilml train any_wheel`. Goals: "
-        "30 s for the 96 000 rows of the demonstration, 120 s for `any_wheel`, and cost that grows "
-        "linearly with the number of rows. *Processor time* is that of all processes; where other "
-        "programs run, wall time is longer.",
-        training_time.table,
-    ),
+    Part("lssvm", "LS-SVM against size", lssvm_scale.ABOUT, lssvm_scale.tables),
+    Part("training", "Time of training", training_time.ABOUT, training_time.table),
     Part(
         "streams",
         "A day of driving",
