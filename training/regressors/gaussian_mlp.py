@@ -108,7 +108,8 @@ class GaussianMLP(GaussianRegressor):
             self.y_scaling_.apply(validation[1].reshape(len(validation[1]), -1)),
         )
         x = self.x_scaling_.apply(X)
-        with threadpool_limits(1):  # sums in a fixed order, whatever the number of cores
+        # one thread: sums in a fixed order; a step that is too long ends in infinities
+        with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
             self._minimise(x, self.y_scaling_.apply(Y), standardised, progress)
         log_variance = self._standardised_outputs(x)[1]
         self.head_ = GaussianHead.of(self.y_scaling_, log_variance, one_output)
