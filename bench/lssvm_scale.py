@@ -154,7 +154,7 @@ def draw(found: dict[str, list[Fit]]) -> None:
         axes[-1].plot([fit.rows for fit in some], times, "o-", ms=4, label=label)
     axes[-1].set(xscale="log", yscale="log", xlabel="rows learned from", ylabel="seconds")
     axes[-1].set_title(f"time of the fit, {usable_cores()} cores", fontsize=9)
-    axes[-1].legend(fontsize=8)
+    axes[0].legend(fontsize=8)
     for axis in axes:
         axis.grid(alpha=0.3)
     with atomic_output(PICTURE) as part:

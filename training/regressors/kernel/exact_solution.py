@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from training.regressors.kernel.expansion import (
+    MOST_VALIDATION_ROWS,
     Expansion,
     Rows,
     Search,
@@ -89,7 +90,8 @@ class ExactSolution:
 
     def bytes(self, rows: int, inputs: int, outputs: int) -> int:
         """Memory of a solution beyond its training rows."""
-        some = 8 * 5 * min(rows, EIGENSYSTEM_ROWS) ** 2
+        few = min(rows, EIGENSYSTEM_ROWS)
+        some = 8 * few * (5 * few + 3 * MOST_VALIDATION_ROWS)
         tiles = factor_bytes(rows) if rows > EIGENSYSTEM_ROWS else 0
         return 8 * rows * (2 * inputs + 8 * outputs) + some + tiles
 
