@@ -1,4 +1,4 @@
-"""Learned estimators: benchmark, calibration, fusion rules, number of centres, leave-one-out."""
+"""Learned estimators: benchmark, calibration, fusion rules, leave-one-out."""
 
 from __future__ import annotations
 
@@ -8,20 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from datagen.generate import generate
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case
-from soilml.quantities import SHEAR
 from training.benchmark.acceptance import goals
 from training.benchmark.report import LEGEND, format_goals, format_tables
 from training.benchmark.suite import RECIPE, benchmark
-from training.calibration.metrics import compute_metrics
-from training.data.dataset import read_dataset, split_by_run
-from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
-from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.lssvm import GAMMAS, LSSVM, KernelEigensystem
-from training.regressors.rbf_kernel import rbf
+from training.regressors.kernel.exact_solution import GAMMAS
+from training.regressors.kernel.kernel_eigensystem import KernelEigensystem
+from training.regressors.kernel.rbf_kernel import rbf
 
 ROOT = Path(__file__).parents[1]
 FEATURES = ("slip", "torque/load", "load")
@@ -76,34 +71,6 @@ def parity() -> str:
         off = metadata.get("parity", "")
         lines.append(f"| {file.name} | {file.stat().st_size / 1e3:.0f} | {off} |")
     return "\n".join(lines)
-
-
-def centres(folder: Path) -> str:
-    """Error of regressors of one reading against the number of support vectors (centres)."""
-    generate(read_recipe("wheel"), folder / "data.parquet")
-    parts = split_by_run(read_dataset(folder / "data.parquet", FEATURES, SHEAR), seed=0)
-    train, check = parts.train, parts.calibration.limit_rows_per_run()
-    spread = train.targets.std(axis=0)
-    regressors = {
-        f"fixed-size LS-SVM, {m} centres": (FixedSizeLSSVM(centres=m), len(train))
-        for m in (25, 50, 100, 150, 200, 400)
-    }
-    regressors["exact LS-SVM"] = (LSSVM(), 1500)
-    regressors["MLP, 64 x 64"] = (GaussianMLP(), len(train))
-    lines = [
-        "| regressor | training rows | RMSE / prior std, c | phi | K | negative log density, sum "
-        "| training time, s |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
-    for label, (regressor, rows) in regressors.items():
-        started = time.perf_counter()
-        regressor.fit(train.features[:rows], train.targets[:rows])
-        seconds = time.perf_counter() - started
-        mean, std = regressor.predict(check.features, return_std=True)
-        s = compute_metrics(check.targets, mean, std, spread)
-        errors = " | ".join(f"{v:.4f}" for v in s.relative)
-        lines.append(f"| {label} | {rows} | {errors} | {s.nll.sum():.3f} | {seconds:.1f} |")
-    return "\n".join(lines) + f"\n\nOn {len(check)} held-out rows."
 
 
 def leave_one_out() -> str:

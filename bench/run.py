@@ -18,6 +18,7 @@ import board
 import c_export
 import identification
 import learning
+import lssvm_scale
 import model_errors
 import physics
 import prospects
@@ -25,6 +26,7 @@ import slip
 import streams
 import summary
 import systems
+import training_time
 from benchmarks_file import FILE, MARK, ROOT, machine
 
 from soilml.io.atomic_files import save_text
@@ -145,13 +147,8 @@ PARTS = (
         "Largest difference between the float32 file and the float64 estimator. Goal: 1e-4.",
         lambda folder: learning.parity(),
     ),
-    Part(
-        "centres",
-        "Number of centres",
-        "Regressors of one reading: the error is limited by the information in the reading, not by "
-        "the capacity of the regressor.",
-        learning.centres,
-    ),
+    Part("lssvm", "LS-SVM against size", lssvm_scale.ABOUT, lssvm_scale.tables),
+    Part("training", "Time of training", training_time.ABOUT, training_time.table),
     Part(
         "streams",
         "A day of driving",

@@ -201,7 +201,7 @@ def wheel_posterior(tmp_path_factory: pytest.TempPathFactory):
     from training.set_posterior.response_surface import ResponseSettings
 
     family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
-    return _fitted(tmp_path_factory, "wheel_response", family, ResponseSettings(768, 32, 120, 0))
+    return _fitted(tmp_path_factory, "wheel_response", family, ResponseSettings(768, 32, 400, 0))
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -204,7 +205,11 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     regressor = REGRESSORS[type_name]()
     defaults = regressor.get_params()
     settings.permit(defaults)
-    parameters = {k: _take_parameter(settings, k, v) for k, v in defaults.items() if k in settings}
+    parameters = {
+        k: _take_parameter(settings, k, v, regressor.choices)
+        for k, v in defaults.items()
+        if k in settings
+    }
     settings.finish()
     if "random_state" in defaults and "random_state" not in parameters:
         parameters["random_state"] = seed
@@ -212,8 +217,15 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     return regressor
 
 
-def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
-    """A hyperparameter: whole numbers, a whole number, or a number in a range that is finite."""
+def _take_parameter(
+    settings: Settings, key: str, default: Any, choices: Mapping[str, tuple[str, ...]]
+) -> Any:
+    """A hyperparameter: a word, whole numbers, a whole number, or a number that is finite."""
+    if key in choices:
+        word = settings.text(key)
+        if word not in choices[key]:
+            settings.fail(f"{key} is {word!r}; there are: {', '.join(choices[key])}")
+        return word
     if isinstance(default, tuple | list):
         values = tuple(settings.take(key, list, "a list of whole numbers"))
         if not all(type(v) is int and 1 <= v <= 4096 for v in values):

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
 from soilml.errors import InputError
-from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.gaussian_pooling import PoolingCalibration, PoolingRule, pool_within_prior
-from soilml.quantities import Z_90
+from soilml.onboard.gaussian_pooling import PoolingCalibration
+from training.available_memory import available_memory
 from training.calibration.held_out import carry_errors
-from training.calibration.metrics import Metrics, compute_metrics
+from training.calibration.metrics import Metrics
 from training.calibration.recalibration import (
     CalibratedRegressor,
     covariance_matrices,
@@ -26,16 +25,14 @@ from training.calibration.row_pooling import (
     LEAST_GROUPS,
     calibrate_pooling,
     calibrate_single_rows,
-    groups_by_length,
-    measured_rows,
     row_groups,
     run_conditions,
-    runs_with_pattern,
 )
 from training.calibration.training_domain import TrainingDomain
 from training.data.dataset import Dataset, DataSplit, split_by_run
 from training.ensemble import fuse_members
 from training.regressors.feature_subset import FeatureSubset
+from training.scores import score, score_pooling, score_rules
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.response_surface import fit_response
@@ -155,17 +152,18 @@ def train(
     scored = np.isin(parts.calibration.run, third.run)
     calibration = parts.calibration.rows(~scored)
     _check_enough(data, calibration)
+    labels = [_label(regressor, parts) for regressor in spec.regressors]
     members = []
-    for regressor in spec.regressors:
-        _fit(regressor, parts, partial(progress, f"fitting {regressor.name}"))
+    for regressor, label in zip(spec.regressors, labels, strict=True):
+        _fit(regressor, parts, partial(progress, f"fitting {label}"))
         members.append(recalibrate(regressor, first))
-    scores = {m.regressor.name: _score(m, third, prior.std) for m in members}
+    scores = {m.regressor.name: score(m, third, prior.std) for m in members}
     if len(members) > 1:
-        scores |= _score_rules(members, first, second, third, prior.std)
+        scores |= score_rules(members, first, second, third, prior.std)
         estimator = recalibrate(fuse_members(members, spec.rule, first), second)
     else:
         estimator = recalibrate(members[0].regressor, _unscored_rows(parts, third))
-    scores["estimator"] = _score(estimator, third, prior.std)
+    scores["estimator"] = score(estimator, third, prior.std)
     mean, std = estimator.predict(calibration.features)
     covariance = covariance_matrices(std, estimator.correlation)
     calibrate = calibrate_single_rows if spec.per_row else calibrate_pooling
@@ -180,7 +178,7 @@ def train(
         data=data,
         parts=parts,
         scores=scores,
-        pooled_scores=_score_pooling(estimator, pooling, parts.calibration.rows(scored), prior),
+        pooled_scores=score_pooling(estimator, pooling, parts.calibration.rows(scored), prior),
         members=tuple(members),
         set_posterior=set_posterior,
         set_figures=set_figures,
@@ -223,6 +221,26 @@ def _check_enough(data: Dataset, calibration: Dataset) -> None:
         )
 
 
+def _label(regressor: FeatureSubset, parts: DataSplit) -> str:
+    """Name of a regressor with what its fit will take; raises `InputError` where it does not fit.
+
+    It is said and refused before anything is fitted.
+    """
+    rows, outputs = parts.train.targets.shape
+    inputs = regressor.select(parts.train.features[:1]).shape[1]
+    needs = regressor.model.requirements(rows, inputs, outputs)
+    if needs is None:
+        return regressor.name
+    free = available_memory()
+    size = f"{rows} rows, {needs.size}, {needs.memory / 1e9:.2g} GB of memory"
+    if free is not None and needs.memory > free:
+        raise InputError(
+            f"{regressor.name}: {size}, and {free / 1e9:.2g} GB are free; take fewer rows, or "
+            'fewer prototypes with solution = "fixed-size"'
+        )
+    return f"{regressor.name} ({size})"
+
+
 def _fit(regressor: FeatureSubset, parts: DataSplit, progress: Callable[[int, int], None]) -> None:
     progress(0, 1)
     training = (parts.train.features, parts.train.targets)
@@ -245,54 +263,3 @@ def _unscored_rows(parts: DataSplit, scored: Dataset) -> Dataset:
     """Calibration rows, a few of each run, without the runs that metrics are measured on."""
     few = parts.calibration.limit_rows_per_run()
     return few.rows(~np.isin(few.run, scored.run))
-
-
-def _score(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Metrics:
-    return compute_metrics(data.targets, *estimator.predict(data.features), prior_std)
-
-
-def _score_rules(
-    members: list[CalibratedRegressor],
-    first: Dataset,
-    second: Dataset,
-    third: Dataset,
-    prior_std: Floats,
-) -> dict[str, Metrics]:
-    """Metrics of every fusion rule, before and after recalibration."""
-    scores = {}
-    for rule in RULES:
-        ensemble = fuse_members(members, rule, first)
-        claimed = ensemble.predict(third.features)
-        scores[f"{rule}, as claimed"] = compute_metrics(third.targets, *claimed, prior_std)
-        scores[f"{rule}, recalibrated"] = _score(recalibrate(ensemble, second), third, prior_std)
-    return scores
-
-
-def _score_pooling(
-    estimator: CalibratedRegressor, pooling: PoolingCalibration, data: Dataset, prior: PriorSummary
-) -> dict[str, dict[int, Metrics]]:
-    """Metrics of pooled rows by pattern and number of rows, on runs not used for calibration."""
-    mean, std = estimator.predict(data.features)
-    covariance = covariance_matrices(std, estimator.correlation)
-    scores: dict[str, dict[int, Metrics]] = {}
-    for pattern in pooling.patterns:
-        by_length = scores[pooling.label(pattern)] = {}
-        runs = runs_with_pattern(pattern.varies, data, pooling.conditions)
-        for groups in groups_by_length(runs):
-            estimates = [
-                _pool(mean[rows], covariance[rows], prior, pooling.rule(measured_rows(data, rows)))
-                for rows in groups
-            ]
-            pooled_mean, pooled_std = (np.stack(part) for part in zip(*estimates, strict=True))
-            by_length[groups.shape[1]] = compute_metrics(
-                data.targets[groups[:, 0]], pooled_mean, pooled_std, prior.std
-            )
-    return scores
-
-
-def _pool(
-    mean: Floats, covariance: Floats, prior: PriorSummary, rule: PoolingRule
-) -> tuple[Floats, Floats]:
-    """Pooled mean, and the standard deviation of a Gaussian with the same 90 % interval."""
-    pooled = pool_within_prior(mean, covariance, prior, rule)
-    return pooled.mean, np.sqrt(np.diag(pooled.covariance)) * rule.coverage_factor / Z_90

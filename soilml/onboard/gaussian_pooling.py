@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -38,29 +39,34 @@ class RunConditions:
     std: Floats
 
     def row_weights(self, measured: Mapping[str, Floats]) -> Floats:
-        """Weight (m,) of each row: one over the number of rows in its bin and the adjacent ones.
+        """Weight (..., m) of each row: one over the rows in its bin and the adjacent ones.
 
         The sum of the weights is the effective number of rows. A reading that is repeated, with or
-        without new noise, counts once.
+        without new noise, counts once. Dimensions before the last are those of several runs.
         """
         position = (self._conditions(measured) - self.lower) / (self.upper - self.lower)
-        # one empty bin on either side, so that np.roll carries nothing across the ends
-        index = tuple(np.clip(position * BINS, 0, BINS).astype(int).T + 1)
-        count = np.zeros((BINS + 3,) * len(self.names))
-        np.add.at(count, index, 1.0)
-        for axis in range(count.ndim):
-            count = count + np.roll(count, 1, axis) + np.roll(count, -1, axis)
-        return np.asarray(1.0 / count[index])
+        # one empty bin on either side, so that no neighbour lies beyond the ends
+        index = np.clip(position * BINS, 0, BINS).astype(int) + 1
+        strides = (BINS + 3) ** np.arange(len(self.names))
+        rows = index.shape[-2]
+        bins = (index @ strides).reshape(-1, rows)
+        size = (BINS + 3) ** len(self.names)
+        bins += size * np.arange(len(bins))[:, None]
+        counts = np.bincount(bins.reshape(-1), minlength=size * len(bins))
+        steps = (np.asarray(step) @ strides for step in product((-1, 0, 1), repeat=len(strides)))
+        near = sum(counts[bins + step] for step in steps)
+        return np.asarray(1.0 / near).reshape(index.shape[:-1])
 
     def variation(self, measured: Mapping[str, Floats], weights: Floats) -> Floats:
-        """How much a run varied each condition, (d,): 0 steady, 1 as much as the training rows.
+        """How much a run varied each condition, (..., d): 0 steady, 1 as the training rows.
 
         The ratio of weighted standard deviations, smoothed by the cubic 3 r^2 - 2 r^3.
         """
-        conditions, count = self._conditions(measured), weights.sum()
-        deviation = conditions - weights @ conditions / count
-        variance = weights @ deviation**2 / max(count - 1.0, 0.5)
-        ratio = np.minimum(np.sqrt(variance) / self.std, 1.0)
+        conditions, count = self._conditions(measured), weights.sum(axis=-1)[..., None]
+        mean = np.einsum("...m,...md->...d", weights, conditions) / count
+        squared = (conditions - mean[..., None, :]) ** 2
+        total = np.einsum("...m,...md->...d", weights, squared)
+        ratio = np.minimum(np.sqrt(total / np.maximum(count - 1.0, 0.5)) / self.std, 1.0)
         return np.asarray(ratio**2 * (3.0 - 2.0 * ratio))
 
     def _conditions(self, measured: Mapping[str, Floats]) -> Floats:
@@ -77,26 +83,26 @@ class RunPattern:
     std_scale: Floats  # (k, q) factor on the pooled standard deviation
     coverage_factor: Floats  # (k, q) half-width of the 90 % interval in standard deviations
 
-    def interpolate(self, rows: float) -> Floats:
-        """Log information share, std scale and coverage factor, (1 + 2 q,).
+    def interpolate(self, rows: float | Floats) -> Floats:
+        """Log information share, std scale and coverage factor, (..., 1 + 2 q).
 
-        Interpolated linearly in the logarithm of the effective number of rows. Beyond the largest
-        number that was measured, more rows do not reduce the uncertainty any further.
+        Interpolated linearly in the logarithm of the effective number of rows (...). Beyond the
+        largest number that was measured, more rows do not reduce the uncertainty any further.
         """
         columns = np.column_stack([np.log(self.information), self.std_scale, self.coverage_factor])
-        log_rows, grid = np.log(max(rows, 1.0)), np.log(self.rows)
-        values = np.asarray([np.interp(log_rows, grid, column) for column in columns.T])
-        values[0] -= max(log_rows - grid[-1], 0.0)
+        log_rows, grid = np.log(np.maximum(rows, 1.0)), np.log(self.rows)
+        values = np.stack([np.interp(log_rows, grid, column) for column in columns.T], axis=-1)
+        values[..., 0] -= np.maximum(log_rows - grid[-1], 0.0)
         return values
 
 
 @dataclass(frozen=True)
 class PoolingRule:
-    """Weights and factors for pooling the rows of one run."""
+    """Weights and factors for pooling the rows of a run, or of several runs of one length."""
 
-    weights: Floats  # (m,) share of each row's information that is used
-    std_scale: Floats  # (q,), as in `RunPattern`
-    coverage_factor: Floats  # (q,)
+    weights: Floats  # (..., m) share of each row's information that is used
+    std_scale: Floats  # (..., q), as in `RunPattern`
+    coverage_factor: Floats  # (..., q)
 
 
 @dataclass(frozen=True)
@@ -116,17 +122,16 @@ class PoolingCalibration:
         return f"{' and '.join(names)} free" if names else "steady"
 
     def rule(self, measured: Mapping[str, Floats]) -> PoolingRule:
-        """Rule for the rows (m,) of one run, interpolated between the calibrated patterns."""
+        """Rule for the rows (..., m) of runs, interpolated between the calibrated patterns."""
         row_weights = self.conditions.row_weights(measured)
         variation = self.conditions.variation(measured, row_weights)
-        shares = [
-            np.prod(np.where(pattern.varies, variation, 1.0 - variation))
-            for pattern in self.patterns
-        ]
-        effective_rows = row_weights.sum()
-        mixture = shares @ np.stack([p.interpolate(effective_rows) for p in self.patterns])
+        effective_rows = row_weights.sum(axis=-1)
+        mixture = np.zeros(1)
+        for pattern in self.patterns:
+            share = np.prod(np.where(pattern.varies, variation, 1.0 - variation), axis=-1)
+            mixture = mixture + share[..., None] * pattern.interpolate(effective_rows)
         q = self.single_row_coverage_factor.size
-        log_information, std_scale, coverage_factor = np.split(mixture, [1, 1 + q])
+        log_information, std_scale, coverage_factor = np.split(mixture, [1, 1 + q], axis=-1)
         return PoolingRule(row_weights * np.exp(log_information), std_scale, coverage_factor)
 
 
@@ -143,6 +148,51 @@ class PooledEstimate:
     mean: Floats
     covariance: Floats
     inconsistency: Floats
+
+
+@dataclass(frozen=True)
+class RowInformation:
+    """What rows add to the prior, in standard deviations of the prior along principal axes."""
+
+    axes: Floats  # (..., q, q)
+    information: Floats  # (..., q) in addition to the prior's, which is 1
+    projected: Floats  # (..., q) mean times precision
+
+    @staticmethod
+    def of(mean: Floats, covariance: Floats, prior: PriorSummary) -> RowInformation:
+        """Of estimates (..., q) and (..., q, q)."""
+        scaled_mean = (mean - prior.mean) / prior.std
+        variance, axes = np.linalg.eigh(covariance / np.outer(prior.std, prior.std))
+        variance = np.clip(variance, LEAST_STD_RATIO**2, 1.0 - LEAST_STD_RATIO)
+        projected = np.einsum("...ji,...j->...i", axes, scaled_mean) / variance
+        return RowInformation(axes, 1.0 / variance - 1.0, projected)
+
+    def rows(self, index: NDArray[np.int64]) -> RowInformation:
+        """The rows of an index array (..., m)."""
+        return RowInformation(self.axes[index], self.information[index], self.projected[index])
+
+    def pool(self, prior: PriorSummary, weights: Floats) -> PooledEstimate:
+        """See `pool`; the last dimension before q is that of the rows."""
+        axes, information, projected = self.axes, self.information, self.projected
+        weighted = weights[..., None] * information
+        # sums over rows and axes as one product of matrices
+        flat = axes.swapaxes(-1, -2).reshape(*axes.shape[:-3], -1, axes.shape[-1])
+        scaled = flat * weighted.reshape(*weighted.shape[:-2], -1, 1)
+        inverse = np.linalg.inv(np.eye(axes.shape[-1]) + flat.swapaxes(-1, -2) @ scaled)
+        right = weights[..., None] * projected
+        right = (right.reshape(*right.shape[:-2], 1, -1) @ flat)[..., 0, :]
+        centre = np.einsum("...ij,...j->...i", inverse, right)
+        along = (flat @ centre[..., None]).reshape(information.shape)
+        residual = projected - information * along
+        squared = np.sum(residual**2 / (information + LEAST_INFORMATION), axis=-1)
+        disagreement = np.sum(weights / weights.sum(axis=-1, keepdims=True) * squared, axis=-1)
+        pooled_mean = prior.mean + prior.std * centre
+        outside = np.maximum(prior.lower - pooled_mean, pooled_mean - prior.upper) / prior.std
+        return PooledEstimate(
+            mean=pooled_mean,
+            covariance=np.asarray(inverse * np.outer(prior.std, prior.std)),
+            inconsistency=np.stack([disagreement, np.maximum(outside.max(axis=-1), 0.0)], axis=-1),
+        )
 
 
 def pool(mean: Floats, covariance: Floats, prior: PriorSummary, weights: Floats) -> PooledEstimate:
@@ -170,47 +220,22 @@ def pool(mean: Floats, covariance: Floats, prior: PriorSummary, weights: Floats)
     It treats the posterior of a row as Gaussian, which it is not; `PoolingCalibration` holds
     measured corrections.
     """
-    q = mean.shape[-1]
-    scaled_mean = (mean - prior.mean) / prior.std
-    scaled = covariance / np.outer(prior.std, prior.std)
-    variance, axes = np.linalg.eigh(scaled)  # along the principal axes of each row
-    variance = np.clip(variance, LEAST_STD_RATIO**2, 1.0 - LEAST_STD_RATIO)
-    information = 1.0 / variance - 1.0  # in addition to the prior's, which is 1
-    projected = np.einsum("...ji,...j->...i", axes, scaled_mean) / variance
-    inverse = np.linalg.inv(
-        np.eye(q) + np.einsum("...m,...mij,...mj,...mkj->...ik", weights, axes, information, axes)
-    )
-    weighted = np.einsum("...m,...mij,...mj->...i", weights, axes, projected)
-    centre = np.einsum("...ij,...j->...i", inverse, weighted)
-    residual = projected - information * np.einsum("...mji,...j->...mi", axes, centre)
-    disagreement = np.sum(
-        weights
-        / weights.sum(axis=-1, keepdims=True)
-        * np.sum(residual**2 / (information + LEAST_INFORMATION), axis=-1),
-        axis=-1,
-    )
-    pooled_mean = prior.mean + prior.std * centre
-    outside = np.maximum(prior.lower - pooled_mean, pooled_mean - prior.upper) / prior.std
-    return PooledEstimate(
-        mean=pooled_mean,
-        covariance=np.asarray(inverse * np.outer(prior.std, prior.std)),
-        inconsistency=np.stack([disagreement, np.maximum(outside.max(axis=-1), 0.0)], axis=-1),
-    )
+    return RowInformation.of(mean, covariance, prior).pool(prior, weights)
 
 
 def pool_within_prior(
     mean: Floats, covariance: Floats, prior: PriorSummary, rule: PoolingRule
 ) -> PooledEstimate:
-    """Pool rows (m, q) and (m, q, q) by a rule, with the mean clipped to the prior's range.
+    """Pool rows (..., m, q) and (..., m, q, q) by a rule; the mean is clipped to the prior's range.
 
     The scaled standard deviation is at most the prior's, unless the unscaled one is larger.
     """
     estimate = pool(mean, covariance, prior, rule.weights)
-    unscaled = np.sqrt(np.diag(estimate.covariance))
+    unscaled = np.sqrt(np.diagonal(estimate.covariance, axis1=-2, axis2=-1))
     scale = np.minimum(rule.std_scale, np.maximum(prior.std / unscaled, 1.0))
     return PooledEstimate(
         mean=np.clip(estimate.mean, prior.lower, prior.upper),
-        covariance=estimate.covariance * np.outer(scale, scale),
+        covariance=estimate.covariance * scale[..., :, None] * scale[..., None, :],
         inconsistency=estimate.inconsistency,
     )
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
+    RowInformation,
     RunConditions,
     RunPattern,
-    pool,
 )
 from training.data.dataset import Dataset
 
@@ -72,15 +72,16 @@ def calibrate_pooling(
     """
     rows = row_groups(data.runs(), 1)
     truth = data.targets[rows[:, 0]]
-    one_row = _measure_groups(mean[rows], covariance[rows], truth, prior, np.ones(rows.shape))
+    information = RowInformation.of(mean, covariance, prior)
+    one_row = _measure_groups(information.rows(rows), truth, prior, np.ones(rows.shape))
     by_pattern: dict[tuple[bool, ...], list[_GroupCalibration]] = {}
     for varies in product((False, True), repeat=len(conditions.names)):
         # rows of a steady run add no information: only their inconsistency is measured
         shares = INFORMATION_SHARES if any(varies) else INFORMATION_SHARES[:1]
         by_pattern[varies] = []
         for groups in groups_by_length(runs_with_pattern(varies, data, conditions)):
-            weights = np.stack([conditions.row_weights(measured_rows(data, g)) for g in groups])
-            parts = (mean[groups], covariance[groups], data.targets[groups[:, 0]], prior, weights)
+            weights = conditions.row_weights(measured_rows(data, groups))
+            parts = (information.rows(groups), data.targets[groups[:, 0]], prior, weights)
             candidates = [_measure_groups(*parts, share) for share in shares]
             by_pattern[varies].append(min(candidates, key=lambda entry: entry.loss))
     limits = [entry.inconsistency for entry in chain(*by_pattern.values())]
@@ -136,18 +137,17 @@ def _pattern(varies: tuple[bool, ...], entries: list[_GroupCalibration]) -> RunP
 
 
 def _measure_groups(
-    mean: Floats,
-    covariance: Floats,
+    rows: RowInformation,
     truth: Floats,
     prior: PriorSummary,
     row_weights: Floats,
-    information: float = 1.0,
+    share: float = 1.0,
 ) -> _GroupCalibration:
     """Errors of groups of rows (groups, m), pooled with one information share.
 
     Groups beyond the limits of inconsistency are left out: they would be answered with the prior.
     """
-    pooled = pool(mean, covariance, prior, information * row_weights)
+    pooled = rows.pool(prior, share * row_weights)
     limits = np.quantile(pooled.inconsistency, 1.0 - FALSE_REJECTION_RATE, axis=0)
     consistent = (pooled.inconsistency <= limits).all(axis=1)
     std = np.sqrt(np.diagonal(pooled.covariance, axis1=1, axis2=2))[consistent]
@@ -157,7 +157,7 @@ def _measure_groups(
         # negative log likelihood of the scaled Gaussian, without constants
         loss=float(np.mean(np.log(std * std_scale / prior.std))),
         rows=float(np.exp(np.mean(np.log(row_weights.sum(axis=1))))),
-        information=information,
+        information=share,
         std_scale=std_scale,
         coverage_factor=np.quantile(error / (std * std_scale), 0.9, axis=0),
         inconsistency=limits,
@@ -180,13 +180,15 @@ def runs_with_pattern(
 
     A run with a condition between steady and free belongs to no pattern.
     """
-    selected = []
-    for run in data.runs():
-        measured = measured_rows(data, run)
+    runs = [run for run in data.runs() if len(run) > 1]
+    selected = np.zeros(len(runs), bool)
+    lengths = np.asarray([len(run) for run in runs], dtype=np.int64)
+    for length in np.unique(lengths):  # runs of one length at a time
+        same = np.flatnonzero(lengths == length)
+        measured = measured_rows(data, np.stack([runs[k] for k in same]))
         variation = conditions.variation(measured, conditions.row_weights(measured))
-        if len(run) > 1 and np.where(varies, variation >= FREE, variation <= STEADY).all():
-            selected.append(run)
-    return selected
+        selected[same] = np.where(varies, variation >= FREE, variation <= STEADY).all(axis=-1)
+    return [runs[k] for k in np.flatnonzero(selected)]
 
 
 def row_groups(runs: list[Rows], length: int) -> Rows:
@@ -209,5 +211,5 @@ def groups_by_length(runs: list[Rows]) -> Iterator[Rows]:
 
 
 def measured_rows(data: Dataset, rows: Rows) -> dict[str, Floats]:
-    """The measured quantities of some rows, by name."""
+    """The measured quantities of some rows, or of groups of rows, by name."""
     return {name: values[rows] for name, values in data.measured.items()}

@@ -36,7 +36,10 @@ contains
   [[regressor]]
   type = "mlp"                       # hidden = [64, 64], epochs, batch, ...
   [[regressor]]
-  type = "linear"                    # or "lssvm", exact, for few thousand rows
+  type = "linear"
+  [[regressor]]
+  type = "lssvm"                     # exact up to 20 000 rows, beyond fixed-size;
+  solution = "exact"                 # or "fixed-size", whatever their number
   [set_posterior]                    # optional: pools all readings of a soil
   designs = 4096                     # by their likelihood, with a learned
   hidden = 64                        # response to slip, load and soil

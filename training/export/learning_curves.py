@@ -20,7 +20,7 @@ LEAST_ROWS = 40
 
 
 def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) -> None:
-    """Error against rows, loss against epochs, and leave-one-out error against gamma, as PNG."""
+    """Error against rows, loss against epochs, and held-out error against gamma, as PNG."""
     from matplotlib.figure import Figure
 
     regressors = [member.regressor for member in trained.members]
@@ -53,8 +53,10 @@ def _plot_rows(axis: Any, trained: TrainedModel, regressors: list[FeatureSubset]
             size = int(share * len(train))
             if size < LEAST_ROWS:
                 continue
-            refitted = clone(regressor.model).set_params(**fixed)
-            refitted.fit(features[:size], train.targets[:size])
+            refitted = regressor.model
+            if size < len(train):
+                refitted = clone(regressor.model).set_params(**fixed)
+                refitted.fit(features[:size], train.targets[:size])
             sizes.append(size)
             errors.append(_relative_rmse(replace(regressor, model=refitted), trained))
         axis.plot(sizes, errors, "o-", label=regressor.name)
@@ -73,14 +75,14 @@ def _relative_rmse(regressor: FeatureSubset, trained: TrainedModel) -> float:
 
 
 def _plot_search(axis: Any, regressor: FeatureSubset) -> None:
-    """Leave-one-out error against gamma for each width, and the selected pair."""
+    """Held-out error against gamma for each width, and the selected pair."""
     search = regressor.model.hyperparameter_search()
     for width, gammas, errors in search:
         axis.plot(gammas, np.sqrt(errors), "-", label=f"width {width:.2g}")
-    _, gammas, errors = min(search, key=lambda entry: float(entry[2].min()))
+    _, gammas, errors = search[-1]
     axis.plot([gammas[int(np.argmin(errors))]], [np.sqrt(errors.min())], "k*", ms=10)
-    axis.set(xscale="log", xlabel="gamma", ylabel="leave-one-out error / spread of outputs")
-    axis.set_title(f"{regressor.name}: choice by leave-one-out", fontsize=9)
+    axis.set(xscale="log", xlabel="gamma", ylabel="held-out error / spread of outputs")
+    axis.set_title(f"{regressor.name}: choice of gamma and width", fontsize=9)
     low = float(np.sqrt(errors.min()))
     axis.set_ylim(low * 0.995, low * 1.08)
     axis.legend(fontsize=8)

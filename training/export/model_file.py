@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 TOLERANCE = 1e-4
 #: Readings that the difference is measured on: quasi-random ones, and about as many training rows.
 PARITY_ROWS = 8192
+#: Readings of one call, which bounds the memory for files of many prototypes.
+PARITY_AT_A_TIME = 1024
 
 
 def export_model(
@@ -91,7 +93,12 @@ def _parity(trained: TrainedModel, model: Any) -> float:
     session = session_of(model)
     readings = _parity_readings(trained)
     feed = {name: values.astype(np.float32) for name, values in readings.items()}
-    mean, std, flag = session.run(("mean", "std", "in_range"), feed)
+    rows = len(next(iter(feed.values())))
+    parts = []
+    for first in range(0, rows, PARITY_AT_A_TIME):
+        some = {name: values[first : first + PARITY_AT_A_TIME] for name, values in feed.items()}
+        parts.append(session.run(("mean", "std", "in_range"), some))
+    mean, std, flag = (np.concatenate(part) for part in zip(*parts, strict=True))
     true_mean, true_std, inside = trained.predict(compute_features(trained.spec.features, readings))
     difference = np.maximum(np.abs(mean - true_mean), np.abs(std - true_std)) / trained.prior.std
     same = flag == inside  # float32 rounding moves a few readings across the edge of the domain

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from training.onnx_graph.builder import Graph
 from training.regressors.gaussian_head import GaussianHead, validate_training_data
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress
 from training.regressors.standardisation import Standardisation
+from training.regressors.tanh_network import TanhNetwork
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
 
 #: Penalty of AdamW on the weights: small, against growth without effect on the fit.
 WEIGHT_DECAY = 1e-4
 #: Norm to which larger gradients are scaled down, so that no batch with outliers disrupts the fit.
 LARGEST_GRADIENT = 5.0
+#: First weights of the output layer, as a share of those of the others.
+FIRST_OUTPUTS = 0.1
 #: Log-variances of standardised outputs in the loss: standard deviations from 0.0025 to 20.
 LOG_VARIANCE_RANGE = (-12.0, 6.0)
 
@@ -48,7 +52,7 @@ class GaussianMLP(GaussianRegressor):
     Attributes
     ----------
     layers_ : list of ndarray
-        Weights and bias of each layer in turn; prediction does not need torch.
+        Weights and bias of each layer in turn.
     history_ : list of (float, float)
         See `loss_history`.
 
@@ -104,7 +108,9 @@ class GaussianMLP(GaussianRegressor):
             self.y_scaling_.apply(validation[1].reshape(len(validation[1]), -1)),
         )
         x = self.x_scaling_.apply(X)
-        self._minimise(x, self.y_scaling_.apply(Y), standardised, progress)
+        # one thread: sums in a fixed order; a step that is too long ends in infinities
+        with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
+            self._minimise(x, self.y_scaling_.apply(Y), standardised, progress)
         log_variance = self._standardised_outputs(x)[1]
         self.head_ = GaussianHead.of(self.y_scaling_, log_variance, one_output)
         return self
@@ -112,58 +118,34 @@ class GaussianMLP(GaussianRegressor):
     def _minimise(
         self, x: Floats, z: Floats, validation: tuple[Floats, Floats], progress: Progress
     ) -> None:
-        import torch
-
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # sums in a fixed order, whatever the number of cores
-        try:
-            generator = torch.Generator().manual_seed(self.random_state)
-            layers = _initial_layers([x.shape[1], *self.hidden, 2 * z.shape[1]], generator)
-            self._run_epochs(torch, layers, generator, x, z, validation, progress)
-        finally:
-            torch.set_num_threads(threads)
-
-    def _run_epochs(
-        self,
-        torch: Any,
-        layers: list[Any],
-        generator: Any,
-        x: Floats,
-        z: Floats,
-        validation: tuple[Floats, Floats],
-        progress: Progress,
-    ) -> None:
-        train_x, train_z = torch.from_numpy(x).float(), torch.from_numpy(z).float()
-        validation_x, validation_z = (torch.from_numpy(part).float() for part in validation)
-        batches = max(math.ceil(len(x) / self.batch), 1)
-        optimiser = torch.optim.AdamW(layers, lr=self.learning_rate, weight_decay=WEIGHT_DECAY)
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
-            optimiser, max(self.epochs * batches, 1)
-        )
-        best, epochs_without_gain, self.history_ = math.inf, 0, []
-        self.layers_ = _as_arrays(layers)
+        rng = np.random.default_rng(self.random_state)
+        network = TanhNetwork([x.shape[1], *self.hidden, 2 * z.shape[1]], rng, FIRST_OUTPUTS)
+        train_x, train_z = x.astype(np.float32), z.astype(np.float32)
+        validation_x, validation_z = (part.astype(np.float32) for part in validation)
+        steps = self.epochs * max(math.ceil(len(x) / self.batch), 1)
+        best, epochs_without_gain, step, self.history_ = math.inf, 0, 0, []
+        self.layers_ = network.layers()
         for epoch in range(self.epochs):
             mean_only = epoch < self.warm_up * self.epochs
-            order = torch.randperm(len(train_x), generator=generator)
-            total = 0.0
-            for index in order.split(self.batch):
-                optimiser.zero_grad()
-                outputs = _forward(torch, layers, train_x[index])
-                loss = _loss(outputs, train_z[index], mean_only)
-                loss.backward()
-                torch.nn.utils.clip_grad_norm_(layers, LARGEST_GRADIENT)
-                optimiser.step()
-                schedule.step()
-                total += float(loss.detach()) * len(index)
-            with torch.no_grad():
-                outputs = _forward(torch, layers, validation_x)
-                validation_loss = float(_loss(outputs, validation_z, False))
-            self.history_.append((total / len(train_x), validation_loss))
+            order, total = rng.permutation(len(x)), 0.0
+            for first in range(0, len(x), self.batch):
+                rows = order[first : first + self.batch]
+                outputs = network.forward(train_x[rows])
+                losses, slopes = _loss(outputs, train_z[rows], mean_only)
+                network.backward(slopes)
+                network.clip_gradient(LARGEST_GRADIENT)
+                rate = 0.5 * self.learning_rate * (1.0 + math.cos(math.pi * step / steps))
+                network.step(rate, WEIGHT_DECAY)
+                total += float(losses.sum())
+                step += 1
+            losses, _ = _loss(network.forward(validation_x), validation_z, False)
+            validation_loss = float(losses.mean())
+            self.history_.append((total / len(x), validation_loss))
             progress(epoch + 1, self.epochs)
             if mean_only or validation_loss < best:
                 best = math.inf if mean_only else validation_loss
                 epochs_without_gain = 0
-                self.layers_ = _as_arrays(layers)
+                self.layers_ = network.layers()
             else:
                 epochs_without_gain += 1
                 if epochs_without_gain > self.patience:
@@ -210,35 +192,21 @@ class GaussianMLP(GaussianRegressor):
         return self.history_
 
 
-def _initial_layers(sizes: list[int], generator: Any) -> list[Any]:
-    """Weights and biases: Glorot's uniform range, a tenth of it for the output layer."""
-    import torch
+def _loss(outputs: Singles, z: Singles, mean_only: bool) -> tuple[Singles, Singles]:
+    """Loss (n,) of each row, and derivatives (n, 2 q) of the mean loss by the outputs.
 
-    layers = []
-    for i, (inward, outward) in enumerate(pairwise(sizes)):
-        limit = math.sqrt(6.0 / (inward + outward)) * (0.1 if i == len(sizes) - 2 else 1.0)
-        weights = (2.0 * torch.rand(inward, outward, generator=generator) - 1.0) * limit
-        layers += [weights.requires_grad_(), torch.zeros(outward, requires_grad=True)]
-    return layers
-
-
-def _forward(torch: Any, layers: list[Any], h: Any) -> Any:
-    """Outputs (n, 2 q) of inputs (n, d): means and log-variances."""
-    for i in range(0, len(layers) - 2, 2):
-        h = torch.tanh(h @ layers[i] + layers[i + 1])
-    return h @ layers[-2] + layers[-1]
-
-
-def _loss(outputs: Any, z: Any, mean_only: bool) -> Any:
-    """Gaussian negative log likelihood per row, without constants; or half the squared error."""
+    The loss is the Gaussian negative log likelihood without constants, or half the squared error.
+    """
     q = z.shape[1]
-    squared_error = (z - outputs[:, :q]) ** 2
+    error = outputs[:, :q] - z
+    slopes = np.zeros_like(outputs)
     if mean_only:
-        return 0.5 * squared_error.sum(dim=1).mean()
-    log_variance = outputs[:, q:].clamp(*LOG_VARIANCE_RANGE)
-    return 0.5 * (log_variance + squared_error * (-log_variance).exp()).sum(dim=1).mean()
-
-
-def _as_arrays(layers: list[Any]) -> list[Floats]:
-    """Copies of weights and biases as float64 arrays."""
-    return [part.detach().numpy().astype(np.float64) for part in layers]
+        slopes[:, :q] = error / len(z)
+        return 0.5 * (error**2).sum(axis=1), slopes
+    log_variance = np.clip(outputs[:, q:], *LOG_VARIANCE_RANGE)
+    precision = np.exp(-log_variance)
+    squared = error**2 * precision
+    inside = log_variance == outputs[:, q:]
+    slopes[:, :q] = error * precision / len(z)
+    slopes[:, q:] = 0.5 * (1.0 - squared) * inside / len(z)
+    return 0.5 * (log_variance + squared).sum(axis=1), slopes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -18,6 +19,14 @@ from training.regressors.standardisation import Standardisation
 Floats = NDArray[np.float64]
 #: Called with the steps done and the total number of steps.
 Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """What a fit will take: the size of the model in words, and the memory in bytes."""
+
+    size: str
+    memory: int
 
 
 class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  # type: ignore[misc]
@@ -35,6 +44,8 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     """
 
     type_name: ClassVar[str]
+    #: Allowed values of hyperparameters that are words.
+    choices: ClassVar[dict[str, tuple[str, ...]]] = {}
 
     x_scaling_: Standardisation
     y_scaling_: Standardisation
@@ -72,6 +83,10 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """Fit, where useful with validation rows (X, y) for early stopping; here without them."""
         return self.fit(X, y)
 
+    def requirements(self, rows: int, inputs: int, outputs: int) -> Requirements | None:
+        """What a fit to so many rows takes; None where that is little."""
+        return None
+
     def fitted_settings(self) -> str:
         """Size and chosen hyperparameters of the fitted regressor, for the model card."""
         return ""
@@ -84,7 +99,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         return {}
 
     def hyperparameter_search(self) -> list[tuple[float, Floats, Floats]]:
-        """Kernel width, gammas and leave-one-out errors of each width that was searched."""
+        """Kernel width, gammas and held-out errors of each width; the selected one is the last."""
         return []
 
     def mean_only_epochs(self) -> int:

@@ -1,65 +1,15 @@
-"""Least squares support vector regression with several outputs, solved exactly."""
+"""Least squares support vector regression with several outputs, exact where there are few rows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
-
-from training.regressors.gaussian_head import GaussianHead, validate_training_data
+from training.regressors.kernel.exact_solution import ExactSolution
+from training.regressors.kernel.fixed_size_solution import FixedSizeSolution
 from training.regressors.kernel_expansion import KernelExpansion
-from training.regressors.rbf_kernel import log_squared_residuals, median_distance, rbf
-from training.regressors.standardisation import Standardisation
 
-Floats = NDArray[np.float64]
-
-#: Searched by leave-one-out unless fixed: widths in median distances between rows, and gammas.
-WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
-GAMMAS = tuple(10.0 ** (0.5 * k) for k in range(-6, 17))
-
-
-@dataclass(frozen=True)
-class KernelEigensystem:
-    """Eigendecomposition of a kernel matrix; the solution for any gamma then costs O(n^2)."""
-
-    values: Floats  # (n,)
-    vectors: Floats  # (n, n)
-
-    @staticmethod
-    def of(kernel: Floats) -> KernelEigensystem:
-        """Decompose a kernel matrix (n, n)."""
-        return KernelEigensystem(*np.linalg.eigh(kernel))
-
-    def solve(self, y: Floats, gamma: float) -> tuple[Floats, Floats, Floats]:
-        r"""Dual weights (n, q), bias (q,) and leave-one-out residuals (n, q).
-
-        .. math::
-            \begin{bmatrix} 0 & 1^T \\ 1 & \Omega + I/\gamma \end{bmatrix}
-            \begin{bmatrix} b^T \\ \alpha \end{bmatrix} =
-            \begin{bmatrix} 0 \\ Y \end{bmatrix}, \qquad e_i = \alpha_i / (H^{-1})_{ii}
-
-        References
-        ----------
-        Suykens and Vandewalle, Neural Processing Letters 9, 1999; closed-form leave-one-out: Cawley
-        and Talbot, Neural Networks 17(10), 2004.
-        """
-        weights = 1.0 / (np.maximum(self.values, 0.0) + 1.0 / gamma)
-        ones = self.vectors.sum(axis=0)
-        inverse_ones = self.vectors @ (weights * ones)
-        total = float(ones @ (weights * ones))
-        inverse_y = self.vectors @ (weights[:, None] * (self.vectors.T @ y))
-        bias = inverse_ones @ y / total
-        alpha = inverse_y - inverse_ones[:, None] * bias
-        diagonal = (self.vectors**2) @ weights - inverse_ones**2 / total
-        return alpha, bias, alpha / diagonal[:, None]
-
-    def best_gamma(self, y: Floats, gammas: tuple[float, ...]) -> tuple[float, Floats]:
-        """The gamma with the least leave-one-out error, and the mean squared error of each."""
-        errors = np.asarray([np.mean(self.solve(y, g)[2] ** 2) for g in gammas])
-        return gammas[int(np.argmin(errors))], errors
+#: Most training rows that are solved exactly unless the solution is stated: 1.7 GB, some minutes.
+MOST_EXACT_ROWS = 20_000
 
 
 class LSSVM(KernelExpansion):
@@ -67,16 +17,24 @@ class LSSVM(KernelExpansion):
 
     Parameters
     ----------
+    solution : {"by-rows", "exact", "fixed-size"}
+        "exact" has a prototype for each row; its time grows with the cube of the number of rows and
+        its memory with the square. "fixed-size" has `centres` prototypes, see `FixedSizeLSSVM`;
+        its time is proportional to the number of rows. "by-rows" is exact up to 20 000 rows.
+    centres : int
+        Prototypes of the fixed-size solution.
     gamma : float or None
-        Weight of the errors against smoothness; selected by closed-form leave-one-out if None.
+        Weight of the errors against smoothness; selected if None, by the error on validation rows,
+        or where there are too few by closed-form leave-one-out.
     width : float or None
         Kernel width in standardised inputs; selected in the same way if None.
+    random_state : int
+        Seed of the rows on which they are selected, and of the prototypes.
 
     Notes
     -----
     The log-variance is a second expansion on the same kernel, fitted to the logarithms of the
-    squared leave-one-out residuals. The cost grows with the cube of the number of rows: use
-    `FixedSizeLSSVM` beyond some thousands.
+    squared leave-one-out residuals.
 
     Examples
     --------
@@ -88,35 +46,30 @@ class LSSVM(KernelExpansion):
     """
 
     type_name: ClassVar[str] = "lssvm"
+    choices: ClassVar[dict[str, tuple[str, ...]]] = {"solution": ("by-rows", "exact", "fixed-size")}
 
-    def __init__(self, gamma: float | None = None, width: float | None = None) -> None:
+    def __init__(
+        self,
+        solution: str = "by-rows",
+        centres: int = 150,
+        gamma: float | None = None,
+        width: float | None = None,
+        random_state: int = 0,
+    ) -> None:
+        self.solution = solution
+        self.centres = centres
         self.gamma = gamma
         self.width = width
+        self.random_state = random_state
 
-    def fit(self, X: Any, y: Any) -> LSSVM:
-        """Fit rows X (n, d) to y (n,) or (n, q)."""
-        X, Y, one_output = validate_training_data(self, X, y)
-        self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
-        self.centres_ = self.x_scaling_.apply(X)
-        Z = self.y_scaling_.apply(Y)
-        gammas = GAMMAS if self.gamma is None else (float(self.gamma),)
-        median = median_distance(self.centres_)
-        widths = [w * median for w in WIDTHS] if self.width is None else [float(self.width)]
-        least, self.search_ = np.inf, []
-        with threadpool_limits(1):
-            for width in widths:
-                eigensystem = KernelEigensystem.of(rbf(self.centres_, self.centres_, width))
-                gamma, errors = eigensystem.best_gamma(Z, gammas)
-                self.search_.append((width, np.asarray(gammas), errors))
-                if errors.min() < least:
-                    least, self.width_, self.gamma_, best = errors.min(), width, gamma, eigensystem
-            self.alpha_, self.bias_, self.loo_residual_ = best.solve(Z, self.gamma_)
-            logs = log_squared_residuals(self.loo_residual_)
-            gamma, _ = best.best_gamma(logs, GAMMAS)
-            self.log_variance_alpha_, self.log_variance_bias_, residual = best.solve(logs, gamma)
-        self.head_ = GaussianHead.of(self.y_scaling_, logs - residual, one_output)
-        return self
+    def solution_for(self, rows: int) -> ExactSolution | FixedSizeSolution:
+        """The solution that is used for a number of training rows."""
+        exact = self.solution == "exact" or (self.solution == "by-rows" and rows <= MOST_EXACT_ROWS)
+        if exact:
+            return ExactSolution(self.gamma, self.width, self.random_state)
+        return FixedSizeSolution(self.centres, self.gamma, self.width, self.random_state)
 
     def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """None: fitting again takes too long."""
-        return None
+        """Gamma, width and solution; None where fitting again takes too long."""
+        fixed = super().learning_curve_parameters()
+        return None if fixed is None else fixed | {"solution": self.expansion_.solution}

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
 
 from datagen.engines.processes import process_map
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, gemm, tanh
 from training.regressors.standardisation import Standardisation
+from training.regressors.tanh_network import TanhNetwork
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
@@ -31,9 +32,9 @@ POINTS_PER_TERM = 2.5
 SIMULATED_AT_A_TIME = 512
 #: Designs of a step of the training, and the share held out to measure the error.
 BATCH, HELD_OUT = 256, 0.08
-#: Learning rates of the one-cycle schedule: the optimiser's own, which the schedule overrides, and
-#: the largest, which is reached after a tenth of the steps.
-FIRST_RATE, LARGEST_RATE, WARM_UP = 4e-3, 6e-3, 0.1
+#: Learning rates of the one-cycle schedule: the first, the largest, which is reached after a tenth
+#: of the steps, and the last.
+FIRST_RATE, LARGEST_RATE, LAST_RATE, WARM_UP = 2.4e-4, 6e-3, 2.4e-8, 0.1
 #: Least standard deviation to which an output is scaled: nearly constant coefficients are not
 #: magnified.
 LEAST_OUTPUT_STD = 2e-3
@@ -203,7 +204,7 @@ def _fit_some(
     """The result of `_fit_polynomials` for some of the designs, in one worker."""
     y = respond(designs, x[None])
     finite = np.asarray(np.isfinite(y).all(axis=(1, 2)))
-    a = np.einsum("rp,npk->nrk", pseudo_inverse, y[finite])
+    a = (y[finite].swapaxes(1, 2) @ pseudo_inverse.T).swapaxes(1, 2)
     return a, np.mean((basis @ a - y[finite]) ** 2, axis=1), finite
 
 
@@ -230,44 +231,31 @@ def _train_network(
 
     The loss is the squared error of coefficients times their weights (terms, channels).
     """
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        generator = torch.Generator().manual_seed(settings.seed)
-        start = int(HELD_OUT * len(features))
-        scaling = Standardisation.of(features)
-        y = (coefficients * error_weights).reshape(len(coefficients), -1)
-        y_mean = y.mean(axis=0)
-        y_std = np.maximum(y.std(axis=0), LEAST_OUTPUT_STD)
-        x_train = torch.tensor(scaling.apply(features[start:]), dtype=torch.float32)
-        y_train = torch.tensor((y[start:] - y_mean), dtype=torch.float32)
-        output_scale = torch.tensor(y_std, dtype=torch.float32)
-        widths = [features.shape[1], settings.hidden, settings.hidden, y.shape[1]]
-        layers = _initial(widths, generator)
-        steps = max(len(x_train) // BATCH, 1)
-        optimiser = torch.optim.Adam(layers, lr=FIRST_RATE)
-        rate = torch.optim.lr_scheduler.OneCycleLR(
-            optimiser, LARGEST_RATE, total_steps=settings.epochs * steps, pct_start=WARM_UP
-        )
+    rng = np.random.default_rng(settings.seed)
+    start = int(HELD_OUT * len(features))
+    scaling = Standardisation.of(features)
+    y = (coefficients * error_weights).reshape(len(coefficients), -1)
+    y_mean = y.mean(axis=0)
+    y_std = np.maximum(y.std(axis=0), LEAST_OUTPUT_STD)
+    x_train = scaling.apply(features[start:]).astype(np.float32)
+    y_train = (y[start:] - y_mean).astype(np.float32)
+    output_scale = y_std.astype(np.float32)
+    network = TanhNetwork([features.shape[1], settings.hidden, settings.hidden, y.shape[1]], rng)
+    batches = max(len(x_train) // BATCH, 1)
+    with threadpool_limits(1):  # sums in a fixed order, whatever the number of cores
         for epoch in range(settings.epochs):
             progress("training the response surface", epoch, settings.epochs)
-            order = torch.randperm(len(x_train), generator=generator)
-            batches: Any = torch.split(order[: steps * BATCH], BATCH)
-            for rows in batches:
-                h = torch.tanh(x_train[rows] @ layers[0] + layers[1])
-                h = torch.tanh(h @ layers[2] + layers[3])
-                error = (h @ layers[4] + layers[5]) * output_scale - y_train[rows]
-                loss: Any = (error**2).sum(dim=1).mean()
-                optimiser.zero_grad()
-                loss.backward()
-                optimiser.step()
-                rate.step()
-        progress("training the response surface", settings.epochs, settings.epochs)
-        arrays = [layer.detach().numpy().astype(np.float64) for layer in layers]
-    finally:
-        torch.set_num_threads(threads)
+            order = rng.permutation(len(x_train))
+            for batch in range(batches):
+                rows = order[batch * BATCH : (batch + 1) * BATCH]
+                error = network.forward(x_train[rows]) * output_scale
+                error -= y_train[rows]
+                error *= output_scale * (2.0 / len(rows))
+                network.backward(error)
+                step = epoch * batches + batch
+                network.step(one_cycle_rate(step / (settings.epochs * batches)))
+    progress("training the response surface", settings.epochs, settings.epochs)
+    arrays = network.layers()
     # the last layer takes over the scaling of the outputs
     flat = error_weights.reshape(-1)
     arrays[-2] = arrays[-2] * y_std / flat
@@ -276,12 +264,15 @@ def _train_network(
     return Response(terms, scaling, tuple(arrays), *ends, np.zeros(len(RESPONSE_CHANNELS)))
 
 
-def _initial(sizes: list[int], generator: Any) -> list[Any]:
-    import torch
+def one_cycle_rate(done: float) -> float:
+    """Learning rate at a share of the steps: half a cosine up, and a longer one down to nothing.
 
-    layers: list[Any] = []
-    for inward, outward in pairwise(sizes):
-        limit = (6.0 / (inward + outward)) ** 0.5
-        weights = (2.0 * torch.rand(inward, outward, generator=generator) - 1.0) * limit
-        layers += [weights.requires_grad_(), torch.zeros(outward, requires_grad=True)]
-    return layers
+    References
+    ----------
+    Smith and Topin, arXiv:1708.07120, 2017.
+    """
+    if done < WARM_UP:
+        start, end, share = FIRST_RATE, LARGEST_RATE, done / WARM_UP
+    else:
+        start, end, share = LARGEST_RATE, LAST_RATE, (done - WARM_UP) / (1.0 - WARM_UP)
+    return end + 0.5 * (start - end) * (1.0 + math.cos(math.pi * share))

@@ -25,7 +25,7 @@ def estimator(wheel_set_file):
     return Estimator.load(wheel_set_file)
 
 
-def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 30):
+def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 120):
     """Runs (rows,) of torque on soils of the prior where the model is wrong, and the soils."""
     family, rng = posterior.family, np.random.default_rng(4)
     case = family.recipe.case

@@ -1,0 +1,1 @@
+"""Numerics of the kernel regressors: kernels, prototypes, solutions in bounded memory."""
