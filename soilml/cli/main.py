@@ -26,6 +26,7 @@ DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
 
+  from a log to a table        soilml import
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
   from a model file to C       soilml export-c
@@ -41,6 +42,7 @@ EPILOG = "`soilml COMMAND --help` explains one command with an example."
 #: The commands of this distribution, in the order of the help text; they are present where the
 #: packages can be imported, installed or not. Others come by the entry point `soilml.commands`.
 COMMANDS = {
+    "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",
     "simulate": "soilml.cli.commands.simulate",

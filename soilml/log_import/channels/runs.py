@@ -1,0 +1,224 @@
+"""Which recordings belong to one run, and their common clock."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.log_import.mapping.log_map import FileKind, LogMap
+from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.units.conversion import factor
+
+_WORDS = re.compile(r"[^A-Za-z0-9.]+")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One drive: its recordings, with the time of their samples in s after the run's start."""
+
+    name: str
+    recordings: tuple[Recording, ...]
+    times: tuple[Floats, ...]
+    notes: tuple[str, ...] = ()
+
+    def find(self, address: str) -> tuple[Floats, Floats]:
+        """Times and samples of a column, `NAME` or `RECORDING:NAME`.
+
+        Raises `InputError` where no recording has it, or several have.
+        """
+        holds = [
+            (recording, times, column)
+            for recording, times in zip(self.recordings, self.times, strict=True)
+            if (column := _column_in(recording, address))
+        ]
+        if len(holds) > 1:
+            options = ", ".join(f"'{r.name}:{c}'" for r, _, c in holds)
+            raise InputError(f"run {self.name}: several recordings have the column {address!r}; "
+                             f"needed is one of {options}")  # fmt: skip
+        if not holds:
+            raise InputError(f"run {self.name}: {_missing(self.recordings, address)}")
+        recording, times, column = holds[0]
+        return times, recording.columns[column]
+
+
+def _column_in(recording: Recording, address: str) -> str:
+    """Name of the column of a recording that an address means; "" where it has none."""
+    if address in recording.columns:
+        return address
+    prefix = f"{recording.name}:"
+    if recording.name and address.startswith(prefix):
+        column = address.removeprefix(prefix)
+        return column if column in recording.columns else ""
+    return ""
+
+
+def _missing(recordings: Sequence[Recording], address: str) -> str:
+    known = [f"{r.name}:{c}" if r.name else c for r in recordings for c in r.columns]
+    texts = [c for r in recordings for c in r.texts]
+    if address in texts:
+        return f"the column {address!r} holds text; needed are numbers"
+    near = difflib.get_close_matches(address, known, 1, 0.5)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known[:20])}"
+    return f"no column {address!r}; {hint}"
+
+
+def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
+    """The runs of logs: one for each file, for each set of files that belong together, or for each
+    value of the run column.
+
+    Raises `InputError` where files cannot be matched, or time is missing.
+    """
+    runs = []
+    for name, members in matched_files(logs, log_map.files).items():
+        run = _with_times(name, members, log_map)
+        runs += _by_column(run, log_map.run_column) if log_map.run_column else [run]
+    return runs
+
+
+def matched_files(
+    logs: Sequence[Sequence[Recording]], kinds: Sequence[FileKind]
+) -> dict[str, list[tuple[Recording, FileKind | None]]]:
+    """Recordings by the name of their run, with the kind of their file."""
+    files = [log[0].file for log in logs]
+    names = run_names(files)
+    if not kinds:
+        return {
+            name: [(recording, None) for recording in log]
+            for name, log in zip(names, logs, strict=True)
+        }
+    found: dict[str, list[tuple[Recording, FileKind | None]]] = {}
+    for file, name, log in zip(files, names, logs, strict=True):
+        matching = [k for k in kinds if fnmatch.fnmatch(name, k.pattern) or _name_fits(file, k)]
+        if len(matching) != 1:
+            known = ", ".join(f"{k.name} = {k.pattern!r}" for k in kinds)
+            raise InputError(
+                f"{file}: {len(matching)} patterns of [files] fit its name; needed is one: {known}"
+            )
+        key = "_".join(key_words(name, set(_words(matching[0].pattern)))) or "run"
+        for recording in log:
+            own = matching[0].name + (f"/{recording.name}" if recording.name else "")
+            found.setdefault(key, []).append((replace(recording, name=own), matching[0]))
+    for key, members in found.items():
+        there = [kind.name for _, kind in members if kind is not None]
+        lacking = [kind.name for kind in kinds if kind.name not in there]
+        if lacking:
+            raise InputError(
+                f"run {key}: no file of the kind {lacking[0]!r}; there is "
+                f"{', '.join(str(recording.file) for recording, _ in members)}"
+            )
+    return found
+
+
+def _name_fits(file: Path, kind: FileKind) -> bool:
+    return fnmatch.fnmatch(file.name, kind.pattern)
+
+
+def run_names(files: Sequence[Path]) -> list[str]:
+    """A name for each file: its stem, with folders where several files have the same one."""
+    stems = [file.stem if file.suffix else file.name for file in files]
+    depth = 0
+    names = list(stems)
+    while len(set(names)) < len(names) and depth < 6:
+        depth += 1
+        names = [
+            "_".join((*file.parts[:-1][-depth:], stem))
+            for file, stem in zip(files, stems, strict=True)
+        ]
+    return names
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in _WORDS.split(text) if word.strip(".")]
+
+
+def key_words(name: str, without: set[str]) -> list[str]:
+    """The words of a run's name that say which run, without those that say which kind of file."""
+    return [word for word in _words(name) if word not in without]
+
+
+def _with_times(
+    name: str, members: list[tuple[Recording, FileKind | None]], log_map: LogMap
+) -> Run:
+    recordings, clocks, notes = [], [], []
+    for recording, kind in members:
+        clock = _clock(recording, log_map)
+        if clock is None:
+            continue
+        good = _increasing(clock)
+        if not good.any():
+            continue
+        if not good.all():
+            count = int(np.sum(~good))
+            notes.append(f"{count} samples go back in time or have none, and are left out")
+            recording, clock = recording.rows(good), clock[good]
+        if kind is not None and kind.clock == "start":
+            clock = clock - clock[0]
+        recordings.append(recording)
+        clocks.append((clock + (kind.delay if kind else 0.0), kind is None or kind.clock == "same"))
+        notes += recording.notes
+    if not clocks:
+        raise InputError(
+            f"run {name}: no recording has a time; needed is [time] column, or [time] rate = "
+            "'100 Hz'"
+        )
+    common = [clock[0] for clock, same in clocks if same]
+    start = min(common) if common else 0.0
+    times = tuple(clock - start if same else clock for clock, same in clocks)
+    return Run(name, tuple(recordings), times, tuple(dict.fromkeys(notes)))
+
+
+def _clock(recording: Recording, log_map: LogMap) -> Floats | None:
+    """Time of the samples in s; None where the recording has no time."""
+    if log_map.time_column:
+        column = _column_in(recording, log_map.time_column)
+        if column:
+            return recording.columns[column] * factor(log_map.time_unit, "s", "[time] unit")
+        if log_map.time_column in recording.texts:
+            raise InputError(
+                f"{recording.file}: the time in column {log_map.time_column!r} is not understood: "
+                f"{recording.texts[log_map.time_column][0]!r}; needed are numbers, dates, hh:mm:ss"
+            )
+    if recording.clock is not None:
+        return recording.clock
+    if log_map.rate:
+        return np.arange(len(recording)) / log_map.rate
+    return None
+
+
+def _increasing(clock: Floats) -> NDArray[np.bool_]:
+    """Samples whose time is above that of all before, (n,)."""
+    filled = np.where(np.isfinite(clock), clock, -np.inf)
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], filled[:-1]]))
+    return np.asarray(filled > before)
+
+
+def _by_column(run: Run, column: str) -> list[Run]:
+    """A run for each value of a column, in order of first appearance."""
+    at = [i for i, r in enumerate(run.recordings) if column in r.texts or column in r.columns]
+    if len(at) != 1:
+        raise InputError(f"[runs] column: {_missing(run.recordings, column)}")
+    recording, times = run.recordings[at[0]], run.times[at[0]]
+    if column in recording.texts:
+        labels = recording.texts[column]
+    else:
+        labels = [f"{value:g}" for value in recording.columns[column]]
+    found = []
+    for label in dict.fromkeys(labels):
+        keep = np.asarray([cell == label for cell in labels])
+        start, stop = times[keep][0], times[keep][-1]
+        parts, clocks = [], []
+        for i, (other, clock) in enumerate(zip(run.recordings, run.times, strict=True)):
+            rows = keep if i == at[0] else (clock >= start) & (clock <= stop)
+            if rows.any():
+                parts.append(other.rows(rows))
+                clocks.append(clock[rows] - start)
+        found.append(Run(label or "unnamed", tuple(parts), tuple(clocks), run.notes))
+    return found
