@@ -16,14 +16,14 @@ Bring raw logs into the table RUNS.csv that identify, estimate and gap read:
 slip, torque and load of each wheel in each steady window, with standard
 deviations.
 
-  soilml import --init LOG... --map MAP.toml      look at the logs, write a map
+  soilml import --init LOG... --out MAP.toml      look at the logs, write a map
   soilml import LOG... --map MAP.toml --out RUNS.csv
 
 Logs are CSV and other text, Parquet, MATLAB files, MCAP and bags of ROS 1
 and 2 (pip install 'soilml[logs]'); each file is a run, unless the map says
 otherwise. MAP.toml says which column or topic is which quantity, in which unit,
 and what stands between: radius, gear ratio, torque constant, tare, each with
-its uncertainty. --init writes one with guesses and their reasons; without --map
+its uncertainty. --init writes one with guesses and their reasons; without --out
 it prints it.
 
 Beside RUNS.csv stand RUNS.report.html (pictures, what was left out and why),
@@ -35,25 +35,27 @@ of a model file. A map that cannot be right is refused with the likely cause;
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("logs", type=InputFile, metavar="LOG", nargs="+", help="logs, of any kind")
+    parser.add_argument("files", type=InputFile, metavar="LOG", nargs="+", help="logs, of any kind")
     parser.add_argument(
         "--init", action="store_true", help="write a commented map with guesses, and no table"
     )
-    parser.add_argument("--map", metavar="MAP.toml", help="the map; with --init, the file to write")
-    parser.add_argument("--out", metavar="RUNS.csv", help="write the table and its report")
+    parser.add_argument("--map", type=InputFile, metavar="MAP.toml", help="how the logs are read")
+    parser.add_argument(
+        "--out", metavar="RUNS.csv", help="write the table and its report; with --init, the map"
+    )
     parser.add_argument("--accept", action="store_true", help="import although the map looks wrong")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
     if args.init:
-        if args.out is not None:
-            raise InputError("--out is for the table; with --init, give --map MAP.toml")
-        if args.map is not None and Path(args.map).exists():
-            raise InputError(f"{args.map} exists; --init would overwrite it: give another name")
-        return output_files(args.map, ".toml")
+        if args.map is not None:
+            raise InputError("--init writes a map and reads none; give its name as --out MAP.toml")
+        if args.out is not None and Path(args.out).exists():
+            raise InputError(f"{args.out} exists; --init would overwrite it: give another name")
+        return output_files(args.out, ".toml")
     if args.map is None:
-        raise InputError("--map is missing; soilml import --init LOG... --map MAP.toml writes one")
+        raise InputError("--map is missing; soilml import --init LOG... --out MAP.toml writes one")
     return output_files(args.out, *IMPORT_SUFFIXES)
 
 

@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         for library in ("jinja2", "matplotlib"):
             need(library, "import")
     with stage_progress() as tell:
-        found = import_log(args.logs, args.map, accept=args.accept, progress=tell)
+        found = import_log(args.files, args.map, accept=args.accept, progress=tell)
         html = ""
         if args.out is not None:
             from soilml.log_import.report.page import page
@@ -56,15 +56,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _init(args: argparse.Namespace) -> int:
-    text = init_map(args.logs)
-    if args.map is None:
+    text = init_map(args.files)
+    if args.out is None:
         write_stdout(text)
         return 0
-    save_text(args.map, text)
+    save_text(args.out, text)
     changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
     todo = f"{changes} lines need a look (CHANGE, NEEDED)" if changes else "look at its guesses"
     print(
-        f"{args.map} written; {todo}; then: soilml import LOG... --map {args.map} --out RUNS.csv",
+        f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv",
         file=sys.stderr,
     )
     return 0

@@ -17,6 +17,8 @@ from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.units.conversion import factor
 
+#: A recording, and the kind of its file where a run has several kinds.
+Member = tuple[Recording, FileKind | None]
 _WORDS = re.compile(r"[^A-Za-z0-9.]+")
 
 
@@ -76,16 +78,16 @@ def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
 
     Raises `InputError` where files cannot be matched, or time is missing.
     """
-    runs = []
-    for name, members in matched_files(logs, log_map.files).items():
-        run = _with_times(name, members, log_map)
-        runs += _by_column(run, log_map.run_column) if log_map.run_column else [run]
-    return runs
+    return [
+        _with_times(own_name, part, log_map)
+        for name, members in matched_files(logs, log_map.files).items()
+        for own_name, part in _divided(name, members, log_map)
+    ]
 
 
 def matched_files(
     logs: Sequence[Sequence[Recording]], kinds: Sequence[FileKind]
-) -> dict[str, list[tuple[Recording, FileKind | None]]]:
+) -> dict[str, list[Member]]:
     """Recordings by the name of their run, with the kind of their file."""
     files = [log[0].file for log in logs]
     names = run_names(files)
@@ -94,7 +96,7 @@ def matched_files(
             name: [(recording, None) for recording in log]
             for name, log in zip(names, logs, strict=True)
         }
-    found: dict[str, list[tuple[Recording, FileKind | None]]] = {}
+    found: dict[str, list[Member]] = {}
     for file, name, log in zip(files, names, logs, strict=True):
         matching = [k for k in kinds if fnmatch.fnmatch(name, k.pattern) or _name_fits(file, k)]
         if len(matching) != 1:
@@ -144,12 +146,10 @@ def key_words(name: str, without: set[str]) -> list[str]:
     return [word for word in _words(name) if word not in without]
 
 
-def _with_times(
-    name: str, members: list[tuple[Recording, FileKind | None]], log_map: LogMap
-) -> Run:
+def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
     recordings, clocks, notes = [], [], []
     for recording, kind in members:
-        clock = _clock(recording, log_map)
+        clock = _clock(recording, log_map, kind)
         if clock is None:
             continue
         good = _increasing(clock)
@@ -170,21 +170,24 @@ def _with_times(
             "'100 Hz'"
         )
     common = [clock[0] for clock, same in clocks if same]
-    start = min(common) if common else 0.0
+    divided = log_map.run_column or log_map.split_at_reset
+    start = (common[0] if divided else min(common)) if common else 0.0
     times = tuple(clock - start if same else clock for clock, same in clocks)
     return Run(name, tuple(recordings), times, tuple(dict.fromkeys(notes)))
 
 
-def _clock(recording: Recording, log_map: LogMap) -> Floats | None:
+def _clock(recording: Recording, log_map: LogMap, kind: FileKind | None) -> Floats | None:
     """Time of the samples in s; None where the recording has no time."""
-    if log_map.time_column:
-        column = _column_in(recording, log_map.time_column)
+    name = (kind.time_column if kind else "") or log_map.time_column
+    if name:
+        column = _column_in(recording, name)
         if column:
-            return recording.columns[column] * factor(log_map.time_unit, "s", "[time] unit")
-        if log_map.time_column in recording.texts:
+            unit = (kind.time_unit if kind else "") or log_map.time_unit
+            return recording.columns[column] * factor(unit, "s", "[time] unit")
+        if name in recording.texts:
             raise InputError(
-                f"{recording.file}: the time in column {log_map.time_column!r} is not understood: "
-                f"{recording.texts[log_map.time_column][0]!r}; needed are numbers, dates, hh:mm:ss"
+                f"{recording.file}: the time in column {name!r} is not understood: "
+                f"{recording.texts[name][0]!r}; needed are numbers, dates, hh:mm:ss"
             )
     if recording.clock is not None:
         return recording.clock
@@ -200,25 +203,36 @@ def _increasing(clock: Floats) -> NDArray[np.bool_]:
     return np.asarray(filled > before)
 
 
-def _by_column(run: Run, column: str) -> list[Run]:
-    """A run for each value of a column, in order of first appearance."""
-    at = [i for i, r in enumerate(run.recordings) if column in r.texts or column in r.columns]
-    if len(at) != 1:
-        raise InputError(f"[runs] column: {_missing(run.recordings, column)}")
-    recording, times = run.recordings[at[0]], run.times[at[0]]
-    if column in recording.texts:
-        labels = recording.texts[column]
+def _divided(
+    name: str, members: Sequence[Member], log_map: LogMap
+) -> list[tuple[str, list[Member]]]:
+    """A log as its runs: by the values of the run column, or where its time starts again.
+
+    Recordings without the column take part in every run, where they overlap in time.
+    """
+    if log_map.run_column:
+        recordings = [recording for recording, _ in members]
+        column = log_map.run_column
+        at = [i for i, r in enumerate(recordings) if column in r.texts or column in r.columns]
+        if len(at) != 1:
+            raise InputError(f"[runs] column: {_missing(recordings, column)}")
+        own = recordings[at[0]]
+        labels = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
+    elif log_map.split_at_reset:
+        at = [0]
+        clock = _clock(members[0][0], log_map, members[0][1])
+        if clock is None:
+            return [(name, list(members))]
+        parts = np.concatenate([[0], np.cumsum(np.diff(clock) < 0.0)])
+        labels = [f"{name}_{part + 1:02d}" for part in parts]
     else:
-        labels = [f"{value:g}" for value in recording.columns[column]]
+        return [(name, list(members))]
     found = []
     for label in dict.fromkeys(labels):
         keep = np.asarray([cell == label for cell in labels])
-        start, stop = times[keep][0], times[keep][-1]
-        parts, clocks = [], []
-        for i, (other, clock) in enumerate(zip(run.recordings, run.times, strict=True)):
-            rows = keep if i == at[0] else (clock >= start) & (clock <= stop)
-            if rows.any():
-                parts.append(other.rows(rows))
-                clocks.append(clock[rows] - start)
-        found.append(Run(label or "unnamed", tuple(parts), tuple(clocks), run.notes))
+        part = [
+            (r.rows(keep), kind) if i == at[0] else (r, kind) for i, (r, kind) in enumerate(members)
+        ]
+        # the recording that was divided comes first: its start is that of the run
+        found.append((label or "unnamed", [part.pop(at[0]), *part]))
     return found

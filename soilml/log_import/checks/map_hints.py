@@ -62,7 +62,7 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
         )
         ratio = np.abs(ratio)
         middle, fastest = float(np.median(ratio)), float(np.max(ratio))
-    if fastest < 0.1 and fastest > 0.0:
+    if 0.0 < fastest < 0.3:
         yield (
             f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
             f"{1.0 / fastest:.3g} times as fast as the travel; "
@@ -73,7 +73,7 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
             f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
             f"{_too_slow(wheel, travel, rotation, middle)}"
         )
-    elif 0.0 < fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
+    elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
         yield (
             f"slip is {1.0 - fastest:.2g} or more in all windows; was the radius of "
             f"{wheel.radius.value if wheel.radius else math.nan:g} m measured as diameter?"
@@ -93,8 +93,8 @@ def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
     if rotation == "rim_speed":
         return "probably [rim_speed] is in mm/s"
     return (
-        f"probably it was measured before a gearbox of about {excess:.3g} to 1; write gear_ratio "
-        f"in [{rotation}]"
+        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio in "
+        f"[{rotation}]), or its unit is wrong"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from soilml.log_import.recording import Floats
 
 #: Range of T / (W r) of driving wheels on soil, and its usual value.
-LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.01, 1.2, 0.3
+LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 #: Slip from which a driving wheel has a torque worth judging.
 _SLIPS = 0.05
 #: Mistakes that make T / (W r) too large, by factor.

@@ -63,7 +63,8 @@ def _candidate(recording: Recording, name: str, ambiguous: bool) -> Candidate:
         for role in (*ROLES, "time")
         if (total := _score(role, scores.get(role, 0.0), kind, unit, own, recording, name)) > 0.0
     }
-    address = f"{recording.name}:{name}" if ambiguous and recording.name else name
+    topic_named = recording.name.startswith("/") or ambiguous
+    address = f"{recording.name}:{name}" if topic_named and recording.name else name
     return Candidate(address, name, unit, kind, own, found)
 
 
@@ -94,7 +95,7 @@ def _score(
     if score <= 0.0:
         return 0.0
     if own.constant:
-        score -= 3.0
+        score -= 3.0 if own.middle else 10.0
     monotone = own.travel > 0.6 or own.wraps_at > 0.0
     if role in ("wheel_angle", "position"):
         score += 1.5 if monotone else -2.5

@@ -9,43 +9,11 @@ from pathlib import Path
 from soilml.optional_imports import tomllib
 
 #: Words that say which wheel a column belongs to.
-WHEEL_WORDS = tuple(
-    [
-        "fl",
-        "fr",
-        "rl",
-        "rr",
-        "ml",
-        "mr",
-        "cl",
-        "cr",
-        "bl",
-        "br",
-        "lf",
-        "rf",
-        "lr",
-        "lm",
-        "rm",
-        "lb",
-        "rb",
-        "left",
-        "right",
-        "front",
-        "rear",
-        "middle",
-        "mid",
-        "centre",
-        "center",
-        "back",
-        "1",
-        "2",
-        "3",
-        "4",
-        "5",
-        "6",
-        "7",
-        "8",
-    ]
+WHEEL_WORDS = (
+    *("fl", "fr", "rl", "rr", "ml", "mr", "cl", "cr", "bl", "br"),
+    *("lf", "rf", "lr", "lm", "rm", "lb", "rb"),
+    *("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back"),
+    *"12345678",
 )
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 

@@ -18,6 +18,7 @@ from soilml.log_import.guesses.unit_guess import guess_rotation_unit, guess_unit
 from soilml.log_import.mapping.channel import take_channel
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.recording import Floats
+from soilml.log_import.units.conversion import dimension
 from soilml.log_import.units.uncertain_value import Uncertain
 
 #: Share of the reading while driving from which a reading at rest is an offset.
@@ -63,7 +64,7 @@ def _draft(role: str, column: Candidate, run: Run, stated: dict[str, tuple[str, 
     if role in ("position", "wheel_angle", "sinkage") and known.size:
         moving = float(np.ptp(known))
     unit, why = guess_unit(role, column, moving)
-    if unit in ("count", "count/s"):
+    if dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
         known_turn = "counts_per_turn" in stated
         draft.put("unit", unit, why)
@@ -81,10 +82,8 @@ def _draft(role: str, column: Candidate, run: Run, stated: dict[str, tuple[str, 
         if ratio is not None and _is_motor(column, role):
             draft.put("gear_ratio", float(ratio[0].split()[0]), f"stated in the log: {ratio[1]}")
         else:
-            draft.put(
-                "gear_ratio", 1.0, "turns of the motor for one of the wheel; 1 where measured at the "
-                "wheel"
-            )  # fmt: skip
+            why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
+            draft.put("gear_ratio", 1.0, why)
     if role == "motor_current":
         constant = stated.get("torque_constant")
         if constant is not None:
@@ -94,8 +93,7 @@ def _draft(role: str, column: Candidate, run: Run, stated: dict[str, tuple[str, 
                 "torque_constant", "1.0 N m/A +- 5 %", "CHANGE: from the data sheet of the motor"
             )
         efficiency = stated.get("efficiency", ("0.7", ""))[0]
-        known = "efficiency" in stated
-        why = "of the gearbox" if known else "CHANGE: of the gearbox"
+        why = "of the gearbox" if "efficiency" in stated else "CHANGE: of the gearbox"
         draft.put("efficiency", f"{efficiency} +- 0.05", why)
         draft.put("idle_current", "0 A +- 0.02 A", "what the lifted wheel takes at this speed")
     return draft

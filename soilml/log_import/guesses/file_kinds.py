@@ -41,6 +41,6 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     return tuple(kinds) if len(runs) < len(logs) else ()
 
 
-def clocks_differ(logs: Sequence[Log], clocks: Sequence[tuple[float, float]]) -> bool:
+def clocks_differ(clocks: Sequence[tuple[float, float]]) -> bool:
     """Whether the ranges of time (from, until) of the kinds do not overlap."""
     return max(start for start, _ in clocks) >= min(stop for _, stop in clocks)

@@ -6,17 +6,17 @@ import json
 import math
 import os
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from soilml.errors import InputError, SoilmlError
-from soilml.log_import.channels.runs import Run, run_names, runs_of
+from soilml.errors import InputError
+from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
 from soilml.log_import.guesses.assignment import Assignment, assign, axle_of
-from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.candidates import Candidate, candidates_of
+from soilml.log_import.guesses.clocks import guess_clock, guess_run_column, restarts
 from soilml.log_import.guesses.draft import (
     Draft,
     describe,
@@ -32,9 +32,8 @@ from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 
-_MOST_LISTED = 40
-#: Keys whose value is changed by nearly every user.
-_WIDTH = 100
+#: Most columns that are listed, and runs that are looked at.
+_MOST_LISTED, _LOOKED = 40, 8
 
 
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
@@ -57,60 +56,57 @@ class _MapText:
 
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
         self.logs = logs
-        self.kinds = guess_file_kinds(logs)
-        self.time_column, self.time_unit, self.rate = self._time()
-        about = [line for log in logs[:3] for recording in log for line in recording.about]
-        self.stated = stated_constants(about)
-        if not self.time_column and "rate" in self.stated:
-            self.rate = float(self.stated["rate"][0].split()[0])
-        self.kinds = self._with_clocks()
-        self.runs = self._runs()
-        self.columns = [
-            c for c in candidates_of(self.runs[0].recordings) if c.name != self.time_column
-        ]
+        first = [recording for log in logs[:4] for recording in log]
+        self.time_column, self.time_unit = guess_clock(first)
+        self.run_column, self.run_count = guess_run_column(logs[0])
+        self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
+        self.stated = stated_constants([line for recording in first for line in recording.about])
+        self.rate = 0.0
+        if not self.time_column and all(recording.clock is None for recording in first):
+            self.rate = float(self.stated.get("rate", ("100", ""))[0].split()[0])
+        self.kinds = self._with_clocks(guess_file_kinds(logs))
+        self.runs = runs_of(logs, self._map(self.kinds))
+        self.run = _liveliest(self.runs[:_LOOKED])
+        clocks = {self.time_column, *(kind.time_column for kind in self.kinds)}
+        self.columns = [c for c in candidates_of(self.run.recordings) if c.name not in clocks]
         self.found: Assignment = assign(self.columns)
         self.run_names = [run.name for run in self.runs]
 
-    def _time(self) -> tuple[str, str, float]:
-        """Column of time and its unit; or a rate, where no column is one."""
-        best: tuple[float, str, Any] = (0.0, "", None)
-        for recording in (r for log in self.logs[:4] for r in log):
-            if recording.clock is not None:
-                return "", "s", 0.0
-            for candidate in candidates_of([recording]):
-                score = candidate.scores.get("time", 0.0)
-                if score > best[0]:
-                    unit = candidate.unit if candidate.kind == "s" else ""
-                    values = recording.columns[candidate.name]
-                    best = (score, candidate.name, unit or time_unit(values))
-        if best[0] > 0.5:
-            return best[1], best[2], 0.0
-        return "", "s", 100.0
-
     def _map(self, kinds: Sequence[FileKind]) -> LogMap:
-        return LogMap("map", (), tuple(kinds), self.time_column, self.time_unit, self.rate)
+        return LogMap(
+            "map",
+            (),
+            tuple(kinds),
+            self.time_column,
+            self.time_unit,
+            self.rate,
+            self.run_column,
+            self.restarts > 0,
+        )
 
-    def _with_clocks(self) -> tuple[FileKind, ...]:
-        if not self.kinds:
+    def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
+        """Kinds with their own columns of time, and with clocks that overlap."""
+        if not kinds:
             return ()
-        try:
-            run = runs_of(self.logs, self._map(self.kinds))[0]
-        except SoilmlError:
-            return ()
-        if clocks_differ(self.logs, [(t[0], t[-1]) for t in run.times]):
-            return tuple(FileKind(k.name, k.pattern, "start") for k in self.kinds)
-        return self.kinds
-
-    def _runs(self) -> list[Run]:
-        return runs_of(self.logs, self._map(self.kinds))
+        members = next(iter(matched_files(self.logs, kinds).values()))
+        named = []
+        for kind in kinds:
+            own = [recording for recording, other in members if other is kind]
+            column, unit = guess_clock(own)
+            alike = (column, unit) == (self.time_column, self.time_unit)
+            named.append(kind if alike else replace(kind, time_column=column, time_unit=unit))
+        run = runs_of(self.logs, self._map(named))[0]
+        if clocks_differ([(times[0], times[-1]) for times in run.times]):
+            return tuple(replace(kind, clock="start") for kind in named)
+        return tuple(named)
 
     def text(self) -> str:
         """The whole map."""
         lines = self._head()
-        lines += self._files() + self._time_lines() + self._run_column()
+        lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
         drafts = {
-            name: draft_channels(self.found.shared | own, self.runs[0], self.stated)
+            name: draft_channels(self.found.shared | own, self.run, self.stated)
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
@@ -135,7 +131,7 @@ class _MapText:
         shown = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
         lines = [
             f"# Map of {len(names)} log{'s' if len(names) > 1 else ''}: {shown}",
-            "# Written by `soilml import --init`. Everything here is a guess: look at the lines with",
+            "# Written by `soilml import --init`. All of it is a guess: look at the lines with",
             "# CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:",
             '# "0.15 m +- 1 %". Forward is positive for rotation, travel and torque.',
             "#",
@@ -155,29 +151,27 @@ class _MapText:
                 "times can be compared; 'start' where each clock starts at 0"
             )  # fmt: skip
             lines.append(f'clock = "{kind.clock}"  # {why}')
+            if kind.time_column:
+                lines.append(f"time = {_toml(kind.time_column)}")
+                lines.append(f"time_unit = {_toml(kind.time_unit)}")
         return lines
 
     def _time_lines(self) -> list[str]:
-        if any(r.clock is not None for r in self.runs[0].recordings):
-            return ["", "# Time comes from the messages."]
         if self.time_column:
-            return [
-                "",
-                "[time]",
-                f"column = {_toml(self.time_column)}",
-                f"unit = {_toml(self.time_unit)}",
-            ]
+            column, unit = _toml(self.time_column), _toml(self.time_unit)
+            return ["", "[time]", f"column = {column}", f"unit = {unit}"]
+        if not self.rate:
+            return ["", "# Time comes from the messages."]
         stated = "stated in the log" if "rate" in self.stated else "CHANGE: no column is a clock"
         return ["", "[time]", f'rate = "{self.rate:g} Hz"  # {stated}']
 
-    def _run_column(self) -> list[str]:
-        recording = self.runs[0].recordings[0]
-        for name, cells in recording.texts.items():
-            values = list(dict.fromkeys(cells))
-            changes = sum(a != b for a, b in pairwise(cells))
-            if 1 < len(values) <= 500 and changes == len(values) - 1:
-                text = f"column = {_toml(name)}  # {len(values)} values, one run each"
-                return ["", "[runs]", text]
+    def _run_lines(self) -> list[str]:
+        if self.run_column:
+            column = _toml(self.run_column)
+            return ["", "[runs]", f"column = {column}  # {self.run_count} values, one run each"]
+        if self.restarts:
+            why = f"the time starts again {self.restarts} times"
+            return ["", "[runs]", f"split_where_time_restarts = true  # {why}"]
         return []
 
     def _wheel(self, drafts: dict[str, Draft]) -> list[str]:
@@ -187,8 +181,10 @@ class _MapText:
                 value, line = self.stated[key]
                 number = value if " " in value else f"{value} m"
                 return [*lines, f'{key} = "{number} +- 1 %"  # stated in the log: {line[:60]}']
-        needed = "slip" not in self.found.roles() and "rim_speed" not in self.found.roles()
-        inputs = inputs_of(drafts, self.runs[0])
+        needed = not {"slip", "rim_speed"} & self.found.roles() and bool(
+            {"wheel_speed", "wheel_angle"} & self.found.roles()
+        )
+        inputs = inputs_of(drafts, self.run)
         ratio = fastest_ratio(inputs) if inputs is not None and needed else math.nan
         hint = ""
         if math.isfinite(ratio) and ratio > 0.0:
@@ -265,6 +261,14 @@ class _MapText:
         if others:
             return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {_toml(others[0].address)}"]
         return []
+
+
+def _liveliest(runs: Sequence[Run]) -> Run:
+    """The run with the most columns that vary: one in which no sensor is dead."""
+    return max(
+        runs,
+        key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings)),
+    )
 
 
 def _toml(value: Any) -> str:

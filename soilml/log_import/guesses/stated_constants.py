@@ -23,11 +23,11 @@ _STATED = {
 }
 #: Numbers in names of files: role, pattern and unit.
 _IN_NAMES = (
-    ("load", r"(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
+    ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
     ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)n(?![a-z0-9])", "N"),
     ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
-    ("slip", r"(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
-    ("slip", r"(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
 )
 
 

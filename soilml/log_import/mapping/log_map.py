@@ -16,12 +16,17 @@ _ZERO = Uncertain(0.0)
 
 @dataclass(frozen=True)
 class FileKind:
-    """One kind of file, where a run has several: its name has `pattern`; how its clock is read."""
+    """One kind of file, where a run has several: its name has `pattern`; how its clock is read.
+
+    `time_column` and `time_unit` replace those of [time] where they are not "".
+    """
 
     name: str
     pattern: str
     clock: str = "same"
     delay: float = 0.0
+    time_column: str = ""
+    time_unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,7 @@ class LogMap:
     time_unit: str = "s"
     rate: float = 0.0
     run_column: str = ""
+    split_at_reset: bool = False
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
@@ -114,6 +120,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     time.finish()
     runs = settings.table("runs")
     run_column = runs.text("column", "")
+    at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
     runs.finish()
     vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
     shared_wheel = settings.table("wheel")
@@ -151,6 +158,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         time_unit,
         rate,
         run_column,
+        at_reset,
         vehicle,
         _take_windows(settings.table("windows")),
         tuple(_take_left_out(entry) for entry in settings.tables("leave_out")),
@@ -192,8 +200,10 @@ def _take_files(settings: Settings) -> tuple[FileKind, ...]:
             own.fail(f"clock is {clock!r}; needed is 'same' or 'start'")
         if "delay" in own:
             delay = take_uncertain(own, "delay", "s").value
+        kinds.append(
+            FileKind(name, pattern, clock, delay, own.text("time", ""), own.text("time_unit", ""))
+        )
         own.finish()
-        kinds.append(FileKind(name, pattern, clock, delay))
     return tuple(kinds)
 
 

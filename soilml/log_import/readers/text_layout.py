@@ -134,7 +134,7 @@ def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, in
     for i in range(len(like)):
         run = like[i : i + _IN_A_ROW]
         if all(run):
-            return i, sum(like[i:]), max(kinds[i:])
+            return i, sum(like[i:]), max(k for k, fits in zip(kinds, like, strict=True) if fits)
     return 0, 0, 0
 
 

@@ -39,8 +39,8 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 #: Units that a log may write in a header without brackets, at the end of a name.
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
-    "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton newtons "
-    "amps inc mn"
+    "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
+    "newtons amps inc mn"
 )
 _POWER = re.compile(r"([A-Za-z]+)\s*(?:\^|\*\*)?\s*(-?\d)(?!\d)")
 
@@ -58,7 +58,7 @@ def spelling(unit: str) -> str:
     if text.lower() in _SPELLINGS:
         return _SPELLINGS[text.lower()]
     parts = re.split(r"([*/ ])", text)
-    parts = [_SPELLINGS.get(p.lower(), p) if p not in ("1", "-", "C") else p for p in parts]
+    parts = [p if p in ("1", "-", "/", "C") else _SPELLINGS.get(p.lower(), p) for p in parts]
     text = "".join(parts)
     text = _POWER.sub(r"\1**\2", text)
     return re.sub(r"(?<=[\w)])\s+(?=\w)", "*", text)

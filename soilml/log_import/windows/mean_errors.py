@@ -24,8 +24,8 @@ def time_and_window(values: Floats) -> tuple[float, int]:
 
     summed by the initial monotone sequence of Geyer, "Practical Markov chain Monte Carlo", Stat.
     Sci. 7 (1992), section 3.3: the sums of neighbouring pairs, as long as they are positive and do
-    not grow. The bias from the mean is corrected to first order, by :math:`1 + (2 M + 1) / n`: Wolff,
-    Comput. Phys. Commun. 156 (2004), equation 49. It is at
+    not grow. The bias from the mean is corrected to first order, by
+    :math:`1 + (2 M + 1) / n`: Wolff, Comput. Phys. Commun. 156 (2004), equation 49. It is at
     least 1.
     """
     n = values.size
@@ -52,9 +52,9 @@ def mean_error(values: Floats, step: float) -> tuple[float, float, float]:
               \quad \nu = \frac{n}{2 M + 1}
 
     The variance of the estimate of tau is :math:`2 (2 M + 1) / n \, \tau^2` (Sokal, "Monte Carlo
-    methods in statistical mechanics", 1997, equation 3.19), that of a
-    chi-squared variable with :math:`\nu` degrees of freedom over :math:`\nu`: the last factor makes the error the standard deviation of the t distribution that follows. NaN are
-    left out.
+    methods in statistical mechanics", 1997, equation 3.19), that of a chi-squared variable with
+    :math:`\nu` degrees of freedom over :math:`\nu`: the last factor makes the error the standard
+    deviation of the t distribution that follows. NaN are left out.
     """
     own = values[np.isfinite(values)]
     if own.size == 0:

@@ -9,7 +9,7 @@ from soilml.log_import.windows.mean_errors import mean_error, time_and_window
 
 #: Parts that a window is divided into: for motion without noise of the places, and for noisy
 #: places, the first number in which noise is less than half of the variance.
-_FINE, _COARSE = 128, (32, 16, 8)
+_FINE, _COARSE = 128, (16, 8)
 #: Correlation of neighbouring rates below which noise of the places outweighs real motion.
 _NOISY = -0.2
 
@@ -68,7 +68,7 @@ def _slope_error(time: Floats, difference: Floats) -> float:
     if neighbours > _NOISY * size:
         tau, last = time_and_window(rates)
         freedom = max(rates.size / (2.0 * last + 1.0), 4.0)
-        wander = size * length * tau
+        wander = size * length * tau / (1.0 - min(tau / rates.size, 0.5))
         return float(np.sqrt(1.2 * wander / span * freedom / (freedom - 2.0)))
     # white noise of means of one fine part: neighbours have the covariance -(sigma / length)^2
     variance = -neighbours * length**2 / rates.size
@@ -78,7 +78,9 @@ def _slope_error(time: Floats, difference: Floats) -> float:
         noise = variance * count / length**2
         if noise < 0.25 * size:
             break
-    wander = max(size + 2.0 * neighbours, size - 2.0 * noise, 0.0) * length
+    # the difference of two large numbers: half of its standard error is allowed for
+    spread = size * np.sqrt(2.0 / count)
+    wander = (max(size + 2.0 * neighbours, size - 2.0 * noise, 0.0) + 0.5 * spread) * length
     freedom = max(count - 1.0, 4.0)
     return float(
         np.sqrt(1.2 * wander / span * freedom / (freedom - 2.0) + 12.0 * variance / span**2)

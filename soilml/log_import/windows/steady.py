@@ -205,6 +205,10 @@ def _why_not(
         usual = float(np.nanpercentile(np.abs(rim), 90))
         if float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual:
             return "the wheel is at rest"
+    elif "torque" in quantities and np.isfinite(quantities["torque"][rows]).any():
+        size = np.abs(quantities["torque"])
+        if float(np.nanmedian(size[rows])) < _AT_REST * float(np.nanpercentile(size, 90)):
+            return "the torque is near zero: the wheel is probably at rest"
     if stop - start < settings.shortest:
         return f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
     for name in ("slip", "load"):

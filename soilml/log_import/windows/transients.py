@@ -12,6 +12,8 @@ from soilml.log_import.recording import Floats
 #: largest share of it that is cut off at the beginning and at the end.
 _WATCHED, _MEANS = ("slip", "torque"), 50
 _MOST_BEFORE, _MOST_AFTER = 0.4, 0.15
+#: The rule has to lower its criterion to this share: noise alone lowers it by a few per cent.
+_GAIN = 0.85
 
 
 def without_transients(
@@ -61,4 +63,5 @@ def _cheapest(series: Floats, most: int) -> int:
         float(np.sum((kept - kept.mean(axis=0)) ** 2)) / len(kept) ** 2
         for kept in (series[i:] for i in range(most + 1))
     ]
-    return int(np.argmin(costs))
+    best = int(np.argmin(costs))
+    return best if costs[best] < _GAIN * costs[0] else 0

@@ -96,7 +96,7 @@ def write_csv(path, columns, separator=",", decimal=".", encoding="utf-8", head=
     if units is not None:
         lines.append(separator.join(units))
     for row in zip(*columns.values(), strict=True):
-        cells = [value if isinstance(value, str) else f"{value:.7g}" for value in row]
+        cells = [value if isinstance(value, str) else f"{value:.14g}" for value in row]
         lines.append(separator.join(cells).replace(".", decimal))
     path.write_bytes("\r\n".join(lines).encode(encoding))
     return path
