@@ -93,8 +93,8 @@ def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
     if rotation == "rim_speed":
         return "probably [rim_speed] is in mm/s"
     return (
-        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio in "
-        f"[{rotation}]), or its unit is wrong"
+        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
+        f"in [{rotation}]), or its unit is wrong"
     )
 
 

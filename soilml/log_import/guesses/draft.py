@@ -83,6 +83,8 @@ def _draft(role: str, column: Candidate, run: Run, stated: dict[str, tuple[str, 
             draft.put("gear_ratio", float(ratio[0].split()[0]), f"stated in the log: {ratio[1]}")
         else:
             why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
+            if role == "motor_current" or "mot" in column.address.lower():
+                why = "CHANGE: turns of the motor for one of the wheel"
             draft.put("gear_ratio", 1.0, why)
     if role == "motor_current":
         constant = stated.get("torque_constant")

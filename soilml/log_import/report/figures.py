@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from soilml.quantities import Z_90
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import FigureBase
 
 #: Panels of a run: title with unit, quantities, and labels.
 _PANELS = (
@@ -37,26 +36,21 @@ _LOADS = ("#0d0887", "#9c179e", "#cc4778", "#e0603f", "#d98300")
 
 def run_figure(series: WheelSeries, imported: ImportedLog) -> SvgImage:
     """The channels of a run over time; windows are shaded, with their means and 90 % intervals."""
-    panels = [
-        (title, names, labels)
-        for title, names, labels in _PANELS
-        if any(_finite(series, name) for name in names)
-    ]
-    height = _HEIGHT * len(panels) + 46
     with report_style():
-        canvas = new_figure(height)
-        _draw_panels(canvas, panels, series, imported, height)
+        canvas = new_figure(_HEIGHT * len(_panels(series)) + 46)
+        draw_run(canvas, series, imported)
         kept = sum(not s.why for s in series.stretches)
         return svg_image(canvas, f"run {series.run}: {kept} steady windows")
 
 
-def _draw_panels(
-    canvas: Figure,
-    panels: Sequence[tuple[str, Sequence[str], Sequence[str]]],
-    series: WheelSeries,
-    imported: ImportedLog,
-    height: float,
-) -> None:
+def _panels(series: WheelSeries) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+    return [panel for panel in _PANELS if any(_finite(series, name) for name in panel[1])]
+
+
+def draw_run(canvas: FigureBase, series: WheelSeries, imported: ImportedLog) -> None:
+    """Draw the panels of a run into a matplotlib figure."""
+    panels = _panels(series)
+    height = _HEIGHT * len(panels) + 46.0
     rows = imported.table.rows(imported.table["run"] == series.run)
     for k, (title, names, labels) in enumerate(panels):
         top = height - 16 - _HEIGHT * k
@@ -142,29 +136,41 @@ def _thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def slip_figures(imported: ImportedLog) -> list[SvgImage]:
     """The rows over slip: T / (W r) or torque, drawbar pull over load, sinkage; 90 % intervals."""
-    table = imported.table
-    load = table["load_N"]
-    lever = load * imported.radius
     found = []
     with report_style():
-        if np.isfinite(table["torque_Nm"]).any():
-            if np.isfinite(imported.radius):
-                found.append(_over_slip(imported, "torque_Nm", lever, "torque / (load × radius)"))
-            else:
-                found.append(_over_slip(imported, "torque_Nm", np.ones(len(table)), "torque, N m"))
-        if "drawbar_pull_N" in table:
-            found.append(_over_slip(imported, "drawbar_pull_N", load, "drawbar pull / load"))
-        if "sinkage_m" in table:
-            found.append(
-                _over_slip(imported, "sinkage_m", np.full(len(table), 1e-3), "sinkage, mm")
-            )
+        for key, unit, title in _over_slip(imported):
+            canvas = new_figure(250)
+            _draw_over_slip(canvas.add_axes((0.14, 0.17, 0.83, 0.72)), imported, key, unit, title)
+            found.append(svg_image(canvas, f"{title} of {len(imported.table)} rows over slip"))
     return found
 
 
-def _over_slip(imported: ImportedLog, key: str, unit: Floats, title: str) -> SvgImage:
+def draw_slip(canvas: FigureBase, imported: ImportedLog) -> None:
+    """Draw the rows over slip, one below the other, into a matplotlib figure."""
+    shown = _over_slip(imported)[:2]
+    for k, (key, unit, title) in enumerate(shown):
+        place = (0.14, 0.1 + 0.48 * (len(shown) - 1 - k), 0.83, 0.88 / len(shown) - 0.1)
+        _draw_over_slip(canvas.add_axes(place), imported, key, unit, title)
+
+
+def _over_slip(imported: ImportedLog) -> list[tuple[str, Floats, str]]:
+    """Columns to show over slip, what they are divided by, and their titles."""
     table = imported.table
-    canvas = new_figure(250)
-    axes = canvas.add_axes((0.14, 0.17, 0.83, 0.72))
+    load, found = table["load_N"], []
+    if np.isfinite(table["torque_Nm"]).any():
+        if np.isfinite(imported.radius):
+            found.append(("torque_Nm", load * imported.radius, "torque / (load × radius)"))
+        else:
+            found.append(("torque_Nm", np.ones(len(table)), "torque, N m"))
+    if "drawbar_pull_N" in table:
+        found.append(("drawbar_pull_N", load, "drawbar pull / load"))
+    if "sinkage_m" in table:
+        found.append(("sinkage_m", np.full(len(table), 1e-3), "sinkage, mm"))
+    return found
+
+
+def _draw_over_slip(axes: Axes, imported: ImportedLog, key: str, unit: Floats, title: str) -> None:
+    table = imported.table
     loads = table["load_N"]
     groups = load_groups(loads)
     std = table[f"{key}_std"] if f"{key}_std" in table else np.zeros(len(table))
@@ -181,7 +187,6 @@ def _over_slip(imported: ImportedLog, key: str, unit: Floats, title: str) -> Svg
     axes.set_xlabel("slip")
     axes.set_title(title)
     axes.legend(fontsize=9, frameon=False, title="load", title_fontsize=9)
-    return svg_image(canvas, f"{title} of {len(table)} rows over slip")
 
 
 def load_groups(loads: Floats) -> NDArray[np.int64]:

@@ -75,7 +75,27 @@ def steady_windows(
         found.append(
             Stretch(max(entry.start, float(time[0])), min(entry.stop, float(time[-1])), entry.why)
         )
-    return sorted(found, key=lambda s: s.start)
+    return _joined(sorted(found, key=lambda s: s.start), settings)
+
+
+def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]:
+    """Stretches of which those that are too short, and follow each other, are one."""
+    found: list[Stretch] = []
+    short: list[Stretch] = []
+    for stretch in [*stretches, None]:
+        if stretch is not None and "too short" in stretch.why:
+            short.append(stretch)
+            continue
+        if len(short) < 3:
+            found += short
+        else:
+            why = (
+                f"nothing stays the same for {settings.shortest:g} s, as if someone had touched it"
+            )
+            found.append(Stretch(short[0].start, short[-1].stop, why))
+        short = []
+        found += [stretch] if stretch is not None else []
+    return found
 
 
 def _judged(

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from simulated_rig import wandering
 
+from soilml.log_import.checks.irregular import irregular_windows
 from soilml.log_import.mapping.log_map import WindowSettings
+from soilml.log_import.window_rows import WindowRow
 from soilml.log_import.windows.change_points import change_points, steady_pieces
 from soilml.log_import.windows.mean_errors import autocorrelation_time, mean_error
 from soilml.log_import.windows.pooled_errors import pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
-from soilml.log_import.windows.steady import steady_windows
+from soilml.log_import.windows.steady import Stretch, steady_windows
 from soilml.log_import.windows.transients import without_transients
 
 
@@ -115,6 +117,16 @@ def test_what_is_left_out_has_a_reason():
     assert why[0] == "the wheel is at rest"
     assert any("too short" in text for text in why)
     assert any("of the slip is missing" in text for text in why)
+
+
+def test_a_window_that_wanders_far_more_than_the_others_is_irregular():
+    def row(error):
+        return WindowRow(Stretch(0.0, 9.0), {}, {"slip": 0.2}, {"slip": error})
+
+    usual = [row(0.004 + 0.0005 * k) for k in range(5)]
+    found = irregular_windows([[*usual, row(0.05)], [row(0.02)]])
+    assert list(found) == [(0, 5)] and "the slip wanders 9.1 times" in found[(0, 5)]
+    assert irregular_windows([[row(0.004), row(0.05)]]) == {}
 
 
 def test_a_slow_drift_gives_no_window_with_a_wrong_mean():
