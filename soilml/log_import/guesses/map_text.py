@@ -60,6 +60,7 @@ class _MapText:
         self.time_column, self.time_unit = guess_clock(first)
         self.run_column, self.run_count = guess_run_column(logs[0])
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
+        _refuse_a_table_of_runs(logs[0], self.time_column)
         self.stated = stated_constants([line for recording in first for line in recording.about])
         self.rate = 0.0
         if not self.time_column and all(recording.clock is None for recording in first):
@@ -261,6 +262,17 @@ class _MapText:
         if others:
             return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {_toml(others[0].address)}"]
         return []
+
+
+def _refuse_a_table_of_runs(log: Sequence[Recording], clock: str) -> None:
+    """Raise `InputError` for a table whose rows are means already."""
+    for recording in log:
+        held = {*recording.columns, *recording.texts}
+        if {"run", "slip", "load_N"} <= held and not clock and recording.clock is None:
+            raise InputError(
+                f"{recording.file} is a table of runs already, with one row for each operating "
+                "point: give it to `soilml identify`, `estimate` or `gap` as it is"
+            )
 
 
 def _liveliest(runs: Sequence[Run]) -> Run:

@@ -120,8 +120,6 @@ def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, in
         except csv.Error:
             kinds.append(0)
             continue
-        while cells and not cells[-1]:
-            cells.pop()  # some loggers end each line with a separator
         numbers = sum(bool(c) and is_number(c, comma) for c in cells)
         blanks = sum(not c for c in cells)
         # names of runs and times of day stand beside the numbers
@@ -150,7 +148,8 @@ def _header(
         cells = split_line(text, separator)
         while cells and not cells[-1] and len(cells) > width:
             cells.pop()
-        if abs(len(cells) - width) <= max(0, width // 8) and sum(map(bool, cells)) > width / 2:
+        # some loggers end each line of samples with a separator, and the header without
+        if abs(len(cells) - width) <= max(1, width // 8) and sum(map(bool, cells)) > width / 2:
             rows.append((i, cells))
     rows = [row for row in rows if row[0] >= len(head) - 5]
     if not rows:

@@ -130,4 +130,4 @@ def _shared(imported: ImportedLog) -> list[dict[str, str]]:
 def _kept_share(imported: ImportedLog) -> str:
     total = sum(float(s.time[-1] - s.time[0]) for s in imported.series)
     kept = sum(w.stop - w.start for s in imported.series for w in s.stretches if not w.why)
-    return f"{kept / total:.0%}" if total else "0 %"
+    return f"{100.0 * kept / total:.0f} %" if total else "0 %"

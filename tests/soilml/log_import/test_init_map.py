@@ -1,12 +1,16 @@
 """The map that is written for a log nobody has described, and the traps of real logs."""
 
+import os
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
 
 from soilml.cli import main
+from soilml.errors import InputError
 from soilml.io.read_table import read_table
 from soilml.log_import import import_log, init_map
 
@@ -103,6 +107,13 @@ def test_wheels_are_told_apart_by_their_names(tmp_path):
     table = imported_by_guess(tmp_path, path, edits).table
     assert list(table["wheel"]) == ["front_left", "front_right", "rear_left", "rear_right"]
     np.testing.assert_allclose(table["load_N"], LOAD, rtol=1e-5)
+
+
+def test_a_table_of_runs_is_no_log(tmp_path):
+    path = tmp_path / "runs.csv"
+    path.write_text("run,slip,load_N,torque_Nm\n" + "a,0.1,60,1.5\n" * 9)
+    with pytest.raises(InputError, match="is a table of runs already"):
+        init_map(path)
 
 
 def test_slip_and_load_in_the_names_of_files(tmp_path):
@@ -211,3 +222,20 @@ def test_the_command_refuses_in_one_line(rig_logs, tmp_path, capsys):
         assert main(command) == 2
         said = capsys.readouterr().err
         assert words in said and said.strip().count("\n") <= 1, said
+
+
+def test_measured_tables_are_looked_at():
+    """Published plate and shear tests: no rig with a wheel, which is said in one line."""
+    folder = os.environ.get("SOILML_DATA", "")
+    logs = sorted(Path(folder).glob("*/*.csv")) if folder else []
+    if not logs:
+        pytest.skip("SOILML_DATA does not name a folder with measured tests")
+    for log in logs:
+        try:
+            text = init_map(log)
+        except InputError as error:
+            assert "is a table of runs already" in str(error)
+            continue
+        content = tomllib.loads(text)
+        with pytest.raises(InputError, match="is missing"):
+            import_log(log, content)
