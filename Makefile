@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers gap test test-fast check models limit kls1 gap-real bench bench-gap clean
+.PHONY: help demo demo-papers demo-import gap test test-fast check models limit kls1 gap-real bench bench-gap clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -20,7 +20,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## from the forward model to an estimate on board, with a table and a picture
@@ -31,6 +31,9 @@ gap: $(VENV)/.ready ## five examples of a model that lacks an effect, with their
 
 demo-papers: $(VENV)/.ready ## every system of the source papers: pictures, and printed numbers beside computed ones
 	@$(BIN)/python examples/papers/run.py
+
+demo-import: $(VENV)/.ready ## from the raw logs of a rig to the soil: map, import report, identification
+	@$(BIN)/python examples/import/run.py
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check

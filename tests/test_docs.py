@@ -11,6 +11,7 @@ from soilml import read_case, read_table
 from soilml.cli import main
 from soilml.cli.main import COMMANDS
 from soilml.io.read_table import RUNS
+from soilml.log_import import read_map
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
@@ -25,6 +26,7 @@ RUN = (
     "docs/sets.md",
     "docs/driving.md",
     "docs/advice.md",
+    "docs/import.md",
     "docs/pull.md",
     "docs/papers/slip_models.md",
     "exported/README.md",
@@ -79,6 +81,13 @@ def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     assert main(["generate", "recipe.toml", "data.parquet", "--rows", "3000"]) == 0
     assert main(["train", "spec.toml", "data.parquet", "model.onnx"]) == 0
+
+
+def test_the_map_of_a_log_is_valid(tmp_path):
+    (tmp_path / "map.toml").write_text(blocks("docs/import.md", "toml")[0])
+    (wheel,) = read_map(tmp_path / "map.toml").wheels
+    assert wheel.channels["motor_current"].torque_constant.relative == pytest.approx(0.03)
+    assert len(wheel.channels) == 6
 
 
 def test_the_table_of_runs_is_valid(tmp_path):

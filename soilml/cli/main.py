@@ -26,6 +26,7 @@ DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
 
+  from a log to a table        soilml import
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
   from a model file to C       soilml export-c
@@ -44,6 +45,7 @@ COMMANDS = {
     "init": "soilml.cli.commands.setup.init",
     "models": "soilml.cli.commands.setup.models",
     "doctor": "soilml.cli.commands.setup.doctor",
+    "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",
     "simulate": "soilml.cli.commands.simulate",

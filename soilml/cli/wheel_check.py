@@ -147,6 +147,12 @@ def _number(value: object) -> str:
     return f"{value:g} m" if isinstance(value, float) else str(value)
 
 
+def trained_radius(estimator: Estimator) -> float | None:
+    """Radius (m) of the wheel of the training; None for a file of any wheel."""
+    radius = json.loads(estimator.metadata["gear"]).get("radius")
+    return float(radius) if isinstance(radius, int | float) else None
+
+
 def check_table_wheel(estimator: Estimator, table: Table) -> None:
     """Raise `TableError` where the table's wheel columns differ from the wheel of the training."""
     gear = json.loads(estimator.metadata["gear"])

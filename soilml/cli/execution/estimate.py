@@ -20,8 +20,14 @@ from soilml.cli.joint_readings import (
 )
 from soilml.cli.option_values import read_rows
 from soilml.cli.output import write_columns
+from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_model_error import usual_answer
-from soilml.cli.wheel_check import apply_case_option, check_table_wheel, describe_file
+from soilml.cli.wheel_check import (
+    apply_case_option,
+    check_table_wheel,
+    describe_file,
+    trained_radius,
+)
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
@@ -56,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
     table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
         check_table_wheel(estimator, table)
+    print_table_hints(table, case, trained_radius(estimators[0]))
     usable = [_complete(estimator, table) & table.answered for estimator in estimators]
     complete = np.any([_complete(estimator, table) for estimator in estimators], axis=0)
     if not np.any(usable):

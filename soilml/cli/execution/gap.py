@@ -10,6 +10,7 @@ from soilml.cli.option_values import available_effects, check_seed, parse_costs,
 from soilml.cli.output import json_text
 from soilml.cli.output_names import GAP_SUSPECTED
 from soilml.cli.progress import progress_bar
+from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, create_folder
@@ -30,6 +31,7 @@ def run(args: argparse.Namespace) -> int:
     effects = available_effects(args)
     case = read_case(args.model, effects)
     table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
             case,

@@ -1,0 +1,55 @@
+"""From raw logs to the soil, and the picture of docs/import.md: `make demo-import`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rig import write_logs
+
+from soilml.cli import main
+from soilml.gap.html.svg_image import report_style
+from soilml.log_import import import_log
+from soilml.log_import.report.figures import draw_run, draw_slip
+
+FOLDER = Path("demo/import")
+#: What a look at the map changes: the gear ratio, which no log tells.
+EDIT = ("gear_ratio = 1 ", "gear_ratio = 99 ")
+
+
+def run(*command: str) -> None:
+    """Run a command and show it."""
+    print(f"\n$ soilml {' '.join(command)}", flush=True)
+    main(command)
+
+
+def picture(logs: list[str], chart: Path, target: Path) -> None:
+    """Two runs over time and the rows over slip, as the report has them."""
+    import matplotlib.pyplot as plt
+
+    imported = import_log(logs, chart)
+    with report_style():
+        figure = plt.figure(figsize=(15.2, 4.8))
+        first, second, third = figure.subfigures(1, 3)
+        draw_run(first, imported.series[0], imported)
+        draw_run(second, imported.series[3], imported)
+        draw_slip(third, imported)
+        first.axes[-1].set_xlabel("time, s; sand_1")
+        second.axes[-1].set_xlabel("time, s; sand_4: somebody pulls on the carriage at the end")
+        figure.savefig(target, dpi=80, facecolor="white")
+
+
+if __name__ == "__main__":
+    logs = [str(path) for path in write_logs(FOLDER)]
+    chart, runs = FOLDER / "map.toml", FOLDER / "runs.csv"
+    chart.unlink(missing_ok=True)
+    run("import", "--init", *logs, "--out", str(chart))
+    run("import", *logs, "--map", str(chart), "--out", str(runs))
+    print(f"\nin {chart}: {EDIT[0].strip()} -> {EDIT[1].strip()}")
+    chart.write_text(chart.read_text().replace(*EDIT))
+    run("import", *logs, "--map", str(chart), "--out", str(runs))
+    run("identify", str(FOLDER / "model.toml"), str(runs), "--out", str(FOLDER / "soil.json"))
+    picture(logs, chart, FOLDER / "import.png")
+    print(f"\npicture: {FOLDER / 'import.png'}; report: {runs.with_suffix('.report.html')}")

@@ -1,0 +1,87 @@
+"""`soilml import`: logs of rigs and rovers become a table of runs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from soilml.cli.output import format_columns, is_terminal, json_text, write_stdout
+from soilml.cli.output_names import IMPORT_SUFFIXES
+from soilml.cli.progress import stage_progress
+from soilml.io.atomic_files import atomic_outputs, output_files, save_text
+from soilml.io.text_tables import csv_text
+from soilml.log_import.guesses.map_text import init_map
+from soilml.log_import.result import ImportedLog
+from soilml.log_import.workflow import import_log
+from soilml.optional_imports import need
+
+#: Columns of the table on the terminal; the file has all.
+_SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "drawbar_pull_N",
+          "sinkage_m")  # fmt: skip
+_MOST_SHOWN = 40
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the map, or the table and its report."""
+    need("pint", "import")
+    if args.init:
+        return _init(args)
+    if args.out is not None:
+        for library in ("jinja2", "matplotlib"):
+            need(library, "import")
+    with stage_progress() as tell:
+        found = import_log(args.files, args.map, accept=args.accept, progress=tell)
+        html = ""
+        if args.out is not None:
+            from soilml.log_import.report.page import page
+
+            html = page(found, tell)
+    _print_remarks(found)
+    if args.out is None:
+        _print_table(found)
+        return 0
+    files = output_files(args.out, *IMPORT_SUFFIXES)
+    texts = (csv_text(found.table.columns), html, json_text(found.as_json()), found.bias_toml())
+    with atomic_outputs(files) as parts:
+        for part, text in zip(parts, texts, strict=True):
+            part.write_text(text, encoding="utf-8")
+    if is_terminal():
+        _print_table(found)
+    print(
+        f"{len(found.table)} rows of {len(found.series)} runs written to {args.out}; "
+        f"report: {files[1]}; errors that all rows share: {files[3]}",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def _init(args: argparse.Namespace) -> int:
+    text = init_map(args.files)
+    if args.out is None:
+        write_stdout(text)
+        return 0
+    save_text(args.out, text)
+    changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
+    todo = f"{changes} lines need a look (CHANGE, NEEDED)" if changes else "look at its guesses"
+    print(
+        f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def _print_remarks(found: ImportedLog) -> None:
+    for text in (*found.implausible, *found.remarks):
+        print(f"! {text}", file=sys.stderr)
+    short = sum(stop.stop - stop.start for _, stop in found.left_out())
+    print(f"{short:.0f} s were left out; the report says why", file=sys.stderr)
+
+
+def _print_table(found: ImportedLog) -> None:
+    table = found.table
+    if not is_terminal():
+        write_stdout(csv_text(table.columns))
+        return
+    columns = {name: table[name][:_MOST_SHOWN] for name in _SHOWN if name in table}
+    more = f"and {len(table) - _MOST_SHOWN} more\n" if len(table) > _MOST_SHOWN else ""
+    write_stdout(f"{format_columns(columns)}\n{more}")

@@ -1,0 +1,36 @@
+"""Hints at columns of a table of runs that look as if a unit or a sign were wrong."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.io.table import Table
+from soilml.log_import.checks.table_hints import table_hints
+
+
+def print_table_hints(table: Table, case: Case | None, radius: float | None = None) -> None:
+    """Print a line on standard error for each oddity of a table; see `table_hints`.
+
+    The radius of the wheel (m) is that of the case, else `radius`; None where it is not known.
+    """
+    used = table.rows(table.answered)
+    radii = radius if case is None else _radii(used, case)
+    if len(used):
+        for hint in table_hints(used.columns, radii):
+            print(f"! {table.source}: {hint}", file=sys.stderr)
+
+
+def _radii(table: Table, case: Case) -> NDArray[np.float64] | None:
+    """Radius of each row, (rows,), m; None for a gear without a radius."""
+    if not case.gears:
+        radius = getattr(case.model.gear, "radius", None)
+        return None if radius is None else np.full(len(table), float(radius))
+    first = next(iter(case.gears))
+    names = table["gear"] if "gear" in table else np.full(len(table), first)
+    radii = {name: getattr(model.gear, "radius", None) for name, model in case.gears.items()}
+    found = [radii.get(str(name) or first) for name in names]
+    return None if any(r is None for r in found) else np.asarray(found, dtype=np.float64)

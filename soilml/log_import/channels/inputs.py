@@ -1,0 +1,202 @@
+"""The channels of one wheel on one grid, in the units of soilml, tared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.log_import.channels.resampling import (
+    derivative,
+    on_grid,
+    sampling_interval,
+    uniform_grid,
+    unwrapped,
+)
+from soilml.log_import.channels.runs import Run
+from soilml.log_import.mapping.channel import Channel
+from soilml.log_import.mapping.log_map import WheelMap
+from soilml.log_import.recording import Floats
+from soilml.log_import.windows.mean_errors import mean_error
+
+#: Span of the derivative of places and angles, s.
+SMOOTH = 0.5
+#: Share of the usual rotation speed below which a wheel stands still; shortest rest, and what is
+#: left out before the start, s.
+_STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
+_PLACES = ("wheel_angle", "position")
+
+
+@dataclass
+class Inputs:
+    """Samples of the channels of one wheel.
+
+    Attributes
+    ----------
+    time
+        Grid (n,), s after the start of the run.
+    values
+        Samples (n,) by role, as the sensors see them: before gearboxes.
+    places
+        Roles that were given as angle or place, of which `values` has the rates under
+        `wheel_speed` and `ground_speed`; here as they were given.
+    constants
+        Roles that do not vary, with their value.
+    rest
+        Mean at rest and its standard error by role; empty where the wheel never rests.
+    tare_error
+        Standard error of the tare by role.
+    notes
+        What was tared, and what could not be.
+    """
+
+    time: Floats
+    values: dict[str, Floats] = field(default_factory=dict)
+    places: dict[str, Floats] = field(default_factory=dict)
+    constants: dict[str, float] = field(default_factory=dict)
+    rest: dict[str, tuple[float, float]] = field(default_factory=dict)
+    tare_error: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def step(self) -> float:
+        """Step of the grid, s."""
+        return float(self.time[1] - self.time[0])
+
+
+def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
+    """The channels of a wheel in a run.
+
+    Raises `InputError` for a column that the run lacks, and where channels do not overlap in time.
+    """
+    raw: dict[str, list[tuple[Floats, Floats]]] = {}
+    constants = {}
+    for role, channel in wheel.channels.items():
+        if channel.columns:
+            raw[role] = [run.find(address) for address in channel.columns]
+        else:
+            constants[role] = _constant(run, channel)
+    parts = [part for several in raw.values() for part in several]
+    if not parts:
+        raise InputError(f"run {run.name}: the map names no column")
+    starts = [times[0] for times, _ in parts]
+    stops = [times[-1] for times, _ in parts]
+    if not max(starts) < min(stops):
+        raise InputError(
+            f"run {run.name}: the recordings do not overlap in time ({max(starts):.6g} s to "
+            f"{min(stops):.6g} s); where their clocks differ, write clock = 'start' in [files]"
+        )
+    intervals = [sampling_interval(times, values) for times, values in parts]
+    if not np.isfinite(min(intervals)):
+        raise InputError(f"run {run.name}: no channel has two samples")
+    grid = uniform_grid(intervals, max(starts), min(stops))
+    if grid.size < 8:
+        raise InputError(f"run {run.name} has {grid.size} samples; needed are 8 or more")
+    inputs = Inputs(grid, constants=constants)
+    for role, several in raw.items():
+        channel = wheel.channels[role]
+        if channel.unwrap:
+            several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
+        sampled = [on_grid(grid, t, v, continuous=role in _PLACES) for t, v in several]
+        _add(inputs, channel, sampled)
+    _tare(inputs, wheel)
+    return inputs
+
+
+def _add(inputs: Inputs, channel: Channel, sampled: list[Floats]) -> None:
+    """Add a channel in the units of soilml; places are added with their rate."""
+    role, grid = channel.role, inputs.time
+    if role == "slope" and len(sampled) == 3:
+        forward, side, up = sampled
+        inputs.values[role] = channel.scale * np.arctan2(forward, np.hypot(side, up))
+    elif role == "position":
+        place = channel.scale * along_path(sampled)
+        inputs.places[role] = place
+        inputs.values.setdefault("ground_speed", derivative(grid, place, SMOOTH))
+    elif role == "wheel_angle":
+        place = channel.scale * sampled[0]
+        inputs.places[role] = place
+        inputs.values.setdefault("wheel_speed", derivative(grid, place, SMOOTH))
+    else:
+        inputs.values[role] = channel.scale * sampled[0]
+
+
+def along_path(sampled: list[Floats]) -> Floats:
+    """Place along the way, (n,), of coordinates: on the straight line that fits them best."""
+    if len(sampled) == 1:
+        return sampled[0]
+    points = np.stack(sampled, axis=1)
+    known = np.isfinite(points).all(axis=1)
+    centred = points - points[known].mean(axis=0)
+    _, _, axes = np.linalg.svd(centred[known], full_matrices=False)
+    place = centred @ axes[0]
+    way = place[known]
+    return np.asarray(place if way[-1] >= way[0] else -place)
+
+
+def _constant(run: Run, channel: Channel) -> float:
+    if channel.value is not None:
+        return channel.value.value
+    assert channel.name_pattern is not None
+    match = channel.name_pattern.search(run.name)
+    try:
+        return channel.scale * float(match[1].replace(",", ".")) if match else float("nan")
+    except ValueError:
+        match = None
+    finally:
+        if match is None:
+            raise InputError(
+                f"{channel.where} file_name {channel.name_pattern.pattern!r} finds no number in "
+                f"the name of the run {run.name!r}"
+            )
+    return float("nan")
+
+
+def resting(inputs: Inputs) -> slice | None:
+    """The stretch before the wheel starts, without its end; None where there is none."""
+    speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
+    if speed is None:
+        speed = inputs.values.get("ground_speed")
+    if speed is None or not np.isfinite(speed).any():
+        return None
+    size = np.abs(speed)
+    moves = np.nan_to_num(size) > max(_STANDS * float(np.nanpercentile(size, 90)), 1e-9)
+    # a single noisy sample is no start
+    width = max(1, round(0.1 / inputs.step))
+    sustained = np.convolve(moves, np.ones(width), "full")[: moves.size] >= width
+    first = int(np.argmax(sustained)) - width + 1 if sustained.any() else moves.size
+    margin = _BEFORE_START + (SMOOTH / 2 if "wheel_angle" in inputs.places else 0.0)
+    end = first - round(margin / inputs.step)
+    return slice(0, end) if end * inputs.step >= _SHORTEST_REST else None
+
+
+def _tare(inputs: Inputs, wheel: WheelMap) -> None:
+    rest = resting(inputs)
+    for role, values in inputs.values.items():
+        channel = wheel.channels.get(role)
+        if rest is not None:
+            mean, error = mean_error(values[rest], inputs.step)[:2]
+            inputs.rest[role] = (mean, error)
+        if channel is None or channel.tare is None:
+            continue
+        if channel.tare == "rest":
+            if rest is None:
+                inputs.notes.append(
+                    f"[{role}] is not tared: the wheel does not rest at the start of the run; "
+                    "state a stretch, such as tare = [0.5, 3.0]"
+                )
+                continue
+            stretch = values[rest]
+        else:
+            assert isinstance(channel.tare, tuple)
+            start, stop = channel.tare
+            stretch = values[(inputs.time >= start) & (inputs.time <= stop)]
+        if np.isfinite(stretch).sum() < 5:
+            inputs.notes.append(f"[{role}] is not tared: the stretch has fewer than 5 samples")
+            continue
+        zero, error = mean_error(stretch, inputs.step)[:2]
+        inputs.values[role] = values - zero
+        inputs.tare_error[role] = error
+        if role in inputs.rest:
+            inputs.rest[role] = (inputs.rest[role][0] - zero, error)

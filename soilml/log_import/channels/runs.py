@@ -1,0 +1,238 @@
+"""Which recordings belong to one run, and their common clock."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.log_import.mapping.log_map import FileKind, LogMap
+from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.units.conversion import factor
+
+#: A recording, and the kind of its file where a run has several kinds.
+Member = tuple[Recording, FileKind | None]
+_WORDS = re.compile(r"[^A-Za-z0-9.]+")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One drive: its recordings, with the time of their samples in s after the run's start."""
+
+    name: str
+    recordings: tuple[Recording, ...]
+    times: tuple[Floats, ...]
+    notes: tuple[str, ...] = ()
+
+    def find(self, address: str) -> tuple[Floats, Floats]:
+        """Times and samples of a column, `NAME` or `RECORDING:NAME`.
+
+        Raises `InputError` where no recording has it, or several have.
+        """
+        holds = [
+            (recording, times, column)
+            for recording, times in zip(self.recordings, self.times, strict=True)
+            if (column := _column_in(recording, address))
+        ]
+        if len(holds) > 1:
+            options = ", ".join(f"'{r.name}:{c}'" for r, _, c in holds)
+            raise InputError(f"run {self.name}: several recordings have the column {address!r}; "
+                             f"needed is one of {options}")  # fmt: skip
+        if not holds:
+            raise InputError(f"run {self.name}: {_missing(self.recordings, address)}")
+        recording, times, column = holds[0]
+        return times, recording.columns[column]
+
+
+def _column_in(recording: Recording, address: str) -> str:
+    """Name of the column of a recording that an address means; "" where it has none."""
+    if address in recording.columns:
+        return address
+    prefix = f"{recording.name}:"
+    if recording.name and address.startswith(prefix):
+        column = address.removeprefix(prefix)
+        return column if column in recording.columns else ""
+    return ""
+
+
+def _missing(recordings: Sequence[Recording], address: str) -> str:
+    known = [f"{r.name}:{c}" if r.name else c for r in recordings for c in r.columns]
+    texts = [c for r in recordings for c in r.texts]
+    if address in texts:
+        return f"the column {address!r} holds text; needed are numbers"
+    near = difflib.get_close_matches(address, known, 1, 0.5)
+    hint = f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(known[:20])}"
+    return f"no column {address!r}; {hint}"
+
+
+def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
+    """The runs of logs: one for each file, for each set of files that belong together, or for each
+    value of the run column.
+
+    Raises `InputError` where files cannot be matched, or time is missing.
+    """
+    return [
+        _with_times(own_name, part, log_map)
+        for name, members in matched_files(logs, log_map.files).items()
+        for own_name, part in _divided(name, members, log_map)
+    ]
+
+
+def matched_files(
+    logs: Sequence[Sequence[Recording]], kinds: Sequence[FileKind]
+) -> dict[str, list[Member]]:
+    """Recordings by the name of their run, with the kind of their file."""
+    files = [log[0].file for log in logs]
+    names = run_names(files)
+    if not kinds:
+        return {
+            name: [(recording, None) for recording in log]
+            for name, log in zip(names, logs, strict=True)
+        }
+    found: dict[str, list[Member]] = {}
+    for file, name, log in zip(files, names, logs, strict=True):
+        matching = [k for k in kinds if fnmatch.fnmatch(name, k.pattern) or _name_fits(file, k)]
+        if len(matching) != 1:
+            known = ", ".join(f"{k.name} = {k.pattern!r}" for k in kinds)
+            raise InputError(
+                f"{file}: {len(matching)} patterns of [files] fit its name; needed is one: {known}"
+            )
+        key = "_".join(key_words(name, set(_words(matching[0].pattern)))) or "run"
+        for recording in log:
+            own = matching[0].name + (f"/{recording.name}" if recording.name else "")
+            found.setdefault(key, []).append((replace(recording, name=own), matching[0]))
+    for key, members in found.items():
+        there = [kind.name for _, kind in members if kind is not None]
+        lacking = [kind.name for kind in kinds if kind.name not in there]
+        if lacking:
+            raise InputError(
+                f"run {key}: no file of the kind {lacking[0]!r}; there is "
+                f"{', '.join(str(recording.file) for recording, _ in members)}"
+            )
+    return found
+
+
+def _name_fits(file: Path, kind: FileKind) -> bool:
+    return fnmatch.fnmatch(file.name, kind.pattern)
+
+
+def run_names(files: Sequence[Path]) -> list[str]:
+    """A name for each file: its stem, with folders where several files have the same one."""
+    stems = [file.stem if file.suffix else file.name for file in files]
+    depth = 0
+    names = list(stems)
+    while len(set(names)) < len(names) and depth < 6:
+        depth += 1
+        names = [
+            "_".join((*file.parts[:-1][-depth:], stem))
+            for file, stem in zip(files, stems, strict=True)
+        ]
+    return names
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in _WORDS.split(text) if word.strip(".")]
+
+
+def key_words(name: str, without: set[str]) -> list[str]:
+    """The words of a run's name that say which run, without those that say which kind of file."""
+    return [word for word in _words(name) if word not in without]
+
+
+def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
+    recordings, clocks, notes = [], [], []
+    for recording, kind in members:
+        clock = _clock(recording, log_map, kind)
+        if clock is None:
+            continue
+        good = _increasing(clock)
+        if not good.any():
+            continue
+        if not good.all():
+            count = int(np.sum(~good))
+            notes.append(f"{count} samples go back in time or have none, and are left out")
+            recording, clock = recording.rows(good), clock[good]
+        if kind is not None and kind.clock == "start":
+            clock = clock - clock[0]
+        recordings.append(recording)
+        clocks.append((clock + (kind.delay if kind else 0.0), kind is None or kind.clock == "same"))
+        notes += recording.notes
+    if not clocks:
+        raise InputError(
+            f"run {name}: no recording has a time; needed is [time] column, or [time] rate = "
+            "'100 Hz'"
+        )
+    common = [clock[0] for clock, same in clocks if same]
+    divided = log_map.run_column or log_map.split_at_reset
+    start = (common[0] if divided else min(common)) if common else 0.0
+    times = tuple(clock - start if same else clock for clock, same in clocks)
+    return Run(name, tuple(recordings), times, tuple(dict.fromkeys(notes)))
+
+
+def _clock(recording: Recording, log_map: LogMap, kind: FileKind | None) -> Floats | None:
+    """Time of the samples in s; None where the recording has no time."""
+    name = (kind.time_column if kind else "") or log_map.time_column
+    if name:
+        column = _column_in(recording, name)
+        if column:
+            unit = (kind.time_unit if kind else "") or log_map.time_unit
+            return recording.columns[column] * factor(unit, "s", "[time] unit")
+        if name in recording.texts:
+            raise InputError(
+                f"{recording.file}: the time in column {name!r} is not understood: "
+                f"{recording.texts[name][0]!r}; needed are numbers, dates, hh:mm:ss"
+            )
+    if recording.clock is not None:
+        return recording.clock
+    if log_map.rate:
+        return np.arange(len(recording)) / log_map.rate
+    return None
+
+
+def _increasing(clock: Floats) -> NDArray[np.bool_]:
+    """Samples whose time is above that of all before, (n,)."""
+    filled = np.where(np.isfinite(clock), clock, -np.inf)
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], filled[:-1]]))
+    return np.asarray(filled > before)
+
+
+def _divided(
+    name: str, members: Sequence[Member], log_map: LogMap
+) -> list[tuple[str, list[Member]]]:
+    """A log as its runs: by the values of the run column, or where its time starts again.
+
+    Recordings without the column take part in every run, where they overlap in time.
+    """
+    if log_map.run_column:
+        recordings = [recording for recording, _ in members]
+        column = log_map.run_column
+        at = [i for i, r in enumerate(recordings) if column in r.texts or column in r.columns]
+        if len(at) != 1:
+            raise InputError(f"[runs] column: {_missing(recordings, column)}")
+        own = recordings[at[0]]
+        labels = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
+    elif log_map.split_at_reset:
+        at = [0]
+        clock = _clock(members[0][0], log_map, members[0][1])
+        if clock is None:
+            return [(name, list(members))]
+        parts = np.concatenate([[0], np.cumsum(np.diff(clock) < 0.0)])
+        labels = [f"{name}_{part + 1:02d}" for part in parts]
+    else:
+        return [(name, list(members))]
+    found = []
+    for label in dict.fromkeys(labels):
+        keep = np.asarray([cell == label for cell in labels])
+        part = [
+            (r.rows(keep), kind) if i == at[0] else (r, kind) for i, (r, kind) in enumerate(members)
+        ]
+        # the recording that was divided comes first: its start is that of the run
+        found.append((label or "unnamed", [part.pop(at[0]), *part]))
+    return found

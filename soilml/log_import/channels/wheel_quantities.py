@@ -1,0 +1,109 @@
+"""Slip, torque, load and the other quantities of a wheel from its channels and the map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from soilml.log_import.channels.wheel_load import vehicle_load
+from soilml.log_import.channels.wheel_torque import through_gearbox, torque_from_current
+from soilml.log_import.mapping.channel import GEARED
+from soilml.log_import.mapping.log_map import Vehicle, WheelMap
+from soilml.log_import.units.uncertain_value import Uncertain
+
+
+def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:
+    """Every constant of the map that acts on a wheel, by name, with its standard deviation.
+
+    The errors that all rows share are constants too: gains of 1 and offsets of 0.
+    """
+    found: dict[str, Uncertain] = {}
+    if wheel.radius is not None:
+        found["radius"] = wheel.radius
+    for role, channel in wheel.channels.items():
+        found[f"{role}.gain"] = Uncertain(1.0, channel.bias.share)
+        found[f"{role}.offset"] = Uncertain(0.0, channel.bias.constant)
+        if channel.value is not None:
+            found[f"{role}.offset"] = Uncertain(0.0, channel.value.std)
+        if role in GEARED:
+            found[f"{role}.gear_ratio"] = channel.gear_ratio
+        if role in ("torque", "motor_current"):
+            found[f"{role}.efficiency"] = channel.efficiency
+        if role == "motor_current":
+            found[f"{role}.torque_constant"] = channel.torque_constant
+            found[f"{role}.idle_current"] = channel.idle_current
+    if vehicle is not None:
+        for key in ("mass", "wheelbase", "behind_front", "height"):
+            found[f"vehicle.{key}"] = getattr(vehicle, key)
+    return found
+
+
+def wheel_quantities(
+    values: Mapping[str, Any],
+    wheel: WheelMap,
+    vehicle: Vehicle | None,
+    constants: Mapping[str, float],
+) -> dict[str, Any]:
+    """Quantities (...) of a wheel from its channels (...), in SI units.
+
+    Parameters
+    ----------
+    values
+        Channels by role, as their sensors see them; `wheel_speed` and `ground_speed` are rates.
+    constants
+        Values of `constants_of`.
+
+    Returns
+    -------
+    dict
+        `rim_speed` and `speed` (m/s), `slip`, `torque`, `load`, `drawbar_pull`, `sinkage`, as far
+        as the channels give them. In reverse, torque and drawbar pull are positive along the
+        travel and the speed is below zero.
+    """
+
+    def read(role: str) -> Any:
+        offset = constants.get(f"{role}.offset", 0.0)
+        return constants.get(f"{role}.gain", 1.0) * values[role] + offset
+
+    found: dict[str, Any] = {}
+    if "rim_speed" in values:
+        found["rim_speed"] = read("rim_speed")
+    elif "wheel_speed" in values and "radius" in constants:
+        source = "wheel_angle" if "wheel_angle" in wheel.channels else "wheel_speed"
+        rate = read("wheel_speed") / constants[f"{source}.gear_ratio"]
+        found["rim_speed"] = constants["radius"] * rate
+    if "ground_speed" in values:
+        found["speed"] = read("ground_speed")
+    turning = found.get("rim_speed", values.get("wheel_speed", found.get("speed", 1.0)))
+    direction = np.where(np.asarray(turning) < 0.0, -1.0, 1.0)
+    if "slip" in values:
+        found["slip"] = read("slip")
+    elif {"rim_speed", "speed"} <= found.keys():
+        found["slip"] = slip_ratio(direction * found["rim_speed"], direction * found["speed"])
+    if "torque" in values:
+        found["torque"] = direction * through_gearbox(
+            read("torque"), direction, "torque", constants.__getitem__
+        )
+    elif "motor_current" in values:
+        found["torque"] = direction * torque_from_current(
+            read("motor_current"), direction, constants.__getitem__
+        )
+    if "load" in values:
+        found["load"] = read("load")
+    elif vehicle is not None:
+        slope = read("slope") if "slope" in values else 0.0
+        found["load"] = vehicle_load(vehicle, wheel.axle, slope, constants.__getitem__)
+    if "drawbar_pull" in values:
+        found["drawbar_pull"] = direction * read("drawbar_pull")
+    if "sinkage" in values:
+        found["sinkage"] = read("sinkage")
+    return found
+
+
+def slip_ratio(rim: Any, ground: Any) -> Any:
+    """Slip (...) of rim and travel speeds (...), m/s: 1 - v/(r omega), braking r omega/v - 1."""
+    rim, ground = np.asarray(rim), np.asarray(ground)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(rim >= ground, 1.0 - ground / rim, rim / ground - 1.0)

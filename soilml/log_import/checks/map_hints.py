@@ -1,0 +1,168 @@
+"""Windows of a log that look as if its map were wrong, with the likely cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from soilml.log_import.checks.table_hints import MOST_TRACTION, traction_cause
+from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.recording import Floats
+
+#: Ratio of what was read to what is meant, for rotations; and for travel.
+_ROTATION = (
+    (180.0 / math.pi, "deg"),
+    (30.0 / math.pi, "rpm"),
+    (2.0 * math.pi, "turns"),
+    (6.0, "deg/s, and was read as rpm"),
+)
+_TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
+
+
+def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> list[str]:
+    """What says that the map of a wheel is wrong.
+
+    Parameters
+    ----------
+    windows
+        Means of the windows (windows,) by quantity: `rim_speed` and `speed` in the sensors' own
+        direction, `slip`, `torque`, `load`, `slope`.
+    """
+    of = f" of wheel {wheel.name}" if wheel.name else ""
+    found = [*_ratio(log_map, wheel, windows), *_load(log_map, wheel, windows)]
+    found += [*_torque(log_map, wheel, windows), *_slope(wheel, windows)]
+    return [f"{log_map.source}{of}: {text}" for text in found]
+
+
+def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+    if "slip" in wheel.channels:
+        slip = windows.get("slip", np.zeros(0))
+        if slip.size and float(np.nanmedian(np.abs(slip))) >= 1.0:
+            yield (
+                f"slip is {float(np.nanmedian(slip)):.3g} in the middle of the windows: probably "
+                "it is in per cent; write unit = '%' in [slip]"
+            )
+        return
+    if not {"rim_speed", "speed"} <= windows.keys():
+        return
+    rim, ground = windows["rim_speed"], windows["speed"]
+    good = np.isfinite(rim) & np.isfinite(ground) & (rim != 0.0)
+    if not good.any():
+        return
+    ratio = ground[good] / rim[good]
+    middle, fastest = float(np.median(ratio)), float(np.max(ratio))
+    rotation = next(r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in wheel.channels)
+    travel = "position" if "position" in wheel.channels else "ground_speed"
+    if middle < -0.02:
+        yield (
+            f"travel and rotation have opposite signs in {np.mean(ratio < 0.0):.0%} of windows: "
+            f"write reverse = true in [{travel}] or in [{rotation}]"
+        )
+        ratio = np.abs(ratio)
+        middle, fastest = float(np.median(ratio)), float(np.max(ratio))
+    if 0.0 < fastest < 0.3:
+        yield (
+            f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
+            f"{1.0 / fastest:.3g} times as fast as the travel; "
+            f"{_too_fast(wheel, rotation, 1.0 / fastest)}"
+        )
+    elif middle > 3.0:
+        yield (
+            f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
+            f"{_too_slow(wheel, travel, rotation, middle)}"
+        )
+    elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
+        yield (
+            f"slip is {1.0 - fastest:.2g} or more in all windows; was the radius of "
+            f"{wheel.radius.value if wheel.radius else math.nan:g} m measured as diameter?"
+        )
+
+
+def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
+    channel = wheel.channels[rotation]
+    if rotation != "rim_speed" and channel.unit in ("", "rad/s", "rad", "rpm"):
+        for factor, unit in _ROTATION:
+            if 0.9 * factor <= excess <= 1.8 * factor and (factor == 6.0) == (
+                channel.unit == "rpm"
+            ):
+                return f"probably [{rotation}] is in {unit}"
+    if wheel.radius is not None and wheel.radius.value > 2.0:
+        return "probably the radius is in mm"
+    if rotation == "rim_speed":
+        return "probably [rim_speed] is in mm/s"
+    return (
+        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
+        f"in [{rotation}]), or its unit is wrong"
+    )
+
+
+def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str:
+    if wheel.channels[travel].unit in ("", "m", "m/s"):
+        for factor, unit in _TRAVEL:
+            if 0.4 * factor <= excess <= 1.2 * factor:
+                return f"probably [{travel}] is in {unit}"
+    ratio = wheel.channels[rotation].gear_ratio.value if rotation != "rim_speed" else 1.0
+    if ratio > 1.0 and excess > 0.4 * ratio:
+        return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
+    return f"probably the unit of [{travel}] or of [{rotation}] is wrong"
+
+
+def _load(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+    load = windows.get("load", np.zeros(0))
+    load = load[np.isfinite(load)]
+    if load.size == 0:
+        return
+    middle = float(np.median(load))
+    if middle <= 0.0:
+        yield (
+            f"the load is {middle:.3g} N in the middle of the windows: probably its sign is "
+            "turned; write reverse = true in [load]"
+        )
+        return
+    if log_map.vehicle is not None and "load" in wheel.channels:
+        weight = log_map.vehicle.mass.value * log_map.vehicle.gravity / log_map.vehicle.wheels
+        if 0.7 < weight / middle / 9.80665 < 1.4:
+            yield (
+                f"the load of {middle:.3g} N is a tenth of the weight: probably it is in kg; write "
+                "unit = 'kgf' in [load]"
+            )
+
+
+def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+    if not {"torque", "load"} <= windows.keys() or wheel.radius is None:
+        return
+    torque, load = windows["torque"], windows["load"]
+    good = np.isfinite(torque) & (load > 0.0)
+    if not good.any():
+        return
+    role = "torque" if "torque" in wheel.channels else "motor_current"
+    traction = float(np.median(np.abs(torque[good]) / load[good])) / wheel.radius.value
+    cause = traction_cause(traction)
+    if traction > MOST_TRACTION:
+        ratio = wheel.channels[role].gear_ratio.value
+        if ratio > 1.0 and 0.02 < traction / ratio < 1.0:
+            cause = f"[{role}] is at the wheel already; remove gear_ratio"
+        elif role == "motor_current" and 0.02 < traction / 1000.0 < 1.0:
+            cause = "torque_constant is in mN m/A, or the current in mA"
+        elif wheel.radius.value < 0.01:
+            cause = "the radius is in another unit"
+        yield f"torque is {traction:.3g} times W r in the middle of the windows: probably {cause}"
+    elif cause:
+        if role == "motor_current":
+            cause = "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
+        yield f"torque is only {traction:.2g} times W r: probably {cause}"
+    slip = windows.get("slip", np.full(torque.shape, np.nan))
+    driving = good & (slip > 0.05)
+    if driving.sum() >= 2 and np.mean(torque[driving] < 0.0) > 0.6:
+        yield f"torque is below zero while the wheel drives: write reverse = true in [{role}]"
+
+
+def _slope(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+    slope = windows.get("slope", np.zeros(0))
+    if slope.size and np.isfinite(slope).any() and float(np.nanmax(np.abs(slope))) > 1.0:
+        yield (
+            f"the slope goes to {float(np.nanmax(np.abs(slope))):.3g} rad: probably it is in "
+            "degrees; write unit = 'deg' in [slope]"
+        )

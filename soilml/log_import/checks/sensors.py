@@ -1,0 +1,91 @@
+"""Sensors that are dead in a run, and sensors that were not tared."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.log_import.channels.inputs import Inputs
+from soilml.log_import.mapping.log_map import WheelMap
+from soilml.log_import.recording import Floats
+
+#: Sensors that respond when a wheel drives.
+_RESPONDING = ("torque", "motor_current", "load", "drawbar_pull", "sinkage")
+#: A sensor is dead below this share of its usual level in the other runs.
+_DEAD_LEVEL = 0.05
+#: A reading at rest counts as an offset above this share of the reading while driving.
+_OFFSET = 0.05
+
+
+def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
+    """For each run of a wheel, the roles whose sensor is dead, with the reason."""
+    levels = {role: [_level(inputs, role) for inputs in runs] for role in _roles(runs)}
+    found: list[dict[str, str]] = []
+    for i, inputs in enumerate(runs):
+        dead = {}
+        for role, values in inputs.values.items():
+            known = values[np.isfinite(values)]
+            if known.size == 0:
+                dead[role] = "it has no samples"
+            elif np.ptp(known) == 0.0 and role in (*_RESPONDING, "wheel_speed"):
+                dead[role] = f"it reads {known[0]:.3g} throughout"
+            elif role in _RESPONDING:
+                others = [level for k, level in enumerate(levels[role]) if k != i]
+                usual = float(np.nanmedian(others)) if len(others) >= 2 else float("nan")
+                if levels[role][i] < _DEAD_LEVEL * usual:
+                    dead[role] = (
+                        f"it reads {levels[role][i]:.2g} while driving, {usual:.2g} in the other "
+                        "runs"
+                    )
+        found.append(dead)
+    return found
+
+
+def _roles(runs: list[Inputs]) -> list[str]:
+    return list(dict.fromkeys(role for inputs in runs for role in inputs.values))
+
+
+def _level(inputs: Inputs, role: str) -> float:
+    """Usual size of a channel while the wheel drives, beside its reading at rest where known."""
+    values = inputs.values.get(role)
+    if values is None or not np.isfinite(values).any():
+        return float("nan")
+    driving = values[_driving(inputs)]
+    if not np.isfinite(driving).any():
+        driving = values
+    rest = inputs.rest.get(role, (0.0, 0.0))[0] if role != "load" else 0.0
+    return float(np.abs(np.nanmedian(driving) - (rest if np.isfinite(rest) else 0.0)))
+
+
+def _driving(inputs: Inputs) -> NDArray[np.bool_]:
+    speed = inputs.values.get("wheel_speed", inputs.values.get("ground_speed"))
+    if speed is None:
+        return np.ones(inputs.time.size, dtype=bool)
+    size: Floats = np.abs(np.nan_to_num(speed))
+    return np.asarray(size > 0.3 * np.percentile(size, 90))
+
+
+def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
+    """Sensors that read something at rest, where they should read zero, and are not tared."""
+    found = []
+    for role, unit in (("torque", "N m"), ("drawbar_pull", "N"), ("motor_current", "A"),
+                       ("sinkage", "m")):  # fmt: skip
+        channel = wheel.channels.get(role)
+        if channel is None or channel.tare is not None:
+            continue
+        offsets, shares = [], []
+        for inputs in runs:
+            if role not in inputs.rest or role not in inputs.values:
+                continue
+            mean, error = inputs.rest[role]
+            level = _level(inputs, role)
+            if np.isfinite(mean) and abs(mean) > 5.0 * np.nan_to_num(error):
+                offsets.append(mean)
+                shares.append(abs(mean) / level if level else np.inf)
+        if offsets and float(np.median(shares)) > _OFFSET:
+            found.append(
+                f"[{role}] reads {float(np.median(offsets)):.3g} {unit} before the wheel starts "
+                f"({len(offsets)} of {len(runs)} runs), {float(np.median(shares)):.0%} of its "
+                "reading while driving: add tare = 'rest' where it should read zero there"
+            )
+    return found

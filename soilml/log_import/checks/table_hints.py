@@ -1,0 +1,170 @@
+"""Rows of a table of runs that look as if a unit, a sign or the radius were wrong.
+
+Imports numpy alone, so that it can be called on board. Nothing here is impossible: hints are
+remarks. What is impossible, such as a slip of 2, is refused where the table is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from soilml.log_import.recording import Floats
+
+#: Range of T / (W r) of driving wheels on soil, and its usual value.
+LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
+#: Slip from which a driving wheel has a torque worth judging.
+_SLIPS = 0.05
+#: Mistakes that make T / (W r) too large, by factor.
+_TOO_LARGE = (
+    (9.80665, "the load is in kg and was taken as N"),
+    (100.0, "the torque is in N cm and was taken as N m"),
+    (1000.0, "the torque is in mN m and was taken as N m"),
+)
+_TOO_SMALL = (
+    (1000.0, "the torque is in kN m, or the radius in mm"),
+    (9.80665, "the torque is in kgf m"),
+)
+
+
+def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) -> list[str]:
+    """Hints at columns in a wrong unit or with a wrong sign, most important first.
+
+    Parameters
+    ----------
+    columns
+        Columns (rows,) of a table of runs by name: `slip`, `load_N`, `torque_Nm`, ...
+    radius
+        Radius of the wheel of all rows or of each row (rows,), m; None where it is not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> slip, load = np.array([0.1, 0.3, 0.5]), np.full(3, 60.0)
+    >>> table_hints({"slip": slip, "load_N": load, "torque_Nm": np.array([1.5, 3, 4])}, 0.15)
+    []
+    >>> table_hints({"slip": slip, "load_N": load / 9.81, "torque_Nm": np.array([1.5, 3, 4])}, 0.15)
+    ['torque is 3.27 times W r in the middle of the rows: probably the load is in kg and was taken as N']
+    """  # noqa: E501
+    found: list[str] = []
+    for check in (_traction, _signs, _slip, _constant_torque, _pull, _sinkage, _angles):
+        found += check(columns, radius)
+    return found
+
+
+def traction_cause(traction: float) -> str:
+    """The likely cause of T / (W r) outside of its range; "" where it is inside."""
+    if LEAST_TRACTION <= traction <= MOST_TRACTION:
+        return ""
+    if traction > MOST_TRACTION:
+        options = [(traction / factor, text) for factor, text in _TOO_LARGE]
+        other = "the torque is wrong by a gear ratio, or the radius by its unit"
+    else:
+        options = [(traction * factor, text) for factor, text in _TOO_SMALL]
+        other = "the torque lacks a gear ratio, or its sensor is dead"
+    distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
+    return text if distance < np.log(4.0) else other
+
+
+def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    if radius is None or not {"slip", "load_N", "torque_Nm"} <= columns.keys():
+        return
+    load = columns["load_N"] * radius
+    judged = np.isfinite(columns["torque_Nm"]) & (load > 0.0) & (columns["slip"] > _SLIPS)
+    if not judged.any():
+        return
+    traction = np.abs(columns["torque_Nm"][judged]) / load[judged]
+    middle = float(np.median(traction))
+    if cause := traction_cause(middle):
+        yield f"torque is {middle:.3g} times W r in the middle of the rows: probably {cause}"
+    elif (odd := np.flatnonzero(traction > 2.0 * MOST_TRACTION)).size:
+        row = int(np.flatnonzero(judged)[odd[0]]) + 1
+        yield (
+            f"torque is {float(traction[odd[0]]):.3g} times W r in row {row}, and at most "
+            f"{float(np.sort(traction)[-odd.size - 1]):.2g} times in the others: look at that row"
+        )
+
+
+def _signs(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    if not {"slip", "torque_Nm"} <= columns.keys():
+        return
+    slip, torque = columns["slip"], columns["torque_Nm"]
+    judged = np.isfinite(torque) & (slip > _SLIPS) & (torque != 0.0)
+    if judged.sum() >= 2 and np.mean(torque[judged] < 0.0) > 0.6:
+        yield (
+            f"torque is below zero in {int(np.sum(torque[judged] < 0.0))} of {int(judged.sum())} "
+            "driving rows: probably its sign is turned"
+        )
+
+
+def _slip(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    slip = columns.get("slip")
+    if slip is None or slip.size < 3:
+        return
+    lowest = float(np.min(slip))
+    if lowest > 0.9:
+        yield (
+            f"slip is {lowest:.2g} or more in all rows: probably the rotation was measured before "
+            "a gearbox, or is in another unit"
+        )
+    elif lowest > 0.45 and np.ptp(slip) > 0.03:
+        yield (
+            f"slip is {lowest:.2g} or more in all rows: is the radius given as diameter? (slip "
+            f"would begin at {2.0 * lowest - 1.0:.2g})"
+        )
+    elif lowest < -0.3 and float(np.max(slip)) < 0.0:
+        yield (
+            f"slip is below zero in all rows, {lowest:.2g} at least: are rim and travel speed "
+            "exchanged, or is the radius too small?"
+        )
+    elif 0.0 < float(np.max(np.abs(slip))) < 0.01:
+        yield "slip is below 0.01 in all rows: was it divided by 100 twice?"
+
+
+def _constant_torque(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    if not {"slip", "torque_Nm"} <= columns.keys():
+        return
+    known = np.isfinite(columns["torque_Nm"])
+    if known.sum() >= 4 and np.ptp(columns["slip"][known]) > 0.05:
+        torque = columns["torque_Nm"][known]
+        if np.ptp(torque) == 0.0:
+            yield f"torque is {float(torque[0]):g} N m at every slip: probably its sensor is dead"
+
+
+def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    if not {"load_N", "drawbar_pull_N"} <= columns.keys():
+        return
+    known = np.isfinite(columns["drawbar_pull_N"])
+    if not known.any():
+        return
+    ratio = columns["drawbar_pull_N"][known] / columns["load_N"][known]
+    if float(np.median(np.abs(ratio))) > 1.2:
+        yield (
+            f"drawbar pull is {float(np.median(np.abs(ratio))):.3g} times the load in the middle "
+            "of the rows: probably one of them is in another unit, or the sensor was not tared"
+        )
+    slip = columns.get("slip")
+    if slip is not None and known.sum() >= 4 and np.ptp(slip[known]) > 0.2:
+        order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.02 else 0.0
+        if order < -0.8 and float(np.median(ratio[slip[known] > 0.2], axis=0)) < -0.05:
+            yield "drawbar pull falls as slip grows, and is below zero: probably its sign is turned"
+
+
+def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    sinkage = columns.get("sinkage_m")
+    if sinkage is None or not np.isfinite(sinkage).any():
+        return
+    middle = float(np.nanmedian(sinkage))
+    if radius is not None and middle > float(np.nanmedian(radius)):
+        unit = "mm" if middle / 1000.0 < float(np.nanmedian(radius)) else "another unit"
+        yield f"sinkage is {middle:.3g} m, more than the radius: probably it is in {unit}"
+    elif middle < -0.002:
+        yield f"sinkage is {middle:.3g} m in the middle of the rows: probably its sign is turned"
+
+
+def _angles(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    for name in ("slip_angle_rad", "slope_rad"):
+        values = columns.get(name)
+        if values is not None and np.isfinite(values).any() and np.nanmax(np.abs(values)) > 1.571:
+            yield f"{name} goes to {np.nanmax(np.abs(values)):.3g}: probably it is in degrees"

@@ -1,0 +1,129 @@
+"""Which column is taken for which role, for one wheel or for several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from soilml.log_import.guesses.candidates import Candidate
+from soilml.log_import.guesses.column_words import WHEEL_WORDS, wheel_word, words_of
+
+#: Roles of which one suffices, the better one first where both fit as well.
+_RIVALS = (
+    ("rim_speed", "wheel_speed", "wheel_angle"),
+    ("ground_speed", "position"),
+    ("torque", "motor_current"),
+)
+#: Roles that each wheel has of its own.
+_PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_current", "load",
+              "drawbar_pull", "sinkage", "slip")  # fmt: skip
+#: Lowest score of a guess.
+_LEAST = 2.0
+_SIDES = {"fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"),
+          "rf": ("front", "right"), "rl": ("rear", "left"), "bl": ("rear", "left"),
+          "rr": ("rear", "right"), "br": ("rear", "right")}  # fmt: skip
+
+
+@dataclass
+class Assignment:
+    """Columns by role: shared ones, those of each wheel, and the runners-up."""
+
+    shared: dict[str, Candidate] = field(default_factory=dict)
+    wheels: dict[str, dict[str, Candidate]] = field(default_factory=dict)
+    others: dict[str, list[Candidate]] = field(default_factory=dict)
+
+    def roles(self) -> set[str]:
+        """All roles that have a column."""
+        return {*self.shared, *(role for own in self.wheels.values() for role in own)}
+
+
+def assign(candidates: Sequence[Candidate]) -> Assignment:
+    """Take the best column for each role, each column once."""
+    found = Assignment()
+    pairs = sorted(
+        (
+            (score, -i, role, candidate)
+            for i, candidate in enumerate(candidates)
+            for role, score in candidate.scores.items()
+            if role != "time" and score >= _LEAST
+        ),
+        key=lambda p: (-p[0], -p[1]),
+    )
+    taken: set[str] = set()
+    for _, _, role, candidate in pairs:
+        if candidate.address in taken:
+            continue
+        if role not in found.shared:
+            found.shared[role] = candidate
+            taken.add(candidate.address)
+        else:
+            found.others.setdefault(role, []).append(candidate)
+    for rivals in _RIVALS:
+        present = [role for role in rivals if role in found.shared]
+        best = max(present, key=lambda r: found.shared[r].scores[r] - 0.1 * rivals.index(r),
+                   default="")  # fmt: skip
+        for role in present:
+            if role != best:
+                found.others.setdefault(role, []).insert(0, found.shared.pop(role))
+    _take_wheels(found)
+    if {"wheel_speed", "wheel_angle", "rim_speed"} & found.roles() and (
+        {"ground_speed", "position"} & found.roles()
+    ):
+        # measured slip is better known than one that somebody has computed
+        slip = found.shared.pop("slip", None)
+        if slip is not None:
+            found.others.setdefault("slip", []).insert(0, slip)
+    return found
+
+
+def _take_wheels(found: Assignment) -> None:
+    """Move the roles of which several wheels have columns of one pattern to these wheels."""
+    groups: dict[str, dict[str, Candidate]] = {}
+    for role in _PER_WHEEL:
+        if role not in found.shared:
+            continue
+        best = found.shared[role]
+        if not wheel_word(best.address):
+            continue
+        alike = {wheel_name(best.address): best}
+        for other in found.others.get(role, []):
+            name = wheel_name(other.address)
+            same = other.scores[role] >= best.scores[role] - 1.5 and _frame(other) == _frame(best)
+            if name and same and name not in alike:
+                alike[name] = other
+        if len(alike) >= 2:
+            groups[role] = alike
+    names = {name for alike in groups.values() for name in alike}
+    complete = [n for n in sorted(names) if all(n in alike for alike in groups.values())]
+    if len(complete) < 2:
+        return
+    for role, alike in groups.items():
+        found.shared.pop(role)
+        members = {candidate.address for candidate in alike.values()}
+        found.others[role] = [c for c in found.others.get(role, []) if c.address not in members]
+        for name in complete:
+            found.wheels.setdefault(name, {})[role] = alike[name]
+
+
+def _frame(candidate: Candidate) -> tuple[str, ...]:
+    """The words of a name without those of the wheel."""
+    return tuple(word for word in words_of(candidate.address) if word not in WHEEL_WORDS)
+
+
+def wheel_name(address: str) -> str:
+    """Name of the wheel that a column belongs to: `front_left`, `wheel_3`; "" for none."""
+    words = wheel_word(address)
+    if not words:
+        return ""
+    plain = [side for word in words for side in _SIDES.get(word, (word,))]
+    name = "_".join(dict.fromkeys(plain))
+    return f"wheel_{name}" if name[0].isdigit() else name
+
+
+def axle_of(wheel: str) -> str:
+    """The axle that the name of a wheel says; "" where it says none."""
+    for axle, words in (("front", ("front", "fl", "fr")), ("rear", ("rear", "back")),
+                        ("middle", ("middle", "mid", "centre", "center"))):  # fmt: skip
+        if any(word in wheel.split("_") for word in words):
+            return axle
+    return ""

@@ -1,0 +1,124 @@
+"""The columns of logs, and how well each fits each role."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
+from soilml.log_import.guesses.column_words import name_scores, words_of
+from soilml.log_import.mapping.channel import ROLES
+from soilml.log_import.recording import Recording
+from soilml.log_import.units.conversion import dimension
+from soilml.log_import.units.unit_names import unit_in_name
+
+#: What a role's unit may be, beside that of `ROLES`.
+_ALSO = {
+    "wheel_angle": ("count",),
+    "wheel_speed": ("count/s",),
+    "load": ("kg",),
+    "slope": (),
+}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A column: its address, the unit that the log states, its behaviour and its scores by role."""
+
+    address: str
+    name: str
+    unit: str
+    kind: str | None
+    about: Behaviour
+    scores: dict[str, float]
+
+
+def candidates_of(recordings: Sequence[Recording]) -> list[Candidate]:
+    """All numeric columns, with their scores."""
+    counts: dict[str, int] = {}
+    for recording in recordings:
+        for name in recording.columns:
+            counts[name] = counts.get(name, 0) + 1
+    return [
+        _candidate(recording, name, counts[name] > 1)
+        for recording in recordings
+        for name in recording.columns
+    ]
+
+
+def _candidate(recording: Recording, name: str, ambiguous: bool) -> Candidate:
+    values = recording.columns[name]
+    stated = recording.units.get(name, "")
+    unit = stated if dimension(stated) else unit_in_name(name)
+    kind = dimension(unit) if unit else None
+    own = behaviour(values)
+    # the name of a topic says what its fields are of: /motor/left: current
+    topic = f"{recording.name} {name}" if recording.name else name
+    scores = name_scores(topic)
+    own_scores = name_scores(name)
+    for role, score in own_scores.items():
+        scores[role] = max(score, scores.get(role, score))
+    found = {
+        role: total
+        for role in (*ROLES, "time")
+        if (total := _score(role, scores.get(role, 0.0), kind, unit, own, recording, name)) > 0.0
+    }
+    topic_named = recording.name.startswith("/") or ambiguous
+    address = f"{recording.name}:{name}" if topic_named and recording.name else name
+    return Candidate(address, name, unit, kind, own, found)
+
+
+def _score(
+    role: str,
+    score: float,
+    kind: str | None,
+    unit: str,
+    own: Behaviour,
+    recording: Recording,
+    name: str,
+) -> float:
+    """How well a column fits a role; 0 or less where it does not."""
+    if own.count < 2:
+        return 0.0
+    if role == "time":
+        if kind not in (None, "s"):
+            return 0.0
+        even = looks_like_time(recording.columns[name])
+        return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+    wanted = (ROLES[role][0], *_ALSO.get(role, ()))
+    if kind is not None:
+        if kind not in wanted and not (kind == "1" and role == "slip"):
+            return 0.0
+        score += 2.5 if kind not in ("1",) else 1.0
+        if score <= 2.5 and not _unit_suffices(role, kind):
+            return 0.0
+    if score <= 0.0:
+        return 0.0
+    if own.constant:
+        score -= 3.0 if own.middle else 10.0
+    monotone = own.travel > 0.6 or own.wraps_at > 0.0
+    if role in ("wheel_angle", "position"):
+        score += 1.5 if monotone else -2.5
+    if role in ("wheel_speed", "ground_speed", "torque", "motor_current") and monotone:
+        score -= 2.0
+    if role == "load" and own.middle != 0.0:
+        steady = abs(own.high - own.low) < 1.5 * abs(own.middle)
+        score += 1.0 if steady else -0.5
+    if role == "slip" and kind is None and own.size > 150.0:
+        score -= 4.0
+    if role == "time" or words_of(name)[:1] == ["std"]:
+        score -= 3.0
+    return score
+
+
+def _unit_suffices(role: str, kind: str) -> bool:
+    """Whether a unit alone, without a name, makes a column a candidate."""
+    return (role, kind) in (
+        ("torque", "N m"),
+        ("motor_current", "A"),
+        ("wheel_speed", "rad/s"),
+        ("ground_speed", "m/s"),
+        ("position", "m"),
+        ("load", "N"),
+        ("wheel_angle", "count"),
+    )

@@ -1,0 +1,293 @@
+"""A commented map for logs that nobody has described: `soilml import --init`."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
+from soilml.log_import.guesses.assignment import Assignment, assign, axle_of
+from soilml.log_import.guesses.candidates import Candidate, candidates_of
+from soilml.log_import.guesses.clocks import guess_clock, guess_run_column, restarts
+from soilml.log_import.guesses.draft import (
+    Draft,
+    describe,
+    draft_channels,
+    fastest_ratio,
+    inputs_of,
+)
+from soilml.log_import.guesses.file_kinds import clocks_differ, guess_file_kinds
+from soilml.log_import.guesses.stated_constants import number_in_names, stated_constants
+from soilml.log_import.guesses.windows_guess import guess_windows
+from soilml.log_import.mapping.channel import ROLES
+from soilml.log_import.mapping.log_map import FileKind, LogMap
+from soilml.log_import.readers import read_log
+from soilml.log_import.recording import Recording
+
+#: Most columns that are listed, and runs that are looked at.
+_MOST_LISTED, _LOOKED = 40, 8
+
+
+def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
+    """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
+
+    Guesses come from names, units and the behaviour of the values. What no log can tell, such as
+    the radius, is marked with CHANGE or NEEDED.
+
+    Raises `InputError` where a file cannot be read or has no columns.
+    """
+    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    if not files:
+        raise InputError("no log was given; needed is at least one file")
+    recordings = [read_log(Path(file)) for file in files]
+    return _MapText(recordings).text()
+
+
+class _MapText:
+    """The map of some logs, section by section."""
+
+    def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
+        self.logs = logs
+        first = [recording for log in logs[:4] for recording in log]
+        self.time_column, self.time_unit = guess_clock(first)
+        self.run_column, self.run_count = guess_run_column(logs[0])
+        self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
+        _refuse_a_table_of_runs(logs[0], self.time_column)
+        self.stated = stated_constants([line for recording in first for line in recording.about])
+        self.rate = 0.0
+        if not self.time_column and all(recording.clock is None for recording in first):
+            self.rate = float(self.stated.get("rate", ("100", ""))[0].split()[0])
+        self.kinds = self._with_clocks(guess_file_kinds(logs))
+        self.runs = runs_of(logs, self._map(self.kinds))
+        self.run = _liveliest(self.runs[:_LOOKED])
+        clocks = {self.time_column, *(kind.time_column for kind in self.kinds)}
+        self.columns = [c for c in candidates_of(self.run.recordings) if c.name not in clocks]
+        self.found: Assignment = assign(self.columns)
+        self.run_names = [run.name for run in self.runs]
+
+    def _map(self, kinds: Sequence[FileKind]) -> LogMap:
+        return LogMap(
+            "map",
+            (),
+            tuple(kinds),
+            self.time_column,
+            self.time_unit,
+            self.rate,
+            self.run_column,
+            self.restarts > 0,
+        )
+
+    def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
+        """Kinds with their own columns of time, and with clocks that overlap."""
+        if not kinds:
+            return ()
+        members = next(iter(matched_files(self.logs, kinds).values()))
+        named = []
+        for kind in kinds:
+            own = [recording for recording, other in members if other is kind]
+            column, unit = guess_clock(own)
+            alike = (column, unit) == (self.time_column, self.time_unit)
+            named.append(kind if alike else replace(kind, time_column=column, time_unit=unit))
+        run = runs_of(self.logs, self._map(named))[0]
+        if clocks_differ([(times[0], times[-1]) for times in run.times]):
+            return tuple(replace(kind, clock="start") for kind in named)
+        return tuple(named)
+
+    def text(self) -> str:
+        """The whole map."""
+        lines = self._head()
+        lines += self._files() + self._time_lines() + self._run_lines()
+        groups = self.found.wheels or {"": {}}
+        drafts = {
+            name: draft_channels(self.found.shared | own, self.run, self.stated)
+            for name, own in groups.items()
+        }
+        first = next(iter(drafts.values()))
+        lines += self._wheel(first)
+        lines += self._load()
+        for role in ROLES:
+            if role in self.found.shared:
+                lines += self._channel(f"[{role}]", role, first[role])
+            elif role not in self.found.roles():
+                lines += self._absent(role)
+        for name, own in self.found.wheels.items():
+            lines += ["", f"[wheels.{name}]"]
+            if axle := axle_of(name):
+                lines.append(f'axle = "{axle}"')
+            for role in own:
+                lines += self._channel(f"[wheels.{name}.{role}]", role, drafts[name][role])
+        lines += guess_windows(self.runs, first)
+        return "\n".join(lines) + "\n"
+
+    def _head(self) -> list[str]:
+        names = run_names([log[0].file for log in self.logs])
+        shown = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+        lines = [
+            f"# Map of {len(names)} log{'s' if len(names) > 1 else ''}: {shown}",
+            "# Written by `soilml import --init`. All of it is a guess: look at the lines with",
+            "# CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:",
+            '# "0.15 m +- 1 %". Forward is positive for rotation, travel and torque.',
+            "#",
+            "# The columns, with the unit that the log states and the range of their values:",
+        ]
+        lines += [f"#   {line}" for line in describe(self.columns[:_MOST_LISTED])]
+        if len(self.columns) > _MOST_LISTED:
+            lines.append(f"#   and {len(self.columns) - _MOST_LISTED} more")
+        notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
+        return lines + [f"# Note: {note}" for note in list(notes)[:5]]
+
+    def _files(self) -> list[str]:
+        lines = []
+        for kind in self.kinds:
+            lines += ["", f"[files.{kind.name}]", f"pattern = {_toml(kind.pattern)}"]
+            why = "their clocks share no time: each starts at 0" if kind.clock == "start" else (
+                "times can be compared; 'start' where each clock starts at 0"
+            )  # fmt: skip
+            lines.append(f'clock = "{kind.clock}"  # {why}')
+            if kind.time_column:
+                lines.append(f"time = {_toml(kind.time_column)}")
+                lines.append(f"time_unit = {_toml(kind.time_unit)}")
+        return lines
+
+    def _time_lines(self) -> list[str]:
+        if self.time_column:
+            column, unit = _toml(self.time_column), _toml(self.time_unit)
+            return ["", "[time]", f"column = {column}", f"unit = {unit}"]
+        if not self.rate:
+            return ["", "# Time comes from the messages."]
+        stated = "stated in the log" if "rate" in self.stated else "CHANGE: no column is a clock"
+        return ["", "[time]", f'rate = "{self.rate:g} Hz"  # {stated}']
+
+    def _run_lines(self) -> list[str]:
+        if self.run_column:
+            column = _toml(self.run_column)
+            return ["", "[runs]", f"column = {column}  # {self.run_count} values, one run each"]
+        if self.restarts:
+            why = f"the time starts again {self.restarts} times"
+            return ["", "[runs]", f"split_where_time_restarts = true  # {why}"]
+        return []
+
+    def _wheel(self, drafts: dict[str, Draft]) -> list[str]:
+        lines = ["", "[wheel]"]
+        for key in ("radius", "diameter"):
+            if key in self.stated:
+                value, line = self.stated[key]
+                number = value if " " in value else f"{value} m"
+                return [*lines, f'{key} = "{number} +- 1 %"  # stated in the log: {line[:60]}']
+        needed = not {"slip", "rim_speed"} & self.found.roles() and bool(
+            {"wheel_speed", "wheel_angle"} & self.found.roles()
+        )
+        inputs = inputs_of(drafts, self.run)
+        ratio = fastest_ratio(inputs) if inputs is not None and needed else math.nan
+        hint = ""
+        if math.isfinite(ratio) and ratio > 0.0:
+            if 0.02 < ratio < 0.7:
+                hint = f"; travel over rotation is {ratio:.3g} m at the lowest slip: a little less"
+            else:
+                hint = (
+                    f"; travel over rotation is {ratio:.3g} m: a unit is wrong, or the rotation is "
+                    "measured before a gearbox"
+                )
+        word = "NEEDED" if needed else "for checks"
+        return [*lines, f'# radius = "0.15 m +- 1 %"  # {word}{hint}']
+
+    def _load(self) -> list[str]:
+        if "load" in self.found.roles():
+            return []
+        if "load" in self.stated and "mass" not in self.stated:
+            value, line = self.stated["load"]
+            return ["", "[load]", f'value = "{value} +- 1 %"  # stated in the log: {line[:60]}']
+        in_name = number_in_names("load", self.run_names)
+        if in_name is not None:
+            pattern, unit, numbers = in_name
+            shown = ", ".join(f"{n:g}" for n in numbers[:4])
+            return [
+                "",
+                "[load]",
+                f"file_name = {_toml(pattern)}  # the names say {shown}",
+                f"unit = {_toml(unit)}",
+            ]
+        count = max(1, len(self.found.wheels))
+        mass = self.stated.get("mass", ("", ""))[0]
+        lines = ["", "# No column is a vertical load: it follows from the mass."]
+        if mass:
+            return [*lines, "[vehicle]", f'mass = "{mass} +- 1 %"', f"wheels = {count}"]
+        return [
+            *lines,
+            "# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'",
+            '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
+            f"# wheels = {count}",
+        ]
+
+    def _channel(self, header: str, role: str, draft: Draft) -> list[str]:
+        lines = ["", f"{header}  # {ROLES[role][1]}"]
+        for key, value in draft.keys.items():
+            comment = draft.comments.get(key, "")
+            lines.append(f"{key} = {_toml(value)}" + (f"  # {comment}" if comment else ""))
+        others = [c.address for c in self.found.others.get(role, [])[:4]]
+        if others:
+            lines.append(f"# or: {', '.join(others)}")
+        if role in ("torque", "load", "drawbar_pull", "position", "ground_speed", "rim_speed"):
+            share = {"torque": "2 %", "load": "1 %"}.get(role)
+            if share:
+                lines.append(f'bias = "{share}"  # calibration error that all rows share')
+        return lines
+
+    def _absent(self, role: str) -> list[str]:
+        others: list[Candidate] = self.found.others.get(role, [])
+        if role == "slip" and not ({"position", "ground_speed"} & self.found.roles()):
+            in_name = number_in_names("slip", self.run_names)
+            if in_name is not None:
+                return [
+                    "",
+                    "[slip]",
+                    f"file_name = {_toml(in_name[0])}",
+                    f"unit = {_toml(in_name[1])}",
+                ]
+        if role == "ground_speed" and not ({"position", "slip"} & self.found.roles() or others):
+            return [
+                "",
+                "# NEEDED: no column is the travel. One of these:",
+                "# [ground_speed]",
+                '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
+            ]
+        if others:
+            return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {_toml(others[0].address)}"]
+        return []
+
+
+def _refuse_a_table_of_runs(log: Sequence[Recording], clock: str) -> None:
+    """Raise `InputError` for a table whose rows are means already."""
+    for recording in log:
+        held = {*recording.columns, *recording.texts}
+        if {"run", "slip", "load_N"} <= held and not clock and recording.clock is None:
+            raise InputError(
+                f"{recording.file} is a table of runs already, with one row for each operating "
+                "point: give it to `soilml identify`, `estimate` or `gap` as it is"
+            )
+
+
+def _liveliest(runs: Sequence[Run]) -> Run:
+    """The run with the most columns that vary: one in which no sensor is dead."""
+    return max(
+        runs,
+        key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings)),
+    )
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float | int | np.number):
+        return f"{float(value):g}" if float(value) != int(value) else f"{int(value)}"
+    if isinstance(value, str) and "\\" in value and "'" not in value:
+        return f"'{value}'"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,69 @@
+"""Constants that a log states in the lines before its header, or in the names of its files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from soilml.log_import.units.conversion import dimension
+
+_VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ]\s*([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
+_UNIT_BEFORE = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]")
+#: Constant -> words before the number, and the unit that it must have.
+_STATED = {
+    "radius": (r"(?:wheel[ _]?)?(?:radius|radius[ _]wheel|wheel[ _]r)", "m"),
+    "diameter": (r"(?:wheel[ _]?)?(?:diameter|durchmesser)", "m"),
+    "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
+    "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
+    "torque_constant": (r"(?:torque[ _]?const\w*|kt|k_t|km)", "N m/A"),
+    "efficiency": (r"(?:gear[ _]?)?(?:efficiency|eta|wirkungsgrad)", "1"),
+    "counts_per_turn": (r"(?:cpr|ppr|counts[ _]?per[ _]?(?:turn|rev\w*)|resolution)", "1"),
+    "mass": (r"(?:mass|masse|rover[ _]?mass|vehicle[ _]?mass)", "kg"),
+    "load": (r"(?:normal[ _]?|vertical[ _]?|wheel[ _]?)?(?:load|weight)", "N"),
+}
+#: Numbers in names of files: role, pattern and unit.
+_IN_NAMES = (
+    ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
+    ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)n(?![a-z0-9])", "N"),
+    ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
+    ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
+)
+
+
+def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Constants by name: as they would be written in a map, and the line that states them."""
+    found: dict[str, tuple[str, str]] = {}
+    for line in lines:
+        for name, (words, ours) in _STATED.items():
+            if name in found:
+                continue
+            match = re.search(rf"\b{words}\b{_VALUE}", line, re.IGNORECASE)
+            if match is None:
+                continue
+            number, unit = match[1].replace(",", "."), match[2].strip()
+            if not unit and (before := _UNIT_BEFORE.search(line[: match.start(1)])):
+                unit = before[1]
+            if ours == "Hz":
+                found[name] = (f"{number} Hz", line)
+            elif unit and dimension(unit) in (ours, "1" if ours == "1" else ours):
+                found[name] = (f"{number} {unit}", line)
+            elif not unit or dimension(unit) is None:
+                plausible = {"radius": 2.0, "diameter": 4.0}.get(name)
+                if plausible is not None and float(number) > plausible:
+                    number += " mm"
+                found[name] = (number, line)
+    if "diameter" in found and "radius" in found:
+        del found["diameter"]
+    return found
+
+
+def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:
+    """A pattern that finds a number for a role in all names of runs, its unit and the numbers."""
+    for kind, pattern, unit in _IN_NAMES:
+        if kind != role:
+            continue
+        matches = [re.search(pattern, name, re.IGNORECASE) for name in names]
+        if all(matches):
+            return pattern, unit, [float(m[1].replace("p", ".")) for m in matches if m]
+    return None

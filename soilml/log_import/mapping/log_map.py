@@ -1,0 +1,284 @@
+"""A map: the file that says how a log is read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.log_import.mapping.channel import ROLES, Channel, take_channel
+from soilml.log_import.units.uncertain_value import Uncertain, take_uncertain
+
+_ZERO = Uncertain(0.0)
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """One kind of file, where a run has several: its name has `pattern`; how its clock is read.
+
+    `time_column` and `time_unit` replace those of [time] where they are not "".
+    """
+
+    name: str
+    pattern: str
+    clock: str = "same"
+    delay: float = 0.0
+    time_column: str = ""
+    time_unit: str = ""
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Masses and lengths from which the load of each wheel follows, in kg, m and m/s^2.
+
+    `behind_front` is the distance of the centre of mass behind the front axle.
+    """
+
+    mass: Uncertain
+    wheels: int = 1
+    gravity: float = 9.80665
+    wheelbase: Uncertain = _ZERO
+    behind_front: Uncertain = _ZERO
+    height: Uncertain = _ZERO
+
+
+@dataclass(frozen=True)
+class WheelMap:
+    """A wheel: its radius (m), its channels by role, and where it stands."""
+
+    name: str
+    radius: Uncertain | None
+    channels: dict[str, Channel]
+    gear: str = ""
+    axle: str = ""
+
+
+@dataclass(frozen=True)
+class WindowSettings:
+    """How steady windows are found; times in s."""
+
+    shortest: float = 2.0
+    settle: float = 0.5
+    sensitivity: float = 1.0
+    largest_slip_change: float = 0.05
+    largest_torque_change: float = 0.15
+    within: tuple[float, float] = (-float("inf"), float("inf"))
+
+
+@dataclass(frozen=True)
+class LeaveOut:
+    """A stretch of a run that the user leaves out, in s after the start of the run."""
+
+    run: str
+    start: float
+    stop: float
+    why: str
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """How a log is read; see docs/import.md for the file."""
+
+    source: str
+    wheels: tuple[WheelMap, ...]
+    files: tuple[FileKind, ...] = ()
+    time_column: str = ""
+    time_unit: str = "s"
+    rate: float = 0.0
+    run_column: str = ""
+    split_at_reset: bool = False
+    vehicle: Vehicle | None = None
+    windows: WindowSettings = field(default_factory=WindowSettings)
+    left_out: tuple[LeaveOut, ...] = ()
+
+
+def read_map(path: str | os.PathLike[str]) -> LogMap:
+    """Read a map; raises `InputError`, naming file, table and key, for what is wrong in it."""
+    settings = read_settings(path)
+    found = _take_map(settings, str(path))
+    settings.finish()
+    return found
+
+
+def map_from(content: Mapping[str, Any]) -> LogMap:
+    """A map from a dictionary with the content of the file; raises `InputError` likewise."""
+    from pathlib import Path
+
+    settings = Settings(dict(content), "map", Path())
+    found = _take_map(settings, "map")
+    settings.finish()
+    return found
+
+
+def _take_map(settings: Settings, source: str) -> LogMap:
+    files = _take_files(settings.table("files"))
+    time = settings.table("time")
+    time_column, time_unit = time.text("column", ""), time.text("unit", "s")
+    rate = take_uncertain(time, "rate", "Hz", _ZERO).value
+    time.finish()
+    runs = settings.table("runs")
+    run_column = runs.text("column", "")
+    at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
+    runs.finish()
+    vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
+    shared_wheel = settings.table("wheel")
+    radius = _take_radius(shared_wheel)
+    gear = shared_wheel.text("gear", "")
+    shared_wheel.finish()
+    named = settings.table("wheels")
+    shared = _take_channels(settings)
+    wheels = []
+    for name in named.content:
+        own = Settings(
+            named.take(name, dict, f"a table [wheels.{name}]"),
+            f"{settings.where} [wheels.{name}]",
+            settings.folder,
+        )
+        wheels.append(
+            WheelMap(
+                name,
+                _take_radius(own) or radius,
+                shared | _take_channels(own),
+                own.text("gear", gear),
+                _take_axle(own),
+            )
+        )
+        own.finish()
+    if not wheels:
+        wheels = [WheelMap("", radius, shared, gear)]
+    for wheel in wheels:
+        _check_wheel(settings, wheel, vehicle)
+    return LogMap(
+        source,
+        tuple(wheels),
+        files,
+        time_column,
+        time_unit,
+        rate,
+        run_column,
+        at_reset,
+        vehicle,
+        _take_windows(settings.table("windows")),
+        tuple(_take_left_out(entry) for entry in settings.tables("leave_out")),
+    )
+
+
+def _take_channels(settings: Settings) -> dict[str, Channel]:
+    settings.permit(ROLES)
+    return {role: take_channel(settings.table(role), role) for role in ROLES if role in settings}
+
+
+def _take_radius(settings: Settings) -> Uncertain | None:
+    if "diameter" in settings:
+        diameter = take_uncertain(settings, "diameter", "m", lower=0.0)
+        return Uncertain(diameter.value / 2.0, diameter.std / 2.0)
+    if "radius" in settings:
+        return take_uncertain(settings, "radius", "m", lower=0.0)
+    settings.permit(["radius", "diameter"])
+    return None
+
+
+def _take_axle(settings: Settings) -> str:
+    axle = settings.text("axle", "")
+    if axle not in ("", "front", "rear", "middle"):
+        settings.fail(f"axle is {axle!r}; needed is 'front', 'middle' or 'rear'")
+    return axle
+
+
+def _take_files(settings: Settings) -> tuple[FileKind, ...]:
+    kinds = []
+    for name in settings.content:
+        own = Settings(
+            settings.take(name, dict, f"a table [files.{name}]"),
+            f"{settings.where} [files.{name}]",
+            settings.folder,
+        )
+        pattern, clock, delay = own.text("pattern"), own.text("clock", "same"), 0.0
+        if clock not in ("same", "start"):
+            own.fail(f"clock is {clock!r}; needed is 'same' or 'start'")
+        if "delay" in own:
+            delay = take_uncertain(own, "delay", "s").value
+        kinds.append(
+            FileKind(name, pattern, clock, delay, own.text("time", ""), own.text("time_unit", ""))
+        )
+        own.finish()
+    return tuple(kinds)
+
+
+def _take_vehicle(settings: Settings) -> Vehicle:
+    mass = take_uncertain(settings, "mass", "kg", lower=0.0)
+    lengths = {
+        key: take_uncertain(settings, key, "m", _ZERO)
+        for key in ("wheelbase", "behind_front", "height")
+    }
+    gravity = take_uncertain(settings, "gravity", "m/s^2", Uncertain(9.80665), lower=0.0).value
+    vehicle = Vehicle(mass, settings.count("wheels", 1), gravity, **lengths)
+    settings.finish()
+    return vehicle
+
+
+def _take_windows(settings: Settings) -> WindowSettings:
+    usual = WindowSettings()
+    within = usual.within
+    if "within" in settings:
+        needed = "two times in s after the start of a run, such as [5, 20]"
+        given = settings.take("within", list, needed)
+        if len(given) != 2 or not all(isinstance(x, int | float) for x in given):
+            settings.fail(f"within is {given!r}; needed is {needed}")
+        within = (float(given[0]), float(given[1]))
+    found = WindowSettings(
+        take_uncertain(settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0).value,
+        take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
+        settings.number("sensitivity", usual.sensitivity),
+        take_uncertain(
+            settings, "largest_slip_change", "1", Uncertain(usual.largest_slip_change)
+        ).value,
+        take_uncertain(
+            settings, "largest_torque_change", "1", Uncertain(usual.largest_torque_change)
+        ).value,
+        within,
+    )
+    if not found.sensitivity > 0.0:
+        settings.fail("sensitivity must be above zero; 1 is usual, 2 finds smaller changes")
+    settings.finish()
+    return found
+
+
+def _take_left_out(settings: Settings) -> LeaveOut:
+    found = LeaveOut(
+        settings.text("run", ""),
+        settings.number("from", 0.0),
+        settings.number("until", float("inf")),
+        settings.text("why", "left out by the map"),
+    )
+    settings.finish()
+    return found
+
+
+def _check_wheel(settings: Settings, wheel: WheelMap, vehicle: Vehicle | None) -> None:
+    """Raise `InputError` where slip or load cannot follow from the channels of a wheel."""
+    has = wheel.channels.keys()
+    of = f" of the wheel {wheel.name!r}" if wheel.name else ""
+    wheel_side, ground_side = (
+        ("wheel_speed", "wheel_angle", "rim_speed"),
+        ("ground_speed", "position"),
+    )
+    if "slip" not in has:
+        for needed, words in ((wheel_side, "rotation"), (ground_side, "travel")):
+            if not has & {*needed}:
+                settings.fail(
+                    f"the {words}{of} is missing, from which slip follows; needed is one of "
+                    f"{', '.join(f'[{n}]' for n in needed)}, or [slip]"
+                )
+        if wheel.radius is None and "rim_speed" not in has:
+            settings.fail(
+                f"[wheel] radius{of} is missing; needed is the radius at which slip is defined, "
+                "such as radius = '0.15 m +- 1 %'"
+            )
+    if "load" not in has and vehicle is None:
+        settings.fail(
+            f"the load{of} is missing; needed is [load] with a column or a value, or [vehicle] "
+            "with mass and wheels"
+        )

@@ -1,0 +1,49 @@
+"""Readers of logs, by the ending of the file's name; a new format is one line in `_READERS`.
+
+They import their libraries when they are called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from soilml.errors import InputError
+from soilml.log_import.recording import Recording
+
+#: Ending -> module and function; any other ending is read as text.
+_READERS = {
+    ".parquet": ("parquet_log", "read_parquet_log"),
+    ".mat": ("matlab", "read_matlab"),
+    ".mcap": ("bags", "read_bag"),
+    ".bag": ("bags", "read_bag"),
+}
+#: Endings of spreadsheets, which are no logs.
+_SPREADSHEETS = (".xls", ".xlsx", ".ods")
+
+
+def read_log(path: str | Path) -> list[Recording]:
+    """The recordings of a log; raises `InputError` where it is missing or cannot be read."""
+    file = Path(path)
+    if not file.exists():
+        raise InputError(f"{file}: there is no such file")
+    suffix = file.suffix.lower()
+    if suffix in _SPREADSHEETS:
+        raise InputError(f"{file} is a spreadsheet; save its sheet as CSV and import that")
+    if suffix == ".db3":
+        file = file.parent
+    if file.is_dir():
+        if not (file / "metadata.yaml").is_file():
+            raise InputError(
+                f"{file} is a folder; needed are log files, or the folder of a ROS 2 bag, which "
+                "has a metadata.yaml"
+            )
+        suffix = ".bag"
+    module, function = _READERS.get(suffix, ("delimited_text", "read_delimited_text"))
+    found = import_module(f"soilml.log_import.readers.{module}")
+    read: Callable[[Path], list[Recording]] = getattr(found, function)
+    try:
+        return read(file)
+    except OSError as error:
+        raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

@@ -1,0 +1,96 @@
+"""ROS 1 and ROS 2 bags by rosbags; other MCAP files by mcap."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from soilml.errors import InputError
+from soilml.log_import.readers.message_fields import TopicColumns
+from soilml.log_import.recording import Recording
+from soilml.optional_imports import need
+
+
+def read_bag(path: Path) -> list[Recording]:
+    """One recording for each topic of a bag: a .bag file, a folder of ROS 2, or an MCAP file.
+
+    Raises `InputError` for a damaged bag and one without numbers, `MissingLibraryError` where the
+    extra `logs` is not installed.
+    """
+    for library in ("rosbags", "mcap"):
+        need(library, "import", "logs")
+    topics: dict[str, TopicColumns] = {}
+    messages = _mcap_messages if path.suffix == ".mcap" else _ros_messages
+    notes: list[str] = []
+    try:
+        for topic, seconds, message in messages(path, notes):
+            topics.setdefault(topic, TopicColumns()).add(seconds, message)
+    except InputError:
+        raise
+    except Exception as error:  # the libraries raise many kinds for damaged files
+        first = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path} cannot be read as a bag: {first}") from None
+    found = [
+        Recording(topic, path, columns, clock=held.times(), notes=tuple(notes))
+        for topic, held in topics.items()
+        if (columns := held.columns())
+    ]
+    if not found:
+        raise InputError(f"{path}: no topic has numbers that can be read; {'; '.join(notes)}")
+    return found
+
+
+def _ros_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, Any]]:
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([path], default_typestore=store) as reader:
+        unknown: set[str] = set()
+        for connection, nanoseconds, raw in reader.messages():
+            if connection.topic in unknown:
+                continue
+            try:
+                message = reader.deserialize(raw, connection.msgtype)
+            except KeyError:
+                unknown.add(connection.topic)
+                notes.append(f"{connection.topic}: type {connection.msgtype} is not known")
+                continue
+            yield connection.topic, 1e-9 * nanoseconds, message
+
+
+def _mcap_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, Any]]:
+    from mcap.reader import make_reader
+
+    decoders: dict[int, Callable[[bytes], Any] | None] = {}
+    with path.open("rb") as opened:
+        for schema, channel, message in make_reader(opened).iter_messages():
+            if channel.id not in decoders:
+                decoders[channel.id] = _decoder(schema, channel.message_encoding)
+                if decoders[channel.id] is None:
+                    kind = channel.message_encoding or "unknown"
+                    notes.append(f"{channel.topic}: encoding {kind} is not read (json, cdr, ros1)")
+            decode = decoders[channel.id]
+            if decode is not None:
+                yield channel.topic, 1e-9 * message.log_time, decode(message.data)
+
+
+def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
+    if encoding == "json":
+        return json.loads
+    if schema is None or encoding not in ("cdr", "ros1"):
+        return None
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+    name = schema.name if "/msg/" in schema.name else schema.name.replace("/", "/msg/")
+    text = schema.data.decode(errors="replace")
+    if name not in store.types:
+        parse = get_types_from_idl if schema.encoding == "ros2idl" else None
+        store.register(parse(text) if parse else get_types_from_msg(text, name))
+    decode: Callable[..., Any] = (
+        store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
+    )
+    return lambda data: decode(data, name)

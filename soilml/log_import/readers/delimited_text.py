@@ -1,0 +1,174 @@
+"""Text logs: comma, semicolon, tab or space separated, of any encoding."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.log_import.readers.text_encoding import decode_text
+from soilml.log_import.readers.text_layout import MISSING, TextLayout, find_layout, split_line
+from soilml.log_import.recording import Floats, Recording
+
+#: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
+_LOOKED, _NUMBERS = 300, 0.5
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?")
+
+
+def read_delimited_text(path: Path) -> list[Recording]:
+    """The table of a text log.
+
+    Encoding, separator, decimal mark, header, line of units and the first sample are found. Cells
+    that are not a number count as missing. Lines with a wrong number of cells are left out.
+
+    Raises `InputError` where the file has no samples.
+    """
+    text, encoding = decode_text(path.read_bytes(), path)
+    lines = text.splitlines()
+    layout = find_layout(lines)
+    if layout is None:
+        raise InputError(
+            f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
+            "sample a line, separated by comma, semicolon, tab or spaces"
+        )
+    rows, bad = _rows(lines[layout.first :], layout)
+    notes = []
+    if encoding not in ("utf-8", "utf-8-sig"):
+        notes.append(f"read as {encoding}")
+    if layout.decimal_comma:
+        notes.append("numbers have decimal commas")
+    if bad:
+        notes.append(f"{bad} lines have a wrong number of cells and are left out")
+    columns, texts = _columns(rows, layout)
+    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
+    return [
+        Recording("", path, columns, texts, units, about=layout.about, notes=tuple(notes)),
+    ]
+
+
+def _rows(lines: list[str], layout: TextLayout) -> tuple[list[list[str]], int]:
+    """The cells of all samples, and how many lines are left out."""
+    width, bad = len(layout.names), 0
+    rows: list[list[str]] = []
+    quoted = '"' in "".join(lines[:50])
+    simple = layout.separator != " " and not quoted
+    for line in lines:
+        if not line or line.isspace():
+            continue
+        try:
+            cells = line.split(layout.separator) if simple else split_line(line, layout.separator)
+        except csv.Error:
+            bad += 1
+            continue
+        if len(cells) < width:
+            if len(cells) < max(2, width / 2) < width:
+                bad += 1
+                continue
+            cells += [""] * (width - len(cells))
+        elif len(cells) > width:
+            if any(cell.strip() for cell in cells[width:]):
+                bad += 1
+                continue
+            cells = cells[:width]
+        rows.append(cells)
+    return rows, bad
+
+
+def _columns(
+    rows: list[list[str]], layout: TextLayout
+) -> tuple[dict[str, Floats], dict[str, list[str]]]:
+    columns: dict[str, Floats] = {}
+    texts: dict[str, list[str]] = {}
+    for i, name in enumerate(layout.names):
+        cells = [row[i] for row in rows]
+        values, numbers = as_numbers(cells, layout.decimal_comma)
+        present = sum(cell.strip().lower() not in MISSING for cell in cells)
+        if present == 0 or numbers >= _NUMBERS * present:
+            columns[name] = values
+            continue
+        seconds = time_of_day(cells)
+        if seconds is not None:
+            columns[name] = seconds
+        else:
+            texts[name] = [cell.strip().strip('"') for cell in cells]
+    return columns, texts
+
+
+def as_numbers(cells: list[str], decimal_comma: bool = False) -> tuple[Floats, int]:
+    """The cells as numbers, NaN where they are none, and how many are numbers."""
+    if decimal_comma:
+        cells = [cell.replace(",", ".") for cell in cells]
+    try:
+        values = np.array(cells, dtype=np.float64)
+    except ValueError:
+        values = np.array([_number(cell) for cell in cells], dtype=np.float64)
+    values[~np.isfinite(values)] = np.nan
+    return values, int(np.isfinite(values).sum())
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        text = cell.strip().strip('"').replace("d", "e").replace("D", "e")
+        try:
+            return float(text) if text.lower() not in MISSING else float("nan")
+        except ValueError:
+            return float("nan")
+
+
+def time_of_day(cells: list[str]) -> Floats | None:
+    """Dates and times of day as seconds; None for other text. Midnight is passed once a day."""
+    shown = [cell.strip().strip('"') for cell in cells[:_LOOKED] if cell.strip()]
+    if not shown:
+        return None
+    for parse in (_iso_seconds, _clock_seconds):
+        if all(np.isfinite(parse(cell)) for cell in shown[:20]):
+            return _seconds(cells, parse)
+    return None
+
+
+def _seconds(cells: list[str], parse: Callable[[str], float]) -> Floats:
+    values = np.array([parse(cell.strip().strip('"')) for cell in cells], dtype=np.float64)
+    if parse is _clock_seconds:
+        known = np.flatnonzero(np.isfinite(values))
+        days = np.cumsum(np.diff(values[known], prepend=values[known[0]]) < -43200.0)
+        values[known] += 86400.0 * days
+    return values
+
+
+def _iso_seconds(cell: str) -> float:
+    text = cell.replace("Z", "+00:00").replace("/", "-")
+    if len(text) < 10 or not text[:4].isdigit():
+        for form in ("%d-%m-%Y %H:%M:%S.%f", "%d-%m-%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f",
+                     "%d.%m.%Y %H:%M:%S"):  # fmt: skip
+            try:
+                when = datetime.datetime.strptime(text.replace(",", "."), form)
+            except ValueError:
+                continue
+            return when.replace(tzinfo=datetime.UTC).timestamp()
+        return float("nan")
+    if match := re.fullmatch(r"(.*\.\d{6})\d+(.*)", text):
+        text = match[1] + match[2]  # nanoseconds
+    try:
+        when = datetime.datetime.fromisoformat(text)
+    except ValueError:
+        return float("nan")
+    if when.tzinfo is None:
+        when = when.replace(tzinfo=datetime.UTC)
+    return when.timestamp()
+
+
+def _clock_seconds(cell: str) -> float:
+    match = _CLOCK.fullmatch(cell)
+    if match is None:
+        return float("nan")
+    hours = int(match[1])
+    if match[4]:
+        hours = hours % 12 + (12 if match[4].lower() == "pm" else 0)
+    return 3600.0 * hours + 60.0 * int(match[2]) + float(match[3].replace(",", "."))

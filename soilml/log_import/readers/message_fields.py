@@ -1,0 +1,111 @@
+"""Messages of bags as columns: nested fields by dotted names, arrays by the names beside them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from soilml.log_import.recording import Floats
+
+_DEEPEST = 6
+#: Longer arrays (images, point clouds, laser scans) are no channels.
+_LONGEST = 24
+
+
+class TopicColumns:
+    """The columns of one topic, filled message by message."""
+
+    def __init__(self) -> None:
+        self.clock: list[float] = []
+        self._stamps: list[float] = []
+        self._cells: dict[str, list[float]] = {}
+
+    def add(self, received: float, message: Any) -> None:
+        """Append a message: an object with fields, or a dictionary; `received` in s."""
+        row = dict(fields_of(message))
+        seconds = row.pop("header.stamp.sec", math.nan)
+        stamp = seconds + 1e-9 * row.pop("header.stamp.nanosec", math.nan)
+        row.pop("header.seq", None)
+        n = len(self.clock)
+        for name, value in row.items():
+            if name not in self._cells:
+                self._cells[name] = [math.nan] * n
+            self._cells[name].append(value)
+        self.clock.append(received)
+        self._stamps.append(stamp)
+        for cells in self._cells.values():
+            if len(cells) <= n:
+                cells.append(math.nan)
+
+    def columns(self) -> dict[str, Floats]:
+        """The columns as arrays; those without a number are left out."""
+        arrays = {name: np.asarray(cells) for name, cells in self._cells.items()}
+        return {name: values for name, values in arrays.items() if np.isfinite(values).any()}
+
+    def times(self) -> Floats:
+        """Time of the samples, s: the stamps in the messages where they are set, else the bag's.
+
+        The time of receipt jitters; the stamp is when the sensor was read.
+        """
+        stamps = np.asarray(self._stamps)
+        clock = np.asarray(self.clock)
+        set_ = np.isfinite(stamps) & (stamps > 0.0)
+        if set_.all() and np.ptp(stamps) > 0.5 * np.ptp(clock):
+            return stamps
+        return clock
+
+
+def fields_of(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
+    """Numbers of a message by dotted name.
+
+    Elements of an array are named by `name` or `names` beside it (as in joint states), else
+    numbered from 0. An orientation has roll, pitch and yaw (rad) besides its quaternion.
+    """
+    if depth > _DEEPEST:
+        return
+    items = (
+        message.items()
+        if isinstance(message, dict)
+        else ((k, getattr(message, k)) for k in _names(message))
+    )
+    content = {key: value for key, value in items if not key.startswith("_")}
+    names = content.get("name", content.get("names", content.get("joint_names")))
+    for key, value in content.items():
+        place = f"{prefix}{key}"
+        if isinstance(value, bool | int | float | np.number):
+            yield place, float(value)
+        elif isinstance(value, list | tuple | np.ndarray):
+            yield from _array(place, value, names, depth)
+        elif isinstance(value, dict) or _names(value):
+            yield from fields_of(value, f"{place}.", depth + 1)
+    if {"x", "y", "z", "w"} <= content.keys():
+        yield from _angles(prefix, *(float(content[k]) for k in "xyzw"))
+
+
+def _array(place: str, value: Any, names: Any, depth: int) -> Iterator[tuple[str, float]]:
+    if len(value) > _LONGEST:
+        return
+    named = isinstance(names, list | tuple) and len(names) == len(value)
+    for i, element in enumerate(value):
+        label = f"{place}.{names[i] if named else i}"
+        if isinstance(element, bool | int | float | np.number):
+            yield label, float(element)
+        elif isinstance(element, dict) or _names(element):
+            yield from fields_of(element, f"{label}.", depth + 1)
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    fields = getattr(type(value), "__dataclass_fields__", None)
+    if fields is not None:
+        return tuple(name for name in fields if not name.startswith("__"))
+    return tuple(getattr(value, "__slots__", ()))
+
+
+def _angles(prefix: str, x: float, y: float, z: float, w: float) -> Iterator[tuple[str, float]]:
+    """Roll, pitch and yaw of a quaternion, rad (ZYX order)."""
+    yield f"{prefix}roll", math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    yield f"{prefix}pitch", math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    yield f"{prefix}yaw", math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

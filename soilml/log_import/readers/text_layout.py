@@ -1,0 +1,189 @@
+"""The layout of a text log: separator, decimal mark, header, units, where the samples begin."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+#: Cells that stand for a missing number.
+MISSING = frozenset(
+    (
+        "",
+        *[
+            "nan",
+            "na",
+            "n/a",
+            "null",
+            "none",
+            "-",
+            "--",
+            "---",
+            "#n/a",
+            "inf",
+            "-inf",
+            "+inf",
+            "nan(ind)",
+            "-nan(ind)",
+            "-nan",
+        ],
+    )
+) | {"1.#qnan", "-1.#ind", "missing", "?", "overflow"}
+COMMENTS = ("#", "%", "//", ";;")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?")
+_BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+_SEPARATORS = (";", "\t", ",", "|")
+#: Lines looked at, and how many of them must follow each other like samples.
+_LOOKED, _IN_A_ROW = 400, 3
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How a text log is written.
+
+    Attributes
+    ----------
+    separator
+        One character; " " for any white space.
+    decimal_comma
+        Numbers are written as 0,25.
+    names, units
+        Header and units, one for each column; units are "" where not stated.
+    first
+        Index of the first line of samples.
+    about
+        Lines before the header.
+    """
+
+    separator: str
+    decimal_comma: bool
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    first: int
+    about: tuple[str, ...]
+
+
+def find_layout(lines: Sequence[str]) -> TextLayout | None:
+    """The layout of the lines of a text file; None where nothing in it looks like samples."""
+    head = list(lines[:_LOOKED])
+    found = [(s, d, *_samples(head, s, d)) for s in (*_SEPARATORS, " ") for d in (False, True)]
+    # a comma cannot separate cells and be the decimal mark
+    found = [f for f in found if f[3] > 0 and not (f[0] == "," and f[1])]
+    if not found:
+        return None
+    best = max(found, key=lambda f: (f[3] * min(f[4], 3), f[4]))
+    separator, comma, first, _, width = best
+    names, units, header = _header(head[:first], separator, width)
+    about = tuple(_plain(line) for line in head[:header] if _plain(line))
+    return TextLayout(separator, comma, names, units, first, about)
+
+
+def split_line(line: str, separator: str) -> list[str]:
+    """The cells of a line, without quotes and white space around them."""
+    if separator == " ":
+        return line.split()
+    cells = next(csv.reader([line], delimiter=separator), [])
+    return [cell.strip() for cell in cells]
+
+
+def is_number(cell: str, decimal_comma: bool = False) -> bool:
+    """Whether a cell is a number, or stands for a missing one."""
+    text = cell.strip()
+    if text.lower() in MISSING or _NUMBER.fullmatch(text):
+        return True
+    return decimal_comma and bool(_COMMA_NUMBER.fullmatch(text))
+
+
+def name_and_unit(cell: str) -> tuple[str, str]:
+    """Name and unit of a header such as `Fz [N]` or `speed (mm/s)`; the unit is "" without one."""
+    match = _BRACKETS.match(cell)
+    if match and match[1].strip():
+        return match[1].strip(), match[2].strip()
+    name, comma, unit = cell.rpartition(",")
+    if comma and name.strip() and 0 < len(unit.strip()) <= 8 and " " not in unit.strip():
+        return name.strip(), unit.strip()
+    return cell.strip(), ""
+
+
+def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, int]:
+    """Index of the first sample, how many lines look like it, and their number of cells."""
+    kinds: list[int] = []
+    for line in head:
+        if line.lstrip().startswith(COMMENTS) or not line.strip():
+            kinds.append(0)
+            continue
+        try:
+            cells = split_line(line, separator)
+        except csv.Error:
+            kinds.append(0)
+            continue
+        numbers = sum(bool(c) and is_number(c, comma) for c in cells)
+        blanks = sum(not c for c in cells)
+        # names of runs and times of day stand beside the numbers
+        kinds.append(len(cells) if numbers >= max(1, (len(cells) - blanks) / 2) else 0)
+    widths = Counter(k for k in kinds if k)
+    if not widths:
+        return 0, 0, 0
+    width = max(widths, key=lambda w: (widths[w], w))
+    like = [abs(k - width) <= width // 4 and k > 0 for k in kinds]
+    for i in range(len(like)):
+        run = like[i : i + _IN_A_ROW]
+        if all(run):
+            return i, sum(like[i:]), max(k for k, fits in zip(kinds, like, strict=True) if fits)
+    return 0, 0, 0
+
+
+def _header(
+    head: list[str], separator: str, width: int
+) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    """Names, units and the index of the header line, among the lines before the samples."""
+    rows = []
+    for i, line in enumerate(head):
+        text = line.strip()
+        for mark in COMMENTS:
+            text = text.removeprefix(mark).strip() if text.startswith(mark) else text
+        cells = split_line(text, separator)
+        while cells and not cells[-1] and len(cells) > width:
+            cells.pop()
+        # some loggers end each line of samples with a separator, and the header without
+        if abs(len(cells) - width) <= max(1, width // 8) and sum(map(bool, cells)) > width / 2:
+            rows.append((i, cells))
+    rows = [row for row in rows if row[0] >= len(head) - 5]
+    if not rows:
+        return tuple(f"column_{i + 1}" for i in range(width)), ("",) * width, len(head)
+    index, names_row = rows[0]
+    for later, cells in rows[1:]:
+        if _are_units(cells):
+            break
+        index, names_row = later, cells
+    units_rows = [cells for i, cells in rows if i > index and _are_units(cells)]
+    units = (units_rows[0] if units_rows else []) + [""] * width
+    names: list[str] = []
+    stated: list[str] = []
+    for k in range(width):
+        cell = names_row[k] if k < len(names_row) else ""
+        name, unit = name_and_unit(cell) if cell else (f"column_{k + 1}", "")
+        if name in names:
+            name = f"{name}#{names.count(name) + 1 + sum(n.startswith(name + '#') for n in names)}"
+        names.append(name)
+        stated.append(units[k].strip("[](){} ") or unit)
+    return tuple(names), tuple(stated), index
+
+
+def _are_units(cells: list[str]) -> bool:
+    """Whether the cells of a line below the header look like units."""
+    from soilml.log_import.units.unit_names import known_unit
+
+    texts = [cell.strip("[](){} ") for cell in cells]
+    texts = [text for text in texts if text not in ("", "-")]
+    return bool(texts) and sum(known_unit(text) for text in texts) > len(texts) / 2
+
+
+def _plain(line: str) -> str:
+    text = line.strip()
+    for mark in COMMENTS:
+        text = text.removeprefix(mark)
+    return text.strip()

@@ -1,0 +1,65 @@
+"""What a reader finds in a log: columns of samples with one clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Columns of equal length (n,), as they stand in a file: one table, topic or struct.
+
+    Attributes
+    ----------
+    name
+        Topic, struct or kind of file; "" where a file holds one table.
+    file
+        The file.
+    columns
+        Numbers by column, NaN where a cell is blank or not a number.
+    texts
+        Columns that hold text, such as names of runs and times of day.
+    units
+        Units by column, as the log writes them.
+    clock
+        Time of each sample in s, where the format has one (bags); None where a column has it.
+    about
+        Lines before the header, which may state the radius of the wheel or the sampling rate.
+    notes
+        What the reader repaired or left out.
+    """
+
+    name: str
+    file: Path
+    columns: dict[str, Floats]
+    texts: dict[str, list[str]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    clock: Floats | None = None
+    about: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        if self.clock is not None:
+            return len(self.clock)
+        held: list[Floats | list[str]] = [*self.columns.values(), *self.texts.values()]
+        return len(held[0]) if held else 0
+
+    def rows(self, keep: NDArray[np.bool_]) -> Recording:
+        """The samples of a mask (n,)."""
+        picked = np.flatnonzero(keep)
+        return Recording(
+            self.name,
+            self.file,
+            {name: values[keep] for name, values in self.columns.items()},
+            {name: [cells[i] for i in picked] for name, cells in self.texts.items()},
+            self.units,
+            None if self.clock is None else self.clock[keep],
+            self.about,
+            self.notes,
+        )

@@ -1,0 +1,1 @@
+"""The report of an import as one self-contained HTML page."""

@@ -1,0 +1,163 @@
+"""What an import gives: rows, windows, what was left out, and remarks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from soilml.config.measurement_noise import Noise
+from soilml.io.table import Table
+from soilml.log_import.channels.shared_errors import SharedError
+from soilml.log_import.recording import Floats
+from soilml.log_import.windows.steady import Stretch
+
+
+@dataclass(frozen=True)
+class WheelSeries:
+    """The quantities of one wheel in one run over time, and the stretches of the run.
+
+    Attributes
+    ----------
+    run
+        Name of the run in the table.
+    drive
+        Name of the run in the log; several wheels share it.
+    time
+        Grid (n,), s.
+    quantities
+        Samples (n,) by name.
+    stretches
+        Steady windows and what is left out.
+    notes
+        What was repaired, tared or doubted in this run.
+    """
+
+    run: str
+    drive: str
+    time: Floats
+    quantities: dict[str, Floats]
+    stretches: tuple[Stretch, ...]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ImportedLog:
+    """The result of an import.
+
+    Attributes
+    ----------
+    table
+        One row for each steady window of each wheel.
+    bias
+        Errors that all rows share, by column, as `[bias]` of a model file states them.
+    shared
+        What each uncertain constant of the map adds to them.
+    series
+        Each wheel in each run.
+    remarks
+        What looks odd, most important first.
+    implausible
+        Those of them that say that the map is wrong.
+    radius
+        Radius of the wheel, m; NaN where the map has none.
+    """
+
+    table: Table
+    bias: dict[str, Noise]
+    shared: tuple[SharedError, ...]
+    series: tuple[WheelSeries, ...]
+    remarks: tuple[str, ...] = ()
+    implausible: tuple[str, ...] = ()
+    radius: float = float("nan")
+    sources: tuple[str, ...] = ()
+    map_name: str = "map"
+
+    def left_out(self) -> list[tuple[str, Stretch]]:
+        """Runs and their stretches that are not in the table, with the reason."""
+        return [(s.run, stretch) for s in self.series for stretch in s.stretches if stretch.why]
+
+    def bias_toml(self) -> str:
+        """The table [bias] of a model file, and what identify and gap take in its place."""
+        if not self.bias:
+            return (
+                "# No constant of the map has a standard deviation: rows share no stated error.\n"
+            )
+        lines = [
+            "# Errors that all rows share, from the uncertainties of the map. Add this table to",
+            "# the model file for `soilml estimate --case`; zero declares a sensor to be exact.",
+            "[bias]",
+        ]
+        lines += [f"{key} = {_setting(noise)}" for key, noise in self.bias.items()]
+        lines += self._effect_lines()
+        return "\n".join(lines) + "\n"
+
+    def _effect_lines(self) -> list[str]:
+        """Commented effects that `identify` integrates out, and options for `gap`."""
+        effects = []
+        torque, slip = self.bias.get("torque_Nm"), self.bias.get("slip")
+        load = self.bias.get("load_N")
+        if torque is not None and torque.share:
+            effects.append(("torque-gain", "gain", torque.share))
+        if torque is not None and torque.constant:
+            effects.append(("torque-offset", "offset", torque.constant))
+        if slip is not None and slip.constant:
+            effects.append(("slip-offset", "offset", slip.constant))
+        if load is not None and load.share:
+            effects.append(("load-gain", "gain", load.share))
+        if not effects:
+            return []
+        lines = ["", "# `soilml identify` and `gap` refuse [bias]. For identify, write them as"]
+        lines.append("# effects with a prior:")
+        for name, parameter, std in effects:
+            lines += ["#", "# [[effect]]", f'# name = "{name}"', "# [effect.prior]"]
+            lines.append(f"# {parameter} = {{ normal = {std:.3g} }}")
+        options = " ".join(f"--checked {name}={std:.3g}" for name, _, std in effects)
+        return [*lines, "#", f"# For gap: {options}"]
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of the JSON file beside the report."""
+        return {
+            "map": self.map_name,
+            "logs": list(self.sources),
+            "rows": _rows(self.table),
+            "bias": {
+                key: {"share": n.share, "constant": n.constant} for key, n in self.bias.items()
+            },
+            "shared_errors": [
+                {"constant": s.constant, "quantity": s.quantity, "rms": s.rms} for s in self.shared
+            ],
+            "left_out": [
+                {"run": run, "from_s": s.start, "until_s": s.stop, "why": s.why}
+                for run, s in self.left_out()
+            ],
+            "runs": [
+                {
+                    "run": s.run,
+                    "duration_s": float(s.time[-1] - s.time[0]),
+                    "step_s": float(s.time[1] - s.time[0]),
+                    "windows": [[w.start, w.stop] for w in s.stretches if not w.why],
+                    "notes": list(s.notes),
+                }
+                for s in self.series
+            ],
+            "remarks": [*self.implausible, *self.remarks],
+        }
+
+
+def _setting(noise: Noise) -> str:
+    rounded = Noise(float(f"{noise.constant:.3g}"), float(f"{noise.share:.3g}"))
+    value = rounded.as_setting()
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
+
+
+def _rows(table: Table) -> list[dict[str, Any]]:
+    names = list(table.columns)
+    return [
+        {
+            name: value.item() if isinstance(value, np.generic) else value
+            for name, value in zip(names, row, strict=True)
+        }
+        for row in zip(*table.columns.values(), strict=True)
+    ]

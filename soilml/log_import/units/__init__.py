@@ -1,0 +1,1 @@
+"""Units of logs, and values with a unit and a standard deviation."""

@@ -1,0 +1,70 @@
+"""Values of a map with unit and standard deviation: `"38.5 mN m/A +- 3 %"`."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from soilml.io.toml_settings import Settings
+from soilml.log_import.units.conversion import factor
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_FORM = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER})\s*(.*?))?\s*")
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """A value in the unit of soilml, and its standard deviation; 0 where it is exact."""
+
+    value: float
+    std: float = 0.0
+
+    @property
+    def relative(self) -> float:
+        """Standard deviation as a share of the value."""
+        return self.std / abs(self.value) if self.value else 0.0
+
+
+def parse_uncertain(text: str | int | float, ours: str, where: str) -> Uncertain | None:
+    """A number, or a text such as `"0.15 m +- 1 %"`; None for another form.
+
+    The standard deviation is in the value's own unit, in another one, or in per cent of the value.
+    Raises `InputError` for a unit that does not give `ours`.
+    """
+    if not isinstance(text, str):
+        return Uncertain(float(text)) if math.isfinite(text) else None
+    match = _FORM.fullmatch(text)
+    if match is None:
+        return None
+    scale = factor(match[2], ours, where)
+    value = float(match[1]) * scale
+    if match[3] is None:
+        return Uncertain(value)
+    std, unit = float(match[3]), match[4]
+    if unit == "%" and match[2] != "%":
+        return Uncertain(value, std / 100.0 * abs(value))
+    return Uncertain(value, std * (factor(unit, ours, where) if unit else scale))
+
+
+def take_uncertain(
+    settings: Settings,
+    key: str,
+    ours: str,
+    default: Uncertain | None = None,
+    lower: float = -math.inf,
+) -> Uncertain:
+    """The value of `key`; raises `InputError` for a wrong form and for one not above `lower`."""
+    example = f"'0.15 {ours} +- 1 %'" if ours != "1" else "'0.7 +- 0.05'"
+    needed = f"a number in {ours}, or a text such as {example}"
+    if key not in settings and default is not None:
+        settings.permit([key])
+        return default
+    given = settings.take(key, (int, float, str), needed)
+    found = parse_uncertain(given, ours, f"{settings.where} {key}")
+    if found is None or found.std < 0.0:
+        settings.fail(f"{key} is {given!r}; needed is {needed}")
+    elif not found.value > lower:
+        settings.fail(f"{key} is {given!r}; needed is a value above {lower:g}")
+    assert found is not None
+    return found

@@ -1,0 +1,1 @@
+"""Steady windows of a run, and the errors of their means."""

@@ -1,0 +1,74 @@
+"""Standard errors of means of autocorrelated samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from soilml.log_import.recording import Floats
+
+#: Samples are first averaged to at most this many, which lowers the noise in their correlations.
+_MOST_VALUES = 256
+#: Fewest independent samples, and degrees of freedom, that an error counts with.
+_FEWEST, _LEAST_FREEDOM = 4.0, 4.0
+
+
+def autocorrelation_time(values: Floats) -> float:
+    """Integrated autocorrelation time of samples (n,), in samples; see `time_and_window`."""
+    return time_and_window(values)[0]
+
+
+def time_and_window(values: Floats) -> tuple[float, int]:
+    r"""Integrated autocorrelation time of samples (n,), in samples, and the last lag M of its sum.
+
+    .. math:: \tau = 1 + 2 \sum_{k=1}^{M} \rho_k
+
+    summed by the initial monotone sequence of Geyer, "Practical Markov chain Monte Carlo", Stat.
+    Sci. 7 (1992), section 3.3: the sums of neighbouring pairs, as long as they are positive and do
+    not grow. The bias from the mean is corrected to first order, by
+    :math:`1 + (2 M + 1) / n`: Wolff, Comput. Phys. Commun. 156 (2004), equation 49. It is at
+    least 1.
+    """
+    n = values.size
+    centred = values - values.mean()
+    variance = float(np.mean(centred**2))
+    # below rounding, a constant has no autocorrelation
+    if n < 4 or variance <= 1e-24 * max(1e-300, float(np.mean(values**2))):
+        return 1.0, 0
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(centred, size)
+    rho = np.fft.irfft(spectrum * np.conj(spectrum), size)[: n // 2 * 2] / (n * variance)
+    pairs = rho[::2] + rho[1::2]
+    below = np.flatnonzero(pairs <= 0.0)
+    count = max(1, int(below[0])) if below.size else pairs.size
+    tau = 2.0 * float(np.minimum.accumulate(pairs[:count]).sum()) - 1.0
+    last = 2 * count - 1
+    return float(np.clip(tau * (1.0 + (2.0 * last + 1.0) / n), 1.0, n / 2.0)), last
+
+
+def mean_error(values: Floats, step: float) -> tuple[float, float, float]:
+    r"""Mean of samples (n,), its standard error, and the autocorrelation time in s.
+
+    .. math:: \sigma^2 = \frac{\tau}{n} s^2 \frac{1}{1 - \tau / n} \frac{\nu}{\nu - 2},
+              \quad \nu = \frac{n}{2 M + 1}
+
+    The variance of the estimate of tau is :math:`2 (2 M + 1) / n \, \tau^2` (Sokal, "Monte Carlo
+    methods in statistical mechanics", 1997, equation 3.19), that of a chi-squared variable with
+    :math:`\nu` degrees of freedom over :math:`\nu`: the last factor makes the error the standard
+    deviation of the t distribution that follows. NaN are left out.
+    """
+    own = values[np.isfinite(values)]
+    if own.size == 0:
+        return float("nan"), float("nan"), float("nan")
+    if own.size < 4:
+        return float(own.mean()), float("nan"), step
+    total, width = own.size, -(-own.size // _MOST_VALUES)
+    own = own[: total // width * width].reshape(-1, width).mean(axis=1)
+    tau, last = time_and_window(own)
+    independent = max(own.size / tau, _FEWEST)
+    freedom = max(own.size / (2.0 * last + 1.0), _LEAST_FREEDOM)
+    variance = float(np.var(own)) / independent / (1.0 - 1.0 / independent)
+    return (
+        float(own.mean()),
+        float(np.sqrt(variance * freedom / (freedom - 2.0))),
+        tau * width * step,
+    )

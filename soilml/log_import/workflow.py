@@ -1,0 +1,249 @@
+"""From logs and a map to a table of runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.config.measurement_noise import Noise
+from soilml.errors import FitError, InputError
+from soilml.log_import.channels.inputs import Inputs, wheel_inputs
+from soilml.log_import.channels.runs import Run, runs_of
+from soilml.log_import.channels.shared_errors import SharedError, shared_errors
+from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.checks.irregular import irregular_windows
+from soilml.log_import.checks.map_hints import map_hints
+from soilml.log_import.checks.sensors import dead_sensors, untared_sensors
+from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
+from soilml.log_import.readers import read_log
+from soilml.log_import.recording import Floats
+from soilml.log_import.result import ImportedLog, WheelSeries
+from soilml.log_import.row_table import rows_as_table, unusable
+from soilml.log_import.window_rows import (
+    WindowRow,
+    add_stated_errors,
+    plain_constants,
+    pool_errors,
+    quantities_of,
+    window_row,
+)
+from soilml.log_import.windows.steady import Stretch, steady_windows
+
+PathLike = str | os.PathLike[str]
+Progress = Callable[[str, int, int], None]
+
+
+def import_log(
+    logs: PathLike | Sequence[PathLike],
+    log_map: PathLike | LogMap | Mapping[str, Any],
+    *,
+    accept: bool = False,
+    progress: Progress | None = None,
+) -> ImportedLog:
+    """Bring logs of a rig or rover into a table of runs.
+
+    Parameters
+    ----------
+    logs
+        One or several files: CSV and other text, Parquet, MATLAB, MCAP, bags of ROS 1 and 2.
+    log_map
+        The map: a TOML file, its content as a dictionary, or what `read_map` returns. `init_map`
+        writes one.
+    accept
+        Give the table although the map looks wrong.
+    progress
+        Called with a stage, the items done and their number.
+
+    Returns
+    -------
+    ImportedLog
+        With one row for each steady window of each wheel; `table` is a table of runs.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read, a column is missing, or the map is implausible: the line names
+        the likely cause.
+    FitError
+        Where no window can be used.
+    MissingLibraryError
+        Where a reader's library is not installed.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    found = _as_map(log_map)
+    recordings = []
+    for i, file in enumerate(files):
+        tell("reading logs", i, len(files))
+        recordings.append(read_log(Path(file)))
+    tell("reading logs", len(files), len(files))
+    runs = runs_of(recordings, found)
+    analyses = [_Wheel(found, wheel, runs, tell) for wheel in found.wheels]
+    wrong = [text for analysis in analyses for text in analysis.map_hints()]
+    if wrong and not accept:
+        raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
+    table = rows_as_table(
+        [(a.wheel, run, a.kept[i]) for i, run in enumerate(runs) for a in analyses], found
+    )
+    if len(table) == 0:
+        raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(analyses)}")
+    bias: dict[str, Noise] = {}
+    parts: list[SharedError] = []
+    for analysis in analyses:
+        own, contributions = analysis.shared_errors()
+        for key, noise in own.items():
+            # rows of several wheels share one table [bias]: the largest errors stand in it
+            other = bias.get(key, noise)
+            bias[key] = replace(
+                noise,
+                share=max(noise.share, other.share),
+                constant=max(noise.constant, other.constant),
+            )
+        parts += contributions
+    radius = found.wheels[0].radius
+    remarks = [text for analysis in analyses for text in analysis.remarks()]
+    remarks += table_hints(table.columns, radius.value if radius else None)
+    return ImportedLog(
+        table,
+        bias,
+        tuple(parts),
+        tuple(a.series(i) for i in range(len(runs)) for a in analyses),
+        tuple(dict.fromkeys(remarks)),
+        tuple(wrong),
+        radius.value if radius else float("nan"),
+        tuple(str(file) for file in files),
+        found.source,
+    )
+
+
+def _as_map(log_map: PathLike | LogMap | Mapping[str, Any]) -> LogMap:
+    if isinstance(log_map, LogMap):
+        return log_map
+    return map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
+
+
+class _Wheel:
+    """One wheel in all runs."""
+
+    def __init__(
+        self, log_map: LogMap, wheel: WheelMap, runs: Sequence[Run], tell: Progress
+    ) -> None:
+        self.log_map, self.wheel, self.runs = log_map, wheel, runs
+        self.inputs = [wheel_inputs(run, wheel) for run in runs]
+        self.dead = dead_sensors(self.inputs)
+        self.quantities: list[dict[str, Floats]] = []
+        self.stretches: list[list[Stretch]] = []
+        self.rows: list[list[WindowRow]] = []
+        stage = f"finding steady windows{' of ' + wheel.name if wheel.name else ''}"
+        for i, run in enumerate(runs):
+            tell(stage, i, len(runs))
+            self._analyse(run, self.inputs[i], self.dead[i])
+        tell(stage, len(runs), len(runs))
+        self._sort_out()
+
+    def _analyse(self, run: Run, inputs: Inputs, dead: Mapping[str, str]) -> None:
+        for role in dead:
+            inputs.values[role] = np.full(inputs.time.size, np.nan)
+        values: dict[str, float | Floats] = {**inputs.values, **inputs.constants}
+        constants = plain_constants(self.log_map, self.wheel)
+        quantities = quantities_of(values, self.log_map, self.wheel, constants)
+        series = {
+            name: np.broadcast_to(values, inputs.time.shape) for name, values in quantities.items()
+        }
+        left_out = tuple(e for e in self.log_map.left_out if e.run in ("", run.name))
+        stretches = steady_windows(inputs.time, series, self.log_map.windows, left_out)
+        rows = [
+            window_row(stretch, inputs, quantities, self.log_map, self.wheel)
+            for stretch in stretches
+            if not stretch.why
+        ]
+        self.quantities.append(series)
+        self.stretches.append([s for s in stretches if s.why])
+        self.rows.append(rows)
+
+    def _sort_out(self) -> None:
+        """Leave out windows without slip or load, and irregular ones."""
+        self.kept: list[list[WindowRow]] = []
+        odd = irregular_windows(self.rows)
+        pool_errors([row for i, rows in enumerate(self.rows) for k, row in enumerate(rows)
+                     if (i, k) not in odd])  # fmt: skip
+        for inputs, rows in zip(self.inputs, self.rows, strict=True):
+            for row in rows:
+                add_stated_errors(row, inputs, self.log_map, self.wheel)
+        for i, rows in enumerate(self.rows):
+            kept = []
+            for k, row in enumerate(rows):
+                why = unusable(row, self.dead[i]) or odd.get((i, k), "")
+                if why:
+                    self.stretches[i].append(replace(row.window, why=why))
+                else:
+                    kept.append(row)
+            self.kept.append(kept)
+
+    def _windows(self) -> dict[str, Floats]:
+        """Means of all windows by quantity, left out or not, in the sensors' own direction."""
+        rows = [row for rows in self.rows for row in rows]
+        names = dict.fromkeys(name for row in rows for name in row.values)
+        found = {name: np.asarray([row.values.get(name, np.nan) for row in rows]) for name in names}
+        if any("slope" in row.means for row in rows):
+            found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
+        return found
+
+    def map_hints(self) -> list[str]:
+        """What says that the map is wrong."""
+        return map_hints(self.log_map, self.wheel, self._windows())
+
+    def shared_errors(self) -> Any:
+        """The errors that the rows share."""
+        rows = [row for rows in self.kept for row in rows]
+        if not rows:
+            return {}, []
+        roles = dict.fromkeys(role for row in rows for role in row.means)
+        means: dict[str, float | Floats] = {
+            role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles
+        }
+        return shared_errors(
+            lambda constants: quantities_of(means, self.log_map, self.wheel, constants),
+            constants_of(self.wheel, self.log_map.vehicle),
+        )
+
+    def remarks(self) -> list[str]:
+        """Dead and untared sensors."""
+        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
+        found = [
+            f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
+            for run, dead in zip(self.runs, self.dead, strict=True)
+            for role, why in dead.items()
+        ]
+        return found + untared_sensors(self.wheel, self.inputs)
+
+    def series(self, i: int) -> WheelSeries:
+        """Quantities and stretches of one run."""
+        run = self.runs[i]
+        windows = [row.window for row in self.kept[i]]
+        notes = (*run.notes, *self.inputs[i].notes)
+        notes += tuple(f"[{role}] is dead: {why}" for role, why in self.dead[i].items())
+        return WheelSeries(
+            f"{run.name}_{self.wheel.name}" if self.wheel.name else run.name,
+            run.name,
+            self.inputs[i].time,
+            self.quantities[i],
+            tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
+            notes,
+        )
+
+
+def _most_frequent(analyses: Sequence[_Wheel]) -> str:
+    """The reason for which most of the time was left out."""
+    seconds: dict[str, float] = {}
+    for analysis in analyses:
+        for stretches in analysis.stretches:
+            for s in stretches:
+                seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
+    return max(seconds, key=lambda why: seconds[why], default="the logs are empty")

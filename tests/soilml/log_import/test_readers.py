@@ -1,0 +1,168 @@
+"""Text logs in the dialects of loggers, units and values with uncertainties."""
+
+import math
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError, MissingLibraryError, SoilmlError
+from soilml.log_import.readers import read_log
+from soilml.log_import.readers.delimited_text import time_of_day
+from soilml.log_import.units.conversion import dimension, factor
+from soilml.log_import.units.uncertain_value import parse_uncertain
+from soilml.log_import.units.unit_names import unit_in_name
+
+PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
+SEMICOLON = PLAIN.replace(",", ";").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        PLAIN.encode(),
+        b"\xef\xbb\xbf" + PLAIN.encode(),
+        PLAIN.encode("utf-16"),
+        PLAIN.encode("utf-16-le"),
+        PLAIN.encode("utf-16-be"),
+        PLAIN.replace("\n", "\r\n").encode(),
+        PLAIN.replace(",", "\t").encode(),
+        SEMICOLON.encode("utf-16"),
+        SEMICOLON.encode(),
+        PLAIN.replace(",", ";").encode(),
+        PLAIN.replace("0.2,,-4", "0.2,NaN,-4").encode(),
+        PLAIN.replace("0.2,,-4", "0.2,#N/A,-4").replace(",", "  ").encode(),
+        PLAIN.replace("0.2,,-4", '"0.2","","-4"').replace("t,F,M", '"t","F","M"').encode(),
+        ("# rig 3\n# Datum 12.3.\n# t,F,M\n" + PLAIN.split("\n", 1)[1]).encode(),
+        ("Größe: 3 µm\n\n" + PLAIN).encode("cp1252"),
+        PLAIN.replace("\n", ",\n").encode(),
+        ("sep=,\n" + PLAIN).encode(),
+    ],
+)
+def test_dialects_of_text(tmp_path, data):
+    (tmp_path / "log.csv").write_bytes(data)
+    (recording,) = read_log(tmp_path / "log.csv")
+    columns = {k: v for k, v in recording.columns.items() if np.isfinite(v).any()}
+    assert list(columns) == ["t", "F", "M"]
+    np.testing.assert_allclose(columns["t"], [0.0, 0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(columns["F"], [1.5, 1.6, np.nan, 1.8, 1.9])
+    np.testing.assert_allclose(columns["M"], [-2, -3, -4, -5, -6])
+
+
+def test_units_stand_in_brackets_or_in_a_row(tmp_path):
+    rows = "\n".join(f"{i};{i};{i};{i}" for i in range(5))
+    for header in ("Time [ms];Fz (N);omega, deg/s;n\n", "Time;Fz;omega;n\nms;N;deg/s;-\n"):
+        (tmp_path / "log.txt").write_text(header + rows)
+        (recording,) = read_log(tmp_path / "log.txt")
+        assert list(recording.columns) == ["Time", "Fz", "omega", "n"]
+        units = {k: v for k, v in recording.units.items() if v != "-"}
+        assert units == {"Time": "ms", "Fz": "N", "omega": "deg/s"}
+
+
+def test_broken_lines_are_left_out_and_counted(tmp_path):
+    text = PLAIN.replace("0.3,1.8,-5", "0.3,1.8,-5,7,9") + "0.5\n"
+    (tmp_path / "log.csv").write_text(text)
+    (recording,) = read_log(tmp_path / "log.csv")
+    assert len(recording) == 4
+    assert recording.notes == ("2 lines have a wrong number of cells and are left out",)
+
+
+def test_a_log_without_header_numbers_its_columns(tmp_path):
+    (tmp_path / "log.dat").write_text(PLAIN.split("\n", 1)[1])
+    (recording,) = read_log(tmp_path / "log.dat")
+    assert list(recording.columns) == ["column_1", "column_2", "column_3"]
+
+
+def test_times_of_day_are_seconds():
+    assert np.ptp(time_of_day(["2024-05-01T10:00:00.25Z", "2024-05-01 10:00:01.5"])) == 1.25
+    assert np.ptp(time_of_day(["23:59:59.5", "00:00:00.5"])) == 1.0
+    assert np.ptp(time_of_day(["01.05.2024 10:00:00", "01.05.2024 10:00:02"])) == 2.0
+    assert time_of_day(["sand_1", "sand_2"]) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.csv", b"no numbers here\nat all\n", "no line of this file looks like samples"),
+        ("a.bin", bytes(range(256)) * 20, "is not a text file"),
+        ("a.xlsx", b"PK", "save its sheet as CSV"),
+        ("a.mat", b"MATLAB 5.0 MAT-file, cut off" + bytes(200), "is not a complete MATLAB file"),
+        ("a.parquet", b"PAR1", "is not a complete Parquet file"),
+        ("a.mcap", b"not mcap", "cannot be read as a bag"),
+        ("a.bag", b"not a bag", "cannot be read as a bag"),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_one_line(tmp_path, name, content, words):
+    if name in ("a.mcap", "a.bag"):
+        pytest.importorskip("rosbags")
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(SoilmlError, match=words) as raised:
+        read_log(tmp_path / name)
+    assert str(tmp_path / name) in str(raised.value) and "\n" not in str(raised.value)
+    with pytest.raises(InputError, match="there is no such file"):
+        read_log(tmp_path / "absent.csv")
+
+
+def test_bags_without_their_libraries_name_the_extra(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    (tmp_path / "a.bag").write_bytes(b"")
+    with pytest.raises(MissingLibraryError, match=r"pip install 'soilml\[logs\]'"):
+        read_log(tmp_path / "a.bag")
+
+
+@pytest.mark.parametrize(
+    ("unit", "ours", "expected"),
+    [
+        ("Nm", "N m", 1.0),
+        ("mNm", "N m", 1e-3),
+        ("N*mm", "N m", 1e-3),
+        ("Ncm", "N m", 0.01),
+        ("kgf·cm", "N m", 0.0980665),
+        ("rpm", "rad/s", math.pi / 30),
+        ("1/min", "rad/s", math.pi / 30),
+        ("U/min", "rad/s", math.pi / 30),
+        ("Hz", "rad/s", 2 * math.pi),
+        ("°/s", "rad/s", math.pi / 180),
+        ("deg/s", "rad/s", math.pi / 180),
+        ("mm/s", "m/s", 1e-3),
+        ("km/h", "m/s", 1 / 3.6),
+        ("m s^-1", "m/s", 1.0),
+        ("%", "1", 0.01),
+        ("kgf", "N", 9.80665),
+        ("kN", "N", 1e3),
+        ("mA", "A", 1e-3),
+        ("µs", "s", 1e-6),
+        ("turns", "rad", 2 * math.pi),
+        ("mN m/A", "N m/A", 1e-3),
+    ],
+)
+def test_units_as_logs_write_them(unit, ours, expected):
+    assert factor(unit, ours, "x") == pytest.approx(expected, rel=1e-9)
+    assert dimension(unit) == ours
+
+
+def test_units_of_another_kind_are_refused_with_a_hint():
+    with pytest.raises(InputError, match="kg are a mass; write kgf"):
+        factor("kg", "N", "[load]")
+    with pytest.raises(InputError, match="counts_per_turn"):
+        factor("counts", "rad", "[wheel_angle]")
+    with pytest.raises(InputError, match="unit 'parsnips' is not known"):
+        factor("parsnips", "N", "[load]")
+    with pytest.raises(InputError, match="does not give rad/s"):
+        factor("%", "rad/s", "[wheel_speed]")
+
+
+def test_values_have_units_and_uncertainties():
+    found = parse_uncertain("38.5 mN m/A +- 5 %", "N m/A", "x")
+    assert found.value == pytest.approx(0.0385) and found.relative == pytest.approx(0.05)
+    found = parse_uncertain("150 mm ± 1 mm", "m", "x")
+    assert (found.value, found.std) == (pytest.approx(0.15), pytest.approx(0.001))
+    assert parse_uncertain("0.7 +- 0.05", "1", "x").std == 0.05
+    assert parse_uncertain(3, "m", "x").std == 0.0
+    assert parse_uncertain("about 3", "m", "x") is None
+
+
+def test_units_at_the_end_of_names():
+    names = ("torque_Nm", "v_mm_s", "time_ms", "omega_rad_s", "F_z", "pos_x", "current_mA")
+    assert [unit_in_name(n) for n in names] == ["Nm", "mm/s", "ms", "rad/s", "", "", "mA"]
