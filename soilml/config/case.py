@@ -19,6 +19,7 @@ from soilml.config.model_settings import (
     take_priors,
 )
 from soilml.config.sensor_bias import take_bias
+from soilml.config.units import take_quantity
 from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
@@ -263,7 +264,11 @@ def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
             base = soil(name)
         except InputError as error:
             settings.fail(str(error))
-        values = {k: settings.number(k) for k in declared(Soil) if k in settings}
+        values = {
+            key: take_quantity(settings, key, parameter.unit)
+            for key, parameter in declared(Soil).items()
+            if key in settings
+        }
         settings.permit(declared(Soil))
         made = with_values(base, values)
         check(made, f"{settings.where}: ")

@@ -8,6 +8,7 @@ from dataclasses import MISSING, fields, replace
 from typing import Any
 
 from soilml.config.prior_settings import take_prior
+from soilml.config.units import take_quantity
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
@@ -85,8 +86,13 @@ def take_effects(
 
 def take_instance(cls: type, settings: Settings) -> Any:
     """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
+    parameters = declared(cls)
     values = {
-        f.name: (settings.text if isinstance(f.default, str) else settings.number)(f.name)
+        f.name: settings.text(f.name)
+        if isinstance(f.default, str)
+        else take_quantity(settings, f.name, parameters[f.name].unit)
+        if f.name in parameters
+        else settings.number(f.name)
         for f in fields(cls)
         if f.name in settings or f.default is MISSING
     }
@@ -118,7 +124,7 @@ def take_priors(settings: Settings, cls: type) -> dict[str, Prior]:
     settings.permit(declared(cls))
     for key, parameter in declared(cls).items():
         if key in settings:
-            prior = take_prior(settings, key, about_zero=True)
+            prior = take_prior(settings, key, unit=parameter.unit, about_zero=True)
             if prior.normal_std is not None:
                 prior = _within_bounds(settings, key, prior, parameter)
             if not parameter.lower <= prior.lower < prior.upper <= parameter.upper:
