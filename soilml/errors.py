@@ -10,6 +10,10 @@
 Nothing *inside* a batch raises: a row that has no answer carries a `soilml.row_status.Status`.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 
 class SoilmlError(Exception):
     """Root of the tree: what was given, what is needed, a hint, in one line."""
@@ -33,3 +37,17 @@ class FitError(SoilmlError):
 
 class MissingLibraryError(SoilmlError, ImportError):
     """A library is not installed; the message says which extra brings it."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A question with the nearest of the known names, to be followed by them; empty without one.
+
+    >>> did_you_mean("slip_sinkage", ["slip-sinkage", "grousers"])
+    "did you mean 'slip-sinkage'? "
+    >>> did_you_mean("sand", ["grousers"])
+    ''
+    """
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), 1, 0.5)
+    return f"did you mean {near[0]!r}? " if near else ""

@@ -19,7 +19,7 @@ from soilml.cli.process import (
     silence_stdout,
     termination_as_exception,
 )
-from soilml.errors import SoilmlError
+from soilml.errors import SoilmlError, did_you_mean
 from soilml.io.atomic_files import check_outputs
 
 DESCRIPTION = """\
@@ -65,6 +65,7 @@ COMMANDS = {
 }
 #: Options whose value may begin with a minus sign.
 _NEGATIVE_VALUES = ("--slip", "--load", "--slips")
+_WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
 _NEGATIVE = re.compile(r"-[\d.]")
 
 
@@ -72,6 +73,12 @@ class _Parser(argparse.ArgumentParser):
     """Reports an error in one line, which names the help."""
 
     def error(self, message: str) -> NoReturn:
+        wrong = re.fullmatch(
+            r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)", message
+        )
+        if wrong is not None:
+            names = re.findall(r"[\w-]+", wrong[2])
+            message = f"no command {wrong[1]!r}; {did_you_mean(wrong[1], names)}there are: {', '.join(names)}"
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from soilml.config.prior_settings import take_prior
 from soilml.config.units import take_quantity
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared
@@ -29,7 +29,9 @@ def take_gear(settings: Settings) -> Gear:
     """The gear in a table [gear] or [gears.NAME]."""
     gear_type = settings.text("type")
     if gear_type not in GEARS:
-        settings.fail(f"type is {gear_type!r}; there are: {', '.join(GEARS)}")
+        settings.fail(
+            f"type is {gear_type!r}; {did_you_mean(gear_type, GEARS)}there are: {', '.join(GEARS)}"
+        )
     gear: Gear = take_instance(GEARS[gear_type], settings)
     settings.finish()
     return gear
@@ -73,7 +75,9 @@ def take_effects(
     for entry in entries:
         name = entry.text("name")
         if name not in effects:
-            entry.fail(f"name is {name!r}; there are: {', '.join(effects)}")
+            entry.fail(
+                f"name is {name!r}; {did_you_mean(name, effects)}there are: {', '.join(effects)}"
+            )
         priors = entry.table("prior")
         try:
             model = model + take_instance(effects[name], entry)

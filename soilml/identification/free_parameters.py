@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
 
@@ -64,7 +64,8 @@ def select_free(case: Case, names: Sequence[str] | None) -> list[FreeParameter]:
     for name in paths:
         if name not in known:
             raise InputError(
-                f"--free {name!r}: no such parameter; this model has: {', '.join(known)}"
+                f"--free {name!r}: no such parameter; {did_you_mean(name, known)}this model has: "
+                f"{', '.join(known)}"
             )
         parameter, nominal = known[name]
         prior = case.prior.get(name) or _DEFAULT_PRIORS.get(name)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.errors import ModelFileError
+from soilml.errors import ModelFileError, did_you_mean
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
@@ -54,7 +54,8 @@ def find_model(path: str | os.PathLike[str]) -> Path:
     released = released_models()
     if file.name not in released:
         raise ModelFileError(
-            f"{file}: no such file, and no released model of this name; there are: "
+            f"{file}: no such file, and no released model of this name; "
+            f"{did_you_mean(file.name, released)}there are: "
             f"{', '.join(released) or 'none in this installation'}"
         )
     return released[file.name]

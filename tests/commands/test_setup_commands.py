@@ -37,7 +37,7 @@ def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
         (["--radius", "15", "--width", "0.1"], "radius"),
         (
             ["--radius", "0.1", "--width", "0.1", "--soil", "wong1989/dry-sand"],
-            "did you mean wong1989/dry_sand?",
+            "did you mean 'wong1989/dry_sand'?",
         ),
         (["--radius", "0.1", "--width", "0.1", "--torque-noise", "2 per cent"], "torque_Nm"),
         (["--radius", "0.1", "--width", "0.1", "--mass", "5", "--wheels", "3"], "an even number"),
@@ -100,3 +100,20 @@ def test_doctor_names_a_damaged_file(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr("soilml.onboard.model_file.released_models", lambda: {"wheel": damaged})
     assert main(["doctor"]) == 1
     assert "! " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["identfy"], "no command 'identfy'; did you mean 'identify'? there are: init"),
+        (["effects", "slip_sinkage"], "did you mean 'slip-sinkage'? there are:"),
+        (["soils", "wong1989/drysand"], "did you mean 'wong1989/dry_sand'? `soilml soils` lists"),
+        (["estimate", "weel"], "did you mean 'wheel'? there are:"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_nearest(capsys, words, said):
+    try:
+        assert main(words) == 2
+    except SystemExit as stop:
+        assert stop.code == 2
+    assert said in capsys.readouterr().err

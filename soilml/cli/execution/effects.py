@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from soilml.cli.option_values import available_effects
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.effects.base import STAGES
@@ -22,7 +22,10 @@ def run(args: argparse.Namespace) -> int:
         print(format_table(("effect", "of the", "size", "what it is"), listed, text_columns=4))
         return 0
     if args.name not in effects:
-        raise InputError(f"no effect {args.name!r}; there are: {', '.join(effects)}")
+        raise InputError(
+            f"no effect {args.name!r}; {did_you_mean(args.name, effects)}there are: "
+            f"{', '.join(effects)}"
+        )
     cls = effects[args.name]
     acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if cls.overrides(stage))
     neutral = cls()

@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil, SoilEntry, soil_catalogue
@@ -16,7 +16,9 @@ def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
     catalogue = soil_catalogue()
     if args.name is not None and args.name not in catalogue:
-        raise InputError(f"no soil {args.name!r}; `soilml soils` lists them")
+        raise InputError(
+            f"no soil {args.name!r}; {did_you_mean(args.name, catalogue)}`soilml soils` lists them"
+        )
     chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
     if args.json:
         print(json.dumps({name: _as_json(entry) for name, entry in chosen.items()}, indent=1))

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from soilml.arrays import Real
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.optional_imports import tomllib
 from soilml.physics.soils.soil import Soil
 
@@ -83,9 +82,9 @@ def soil(name: str, **changes: Real) -> Soil:
     """
     catalogue = soil_catalogue()
     if name not in catalogue:
-        near = difflib.get_close_matches(name, catalogue, 1, 0.5)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise InputError(f"no soil {name!r}: {hint}`soilml soils` lists the catalogue")
+        raise InputError(
+            f"no soil {name!r}; {did_you_mean(name, catalogue)}`soilml soils` lists the catalogue"
+        )
     try:
         return replace(catalogue[name].soil, **changes)
     except TypeError:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import sys
 import tempfile
 from pathlib import Path
 
 from soilml.config.case import read_case
-from soilml.errors import InputError
+from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
 from soilml.physics.soils import soil_catalogue
 
@@ -69,9 +68,9 @@ def _text(given: dict[str, str | float | None], mass: float | None, wheels: int 
     name = given["soil"]
     catalogue = soil_catalogue()
     if name is not None and name not in catalogue:
-        near = difflib.get_close_matches(str(name), catalogue, 1, 0.4)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise InputError(f"no soil {name!r}{hint}; `soilml soils` lists them")
+        raise InputError(
+            f"no soil {name!r}; {did_you_mean(str(name), catalogue)}`soilml soils` lists them"
+        )
     noise = str(given["torque_noise"] or "2 %")
     written = noise if _is_number(noise) else f'"{noise}"'
     parts = [
