@@ -73,12 +73,11 @@ class _Parser(argparse.ArgumentParser):
     """Reports an error in one line, which names the help."""
 
     def error(self, message: str) -> NoReturn:
-        wrong = re.fullmatch(
-            r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)", message
-        )
+        wrong = _WRONG_COMMAND.fullmatch(message)
         if wrong is not None:
             names = re.findall(r"[\w-]+", wrong[2])
-            message = f"no command {wrong[1]!r}; {did_you_mean(wrong[1], names)}there are: {', '.join(names)}"
+            near = did_you_mean(wrong[1], names)
+            message = f"no command {wrong[1]!r}; {near}there are: {', '.join(names)}"
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
