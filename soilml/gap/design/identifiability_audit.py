@@ -150,6 +150,8 @@ def audit(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
+    if not design.answered.any():
+        raise InputError(f"{design.source}: no row has the status ok")
     readings = planned_readings(case, design.rows(design.answered))
     selected = select_free(case, free if free is not None or case.prior else SHEAR)
     soil = [f for f in selected if "." not in f.path]
