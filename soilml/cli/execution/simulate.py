@@ -12,6 +12,7 @@ from soilml.cli.output import write_columns
 from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
 from soilml.identification.discrepancy import ignored_discrepancy
+from soilml.io.table import fault_of_text
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.row_status import Status
 
@@ -19,6 +20,8 @@ from soilml.row_status import Status
 def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    if args.label is not None and (fault := fault_of_text(args.label)):
+        raise InputError(f"--run: {fault}")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
     if slips.size * loads.size > MAX_ROWS:
         raise InputError(
