@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
-from soilml.io.number_text import read_number
+from soilml.io.number_text import read_number, read_numbers
 from soilml.io.plain_text import cell_as_text
 from soilml.io.table import TEXT, Column, fault_of_text
 
@@ -90,7 +90,7 @@ def _blocks(
     lines: list[int] = []
     total = 0
     for row in reader:
-        if not any(cell.strip() for cell in row):
+        if not "".join(row).strip():
             continue
         if len(row) != width:
             raise TableError(
@@ -116,14 +116,22 @@ def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -
             if fault := fault_of_text(cell):
                 raise TableError(f"{file} line {line}, column {name}: {fault}")
         return np.asarray([cell_as_text(cell) for cell in cells], dtype=np.str_)
+    filled = [i for i, cell in enumerate(cells) if cell]
     values = np.full(len(cells), np.nan)
-    for i, cell in enumerate(cells):
-        if cell:
-            try:
-                values[i] = read_number(cell)
-            except ValueError:
-                raise TableError(
-                    f"{file} line {lines[i]}, column {name}: {cell!r} is not a number; "
-                    "needed is a finite number, or a blank cell where it was not measured"
-                ) from None
+    try:
+        values[filled] = read_numbers([cells[i] for i in filled])
+    except ValueError:
+        wrong = next(i for i in filled if not _is_number(cells[i]))
+        raise TableError(
+            f"{file} line {lines[wrong]}, column {name}: {cells[wrong]!r} is not a number; needed "
+            "is a finite number, or a blank cell where it was not measured"
+        ) from None
     return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        read_number(cell)
+    except ValueError:
+        return False
+    return True
