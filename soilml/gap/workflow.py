@@ -69,8 +69,10 @@ from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.unsolvable import solvable
 
 
+@solvable("the gap analysis")
 def gap(
     case: Case,
     table: Table,

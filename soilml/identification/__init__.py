@@ -23,6 +23,7 @@ from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.io.table import Table
 from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.unsolvable import solvable
 
 Method = Callable[[Case, Observations, Sequence[FreeParameter]], Fit]
 
@@ -39,6 +40,7 @@ MOST_ROWS = 100_000
 CLOSED_FORM = ("linear", "newton")
 
 
+@solvable("the identification")
 def identify(
     case: Case, table: Table, free: Sequence[str] | None = None, method: str = "nonlinear"
 ) -> Fit:

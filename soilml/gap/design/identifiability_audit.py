@@ -28,6 +28,7 @@ from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
+from soilml.unsolvable import solvable
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +97,7 @@ class Audit:
         }
 
 
+@solvable("the audit")
 def audit(
     case: Case,
     design: Table,
