@@ -89,6 +89,15 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
     assert "the noise of torque_Nm is 1e-09 or less" in capsys.readouterr().out
 
 
+def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
+    text = THREE_CHANNEL_MODEL.replace('sinkage_m = "2 %"', "")
+    (folder / "less.toml").write_text(text)
+    again = [[f"again_{line[0]}", *line[1:]] for line in rows()]
+    table(folder / "twice.csv", rows() + again)
+    assert main(["gap", "less.toml", "twice.csv", "--out", "found"]) == 0
+    assert "sinkage_m is excluded" in capsys.readouterr().out
+
+
 def test_a_wheel_that_spins_on_the_spot_has_a_status(folder, capsys):
     table(folder / "spin.csv", rows(slip=0.999999))
     assert main(["gap", "model.toml", "spin.csv", "--out", "found"]) == 0

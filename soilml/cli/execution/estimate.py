@@ -21,8 +21,8 @@ from soilml.cli.joint_readings import (
 )
 from soilml.cli.option_values import read_rows
 from soilml.cli.output import write_columns
-from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.progress import progress_bar
+from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (
     apply_case_option,

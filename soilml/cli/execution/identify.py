@@ -11,8 +11,8 @@ from typing import Any
 from soilml.cli.advice_text import advice_after_fit
 from soilml.cli.option_values import available_effects, parse_names, read_rows
 from soilml.cli.output import is_terminal, json_text, write_stdout
-from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.progress import progress_bar, working
+from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import FitError
 from soilml.experiment_design import Advice, is_identified

@@ -168,7 +168,14 @@ def estimate_repeat_noise(readings: StackedReadings) -> tuple[dict[str, float], 
         if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
             continue
         squares = float(np.sum((readings.reading[undeclared] - mean[group]) ** 2))
-        noise[name] = float(np.sqrt(squares / degrees_of_freedom))
+        std = float(np.sqrt(squares / degrees_of_freedom))
+        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.reading[undeclared]).max()):
+            notes.append(
+                f"noise of {column(name)} is not declared, and its repeated rows are equal: none "
+                "can be estimated from them"
+            )
+            continue
+        noise[name] = std
         notes.append(
             f"noise of {column(name)} is not declared: {noise[name]:.3g} was estimated from "
             "repeated rows"
