@@ -92,8 +92,12 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
 def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
     text = THREE_CHANNEL_MODEL.replace('sinkage_m = "2 %"', "")
     (folder / "less.toml").write_text(text)
-    again = [[f"again_{line[0]}", *line[1:]] for line in rows()]
-    table(folder / "twice.csv", rows() + again)
+    levels = "--slip 0.1:0.6:6 --load 40:80:5".split()
+    lines = []
+    for run in "ab":
+        assert main(["simulate", "model.toml", *levels, "--run", run, "--out", "one.csv"]) == 0
+        lines += (folder / "one.csv").read_text().splitlines()[bool(lines) :]
+    (folder / "twice.csv").write_text("\n".join(lines) + "\n")
     assert main(["gap", "less.toml", "twice.csv", "--out", "found"]) == 0
     assert "sinkage_m is excluded" in capsys.readouterr().out
 
