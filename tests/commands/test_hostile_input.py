@@ -92,7 +92,7 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
 def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
     text = THREE_CHANNEL_MODEL.replace('sinkage_m = "2 %"', "")
     (folder / "less.toml").write_text(text)
-    levels = "--slip 0.1:0.6:6 --load 40:80:5".split()
+    levels = ["--slip", "0.1:0.6:6", "--load", "40:80:5"]
     lines = []
     for run in "ab":
         assert main(["simulate", "model.toml", *levels, "--run", run, "--out", "one.csv"]) == 0
