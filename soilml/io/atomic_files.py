@@ -78,6 +78,9 @@ def atomic_outputs(
 
     Raises `InputError` as `check_writable` does, and where the disk is full.
     """
+    if not paths:
+        yield []
+        return
     targets = [check_writable(path) for path in paths]
     names = ", ".join(str(path) for path in paths)
     try:
