@@ -12,9 +12,14 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.interruption import StopSignals, Terminated
 from soilml.cli.options import InputFile
-from soilml.cli.process import fail, reserve_standard_descriptors, silence_stdout
+from soilml.cli.process import (
+    StopSignals,
+    Terminated,
+    fail,
+    reserve_standard_descriptors,
+    silence_stdout,
+)
 from soilml.errors import InputError, SoilmlError
 from soilml.io.atomic_files import check_outputs
 from soilml.io.swap import replaced

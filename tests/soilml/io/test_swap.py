@@ -16,7 +16,7 @@ from soilml.io.atomic_files import atomic_outputs, save_text
 WRITER = """
 import os, signal, sys
 from pathlib import Path
-from soilml.cli.interruption import StopSignals
+from soilml.cli.process import StopSignals
 from soilml.io import swap
 from soilml.io.atomic_files import atomic_outputs
 folder, number, after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
