@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-fast check models limit kls1 gap-real bench bench-gap clean
+.PHONY: help demo demo-papers demo-import gap test test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -67,6 +67,15 @@ bench-gap: $(VENV)/.ready ## 182 sets with hidden effects against gates and base
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[bench]'
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --write
+
+fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make fuzz FUZZ_SECONDS=3600
+	@$(BIN)/python tests/fuzz/run.py --seconds $(or $(FUZZ_SECONDS),3600)
+
+faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
+	@$(BIN)/python tests/faults/run.py --kills $(or $(FAULT_KILLS),200)
+
+bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
+	@$(BIN)/python bench/bounds.py
 
 clean: ## remove the environment and what demo and tests made
 	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache

@@ -119,8 +119,9 @@ def generate_folder(
                     kept += result.rows * result.kept
                     progress(total)
         finally:
-            for left in folder.glob(".part-*.part"):  # of workers that were killed
-                left.unlink(missing_ok=True)
+            for left in folder.glob(".part-*.*"):  # of workers that were killed
+                if left.suffix in (".part", ".journal"):
+                    left.unlink(missing_ok=True)
     check_failures(failed, total)
     return Generated(total, failed, kept)
 

@@ -149,8 +149,17 @@ def read_recipe(
 
 
 def parse_recipe(text: str, where: str) -> Recipe:
-    """The recipe whose `Recipe.text` this is; `where` names its origin in messages."""
-    settings = Settings(json.loads(text), where, Path())
+    """The recipe whose `Recipe.text` this is; `where` names its origin in messages.
+
+    Raises `InputError` for a text that is no recipe.
+    """
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        content = None
+    if not isinstance(content, dict):
+        raise InputError(f"{where} is not a table in JSON")
+    settings = Settings(content, where, Path())
     recipe = _take_recipe(settings, EFFECTS)
     settings.finish()
     return recipe

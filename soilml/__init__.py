@@ -12,7 +12,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+
+TYPE_CHECKING = False  # typing takes longer to import than all this; type checkers read it as true
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 

@@ -8,7 +8,12 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_workers_option
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_workers_option,
+    whole_number,
+)
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
@@ -67,9 +72,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "out", metavar="OUT.parquet", help="file to write, or with a slash at its end a folder"
     )
-    parser.add_argument("--rows", type=int, help="number of rows (default: that of the recipe)")
     parser.add_argument(
-        "--seed", type=int, help="seed of the random numbers (default: that of the recipe)"
+        "--rows", type=whole_number, help="number of rows (default: that of the recipe)"
+    )
+    parser.add_argument(
+        "--seed",
+        type=whole_number,
+        help="seed of the random numbers (default: that of the recipe)",
     )
     add_workers_option(parser)
     parser.add_argument(

@@ -7,20 +7,22 @@ import importlib
 import re
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
 from soilml.cli.options import InputFile
 from soilml.cli.process import (
+    StopSignals,
     Terminated,
     fail,
     reserve_standard_descriptors,
     silence_stdout,
-    termination_as_exception,
 )
-from soilml.errors import SoilmlError, did_you_mean
+from soilml.errors import InputError, SoilmlError, did_you_mean
 from soilml.io.atomic_files import check_outputs
+from soilml.io.swap import replaced
 
 DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
@@ -139,21 +141,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
         number of the signal for a signal that asks the process to stop. `papers` gives 1 where a
         number is not reproduced. An output file is complete or absent in every case.
     """
+    with StopSignals():
+        status = _run(arguments)
+    if arguments is None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process ends; all is said
+    return status
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run one command; exceptions become one line on standard error."""
     reserve_standard_descriptors()
-    words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
-    args = parser(words[0] if words else "").parse_args(words)
+    replaced.clear()
     try:
-        with termination_as_exception():
-            check_outputs(args.outputs(args), _input_files(args))
-            status = int(args.run(args) or 0)
-            if sys.stdout is not None:
-                sys.stdout.flush()
-            return status
+        words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
+        args = parser(words[0] if words else "").parse_args(words)
+        check_outputs(args.outputs(args), _input_files(args))
+        status = int(args.run(args) or 0)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return status
     except SoilmlError as error:
         return fail(str(error), 2)
     except (KeyboardInterrupt, Terminated) as stop:
         code = stop.code if isinstance(stop, Terminated) else 128 + signal.SIGINT
-        said = getattr(stop, "said", "interrupted; no output was written")
+        written = f"complete before that: {', '.join(replaced)}" if replaced else ""
+        said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")
         return fail(said, int(code or 0))
     except BrokenPipeError:
         silence_stdout()
@@ -181,6 +193,8 @@ def _join_negative_values(words: list[str]) -> list[str]:
     """`--slip -0.3:0.6:10` as one word, because argparse would read two options."""
     joined: list[str] = []
     for word in words:
+        if word.startswith("--") and word.endswith("=--"):  # argparse drops this value
+            raise InputError(f"{word}: needed is a value after the equals sign")
         if joined and joined[-1] in _NEGATIVE_VALUES and _NEGATIVE.match(word):
             joined[-1] += f"={word}"
         else:

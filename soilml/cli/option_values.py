@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.io.number_text import read_number, read_whole_number
 from soilml.io.read_table import FILLED, read_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
@@ -53,7 +54,7 @@ def parse_costs(args: argparse.Namespace) -> dict[str, float]:
     for text in args.cost:
         kind, _, number = text.rpartition("=")
         try:
-            costs[kind] = float(number)
+            costs[kind] = read_number(number)
         except ValueError:
             kind = ""
         if not kind:
@@ -71,12 +72,14 @@ def parse_numbers(option: str, text: str) -> NDArray[np.float64]:
     try:
         if ":" in text:
             start, stop, count = text.split(":")
-            if int(count) > MAX_ROWS:
+            if read_whole_number(count) > MAX_ROWS:
                 raise InputError(f"{option} is {text!r}; at most {MAX_ROWS} values are possible")
             with np.errstate(all="ignore"):
-                values = np.linspace(float(start), float(stop), int(count)).round(12)
+                values = np.linspace(
+                    read_number(start), read_number(stop), read_whole_number(count)
+                ).round(12)
         else:
-            values = np.asarray([float(part) for part in text.split(",")])
+            values = np.asarray([read_number(part.strip()) for part in text.split(",")])
     except InputError:
         raise
     except ValueError:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import argparse
 
+from soilml.io.number_text import read_number, read_whole_number
+
 
 class InputFile(str):
     """Value of an argument that names a file to be read: `type=InputFile` in its declaration.
@@ -52,7 +54,7 @@ def add_row_options(parser: argparse.ArgumentParser) -> None:
 def add_seed_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--seed`, which `option_values.check_seed` checks."""
     parser.add_argument(
-        "--seed", type=int, default=0, help="seed of the random numbers (default: 0)"
+        "--seed", type=whole_number, default=0, help="seed of the random numbers (default: 0)"
     )
 
 
@@ -77,8 +79,24 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def number(text: str) -> float:
+    """A finite number; raises `ArgumentTypeError` for anything else."""
+    try:
+        return read_number(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
+
+
+def whole_number(text: str) -> int:
+    """A whole number; raises `ArgumentTypeError` for anything else."""
+    try:
+        return read_whole_number(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number") from None
+
+
 def positive_number(text: str) -> int:
     """A whole number above zero; raises `ArgumentTypeError` for anything else."""
-    if not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
+    if not text.isascii() or not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
     return int(text)

@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.io.atomic_files import save_text
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.atomic_files import atomic_output
+from soilml.io.text_tables import csv_blocks, format_table
 
 
 def write_columns(columns: Mapping[str, Any], out: str | None) -> None:
     """Write the columns to the CSV file `out`; without one, print them."""
     if out is not None:
-        save_text(out, csv_text(columns))
+        with atomic_output(out) as part, part.open("w", encoding="utf-8") as opened:
+            opened.writelines(csv_blocks(columns))
         count = len(next(iter(columns.values())))
         print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
     else:
-        write_stdout(f"{format_columns(columns)}\n" if is_terminal() else csv_text(columns))
+        for text in [f"{format_columns(columns)}\n"] if is_terminal() else csv_blocks(columns):
+            write_stdout(text)
 
 
 def is_terminal() -> bool:

@@ -1,24 +1,84 @@
-"""The process around a command: standard streams, signals, and pipes that are closed early."""
+"""The process around a command: standard streams, and signals from the first import on.
+
+A signal handler that raises an exception is not enough: raised inside the import of a library, the
+exception turns into another one, is lost, or ends the process in its C++ code. While a module is
+imported nothing is half-written yet, and the process just ends.
+"""
 
 from __future__ import annotations
 
-import io
 import os
 import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from typing import Any, NoReturn
+
+TYPE_CHECKING = False  # this module is the first of the command line: it imports little
+if TYPE_CHECKING:
+    from types import FrameType, TracebackType
+    from typing import Any, NoReturn
 
 
 class Terminated(SystemExit):
     """A signal asked the process to stop; the exit status is 128 and the signal's number."""
 
 
+class StopSignals:
+    """Inside, Ctrl-C, SIGTERM and SIGHUP raise an exception, or end the process in an import.
+
+    Ctrl-C raises `KeyboardInterrupt` and the others `Terminated`, so that temporary files are
+    removed. A handler that the program has set already stays, and other threads change nothing.
+    """
+
+    def __enter__(self) -> None:
+        self._before: dict[int, Any] = {}
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            number = getattr(signal, name, None)
+            usual = (signal.SIG_DFL, signal.default_int_handler)
+            if number is not None and (handler := signal.getsignal(number)) in usual:
+                try:
+                    signal.signal(number, _stop)
+                except ValueError:  # another thread than the main one
+                    return
+                self._before[number] = handler
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    if _is_importing(frame):
+        try:
+            os.write(2, b"soilml: interrupted; no output was written\n")
+        finally:
+            os._exit(128 + number)
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    signal.signal(number, signal.SIG_IGN)
+    raise Terminated(128 + number)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Whether a module is being imported, and no output is being written."""
+    swap = sys.modules.get("soilml.io.swap")
+    if getattr(swap, "is_writing", bool)() or getattr(swap, "replaced", ()):
+        return False
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
+
+
 def fail(text: str, status: int) -> int:
     """Print `text` as one line on standard error; returns the exit status."""
-    print(f"soilml: {' '.join(text.split())}", file=sys.stderr)
+    from soilml.io.plain_text import escaped
+
+    print(f"soilml: {' '.join(escaped(text).split())}", file=sys.stderr)
     return status
 
 
@@ -28,42 +88,21 @@ def reserve_standard_descriptors() -> None:
     Otherwise the first file that is opened would get descriptor 1 or 2, and receive what is
     printed.
     """
+    from contextlib import suppress
+
     with suppress(OSError):
         while (descriptor := os.open(os.devnull, os.O_RDWR)) < 3:
             pass
         os.close(descriptor)
     if sys.stderr is None:
+        import io
+
         sys.stderr = io.StringIO()  # print(file=None) would write to standard output
 
 
 def silence_stdout() -> None:
     """Redirect standard output to the null device, so that flushing it cannot fail again."""
+    from contextlib import suppress
+
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-@contextmanager
-def termination_as_exception() -> Iterator[None]:
-    """Inside, SIGTERM and SIGHUP raise `Terminated`, so that temporary files are removed.
-
-    A handler that the program has set already stays, and other threads change nothing.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: Any) -> NoReturn:
-        signal.signal(number, signal.SIG_IGN)
-        raise Terminated(128 + number)
-
-    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-    before = {n: signal.getsignal(n) for n in numbers if n is not None}
-    for number, handler in before.items():
-        if handler is signal.SIG_DFL:
-            signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            if handler is signal.SIG_DFL:
-                signal.signal(number, handler)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress_bar(text: str, total: int) -> Iterator[Callable[[int], None]]:
+def progress_bar(text: str, total: int | None) -> Iterator[Callable[[int], None]]:
     """A function of the number of items done, which draws a bar where stderr is a terminal."""
     if not sys.stderr.isatty():
         yield lambda done: None
@@ -19,7 +19,7 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int], None]]:
     progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
+        *([] if total is None else [TextColumn("{task.completed}/{task.total}")]),
         TimeElapsedColumn(),
         console=Console(stderr=True),
         transient=True,
@@ -27,6 +27,13 @@ def progress_bar(text: str, total: int) -> Iterator[Callable[[int], None]]:
     with progress:
         task = progress.add_task(text, total=total)
         yield lambda done: progress.update(task, completed=done)
+
+
+@contextmanager
+def working(text: str) -> Iterator[None]:
+    """A bar that moves, with the time, for work whose share done is not known."""
+    with progress_bar(text, None):
+        yield
 
 
 @contextmanager

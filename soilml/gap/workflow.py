@@ -18,7 +18,11 @@ from soilml.gap.data.checks import (
 )
 from soilml.gap.data.free_soil import fixed_parameters, free_soil_parameters
 from soilml.gap.data.holdout import HoldoutSplit, split_holdout
-from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
+from soilml.gap.data.stacked_readings import (
+    StackedReadings,
+    check_size,
+    stack_readings,
+)
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_costs import check_costs, rank_by_cost
 from soilml.gap.messages import unsupported_conclusions, verdict_sentence
@@ -65,8 +69,10 @@ from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.free_parameters import FreeParameter
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.unsolvable import solvable
 
 
+@solvable("the gap analysis")
 def gap(
     case: Case,
     table: Table,
@@ -117,7 +123,8 @@ def gap(
     Raises
     ------
     InputError
-        For unknown names, an unusable `holdout`, or a table without usable rows.
+        For unknown names, an unusable `holdout`, a table without usable rows, or more readings than
+        an analysis can hold.
     TableError
         For columns that contradict the case, such as another wheel radius.
 
@@ -145,6 +152,7 @@ def gap(
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
     check_wheel_size(case, table)
+    check_size(table)
     usable = table.answered
     if not usable.any():
         raise InputError(f"{table.source}: no row has the status ok")

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.errors import InputError
+from soilml.errors import FitError, InputError
 from soilml.identification.data.observations import Observations, read_observations
 from soilml.identification.discrepancy import ignored_discrepancy, included_discrepancy
 from soilml.identification.fit_result import Fit
@@ -23,6 +23,7 @@ from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.io.table import Table
 from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.unsolvable import solvable
 
 Method = Callable[[Case, Observations, Sequence[FreeParameter]], Fit]
 
@@ -33,10 +34,13 @@ METHODS: dict[str, Method] = {
     "newton": newton,
     "posterior": posterior,
 }
+#: Rows of one fit; more neither fit into 1 GB nor end within minutes, and would add nothing.
+MOST_ROWS = 100_000
 #: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
 
 
+@solvable("the identification")
 def identify(
     case: Case, table: Table, free: Sequence[str] | None = None, method: str = "nonlinear"
 ) -> Fit:
@@ -65,7 +69,8 @@ def identify(
     InputError
         For a method or a parameter that does not exist, or a method that is not for this gear.
     FitError
-        Where the rows do not determine a fit; the message states what is missing.
+        Where the rows do not determine a fit, or are more than `MOST_ROWS`; the message states what
+        is missing, or what to leave out.
     TableError
         Where the table names another wheel than the case's.
 
@@ -96,6 +101,12 @@ def identify(
         raise InputError(
             f"the {method} method is for rigid wheels, not for a {case.model.gear.name}; take "
             "nonlinear"
+        )
+    if len(table) > MOST_ROWS:
+        every = -(-len(table) // MOST_ROWS)
+        raise FitError(
+            f"{table.source}: {len(table)} rows in one fit; at most {MOST_ROWS} are possible: "
+            f"average rows that were driven alike, keep every {every}th, or fit each run by itself"
         )
     data = read_observations(case, table)
     fit = METHODS[method](case, data, select_free(case, free))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +27,8 @@ SIZE_TOLERANCE = 0.005
 VALUE_TOLERANCE = 0.001
 
 
-def recipe_case(text: str, source: str) -> Case | None:
-    """The case of a recipe in JSON; None for the empty recipe of data that were not simulated.
+def recipe_content(text: str, source: str) -> dict[str, Any]:
+    """A recipe in JSON as nested dictionaries; {} for data that were not simulated.
 
     Raises `InputError` for a text that is not a recipe; `source` names the file that holds it.
     """
@@ -37,6 +38,15 @@ def recipe_case(text: str, source: str) -> Case | None:
         content = None
     if not isinstance(content, dict):
         raise InputError(f"{source}: its recipe is damaged; generate or train it again")
+    return content
+
+
+def recipe_case(text: str, source: str) -> Case | None:
+    """The case of a recipe in JSON; None for the empty recipe of data that were not simulated.
+
+    Raises `InputError` for a text that is not a recipe; `source` names the file that holds it.
+    """
+    content = recipe_content(text, source)
     return take_case(Settings(content, f"recipe of {source}", Path())) if content else None
 
 
@@ -61,7 +71,10 @@ def check_wheel_columns(
 
 
 def check_wheel_size(case: Case, table: Table) -> None:
-    """Raise `TableError` for a table whose gears, or their sizes, are not those of the case."""
+    """Raise `TableError` for a table whose gears, or their sizes, are not those of the case.
+
+    Also for a sinkage that a gear of this size cannot have.
+    """
     names = np.unique(table["gear"]) if "gear" in table else np.asarray([""])
     if case.gears:
         _check_gear_names(case, table)
@@ -74,9 +87,21 @@ def check_wheel_size(case: Case, table: Table) -> None:
             f"{table.source}: column gear names {', '.join(filter(None, names))}, and the model "
             "has one gear; write each as [gears.NAME], or select rows with --where gear=NAME"
         )
+    _check_sinkage(case, table)
     sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}
     hint = "select rows with --where run=NAME, or correct [gear]"
     check_wheel_columns(table, sizes, "the model's wheel has", hint)
+
+
+def _check_sinkage(case: Case, table: Table) -> None:
+    """Raise `TableError` for a sinkage beyond the diameter of the gear: it is not in metres."""
+    key, diameter = QUANTITIES["sinkage"].column, 2.0 * float(case.model.gear.radius)
+    if key in table and (wrong := np.abs(table[key]) > diameter).any():
+        row = int(np.argmax(wrong))
+        raise TableError(
+            f"{table.place(row)}, column {key}: {table[key][row]:g} given, more than the diameter "
+            f"of the gear, {diameter:g} m; convert it to m"
+        )
 
 
 def _check_gear_names(case: Case, table: Table) -> None:

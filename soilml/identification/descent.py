@@ -30,6 +30,8 @@ Floats = NDArray[np.float64]
 STARTS = 4
 #: Tolerance of a descent; and of those from several starts, which only tell optima apart.
 TOLERANCE, START_TOLERANCE = 1e-10, 1e-7
+#: Predictions of the starts that are held at a time: 8 MB, and the model's own arrays beside them.
+MOST_PREDICTIONS = 1_000_000
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
 #: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
@@ -123,12 +125,18 @@ def global_optimum(problem: LeastSquaresProblem) -> Optimum:
     free = problem.free
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     starts = np.vstack([nominal, sobol_points(len(free))])
-    prediction = problem.predict(starts)
-    if np.isnan(prediction).any(axis=1).all():
+    few = max(1, MOST_PREDICTIONS // problem.reading.size)  # sets of predictions held at a time
+    blocks = [starts[i : i + few] for i in range(0, len(starts), few)]
+    costs, feasible = [], False
+    for block in blocks:
+        prediction = problem.predict(block)
+        feasible = feasible or not np.isnan(prediction).any(axis=1).all()
+        costs.append((problem.whitened(prediction) ** 2).sum(axis=1))
+    if not feasible:
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
         )
-    order = np.argsort((problem.whitened(prediction) ** 2).sum(axis=1), kind="stable")
+    order = np.argsort(np.concatenate(costs), kind="stable")
     found: list[Optimum] = []
     for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):  # the nominal point too
         found.append(descend(problem, starts[i], tolerance=START_TOLERANCE))

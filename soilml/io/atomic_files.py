@@ -9,13 +9,14 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from soilml.errors import InputError
+from soilml.io.swap import Swap, finish_interrupted
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
     """The file at `path` with symbolic links resolved; it need not exist yet.
 
     Raises `InputError` where it cannot be written: the path is a folder, a device, a pipe or a
-    socket, or the folder of the file is missing or not writable.
+    socket, the file is read-only, or the folder of the file is missing or not writable.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -27,6 +28,8 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"{path} is a folder; needed is a file name to write to")
     if kind is not None and not stat.S_ISREG(kind):
         raise InputError(f"{path} is a device, pipe or socket; needed is a file name")
+    if kind is not None and not kind & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH):
+        raise InputError(f"{path} is read-only; make it writable, or give another name")
     if folder is None or not stat.S_ISDIR(folder):
         raise InputError(f"{path}: the folder {Path(path).parent} does not exist; create it first")
     if not os.access(target.parent, os.W_OK | os.X_OK):
@@ -61,30 +64,39 @@ def output_files(path: str | None, *suffixes: str) -> list[Path]:
 
 
 @contextmanager
-def atomic_outputs(paths: Sequence[str | os.PathLike[str]]) -> Iterator[list[Path]]:
+def atomic_outputs(
+    paths: Sequence[str | os.PathLike[str]], remove: Sequence[str | os.PathLike[str]] = ()
+) -> Iterator[list[Path]]:
     """Temporary paths that are renamed to `paths` when the block succeeds, and deleted otherwise.
 
     All targets are checked before the block, and none is replaced before all files are written.
-    A temporary file lies in the folder of its target as `.NAME.RANDOM.part`, so that two processes
-    do not share one. Raises `InputError` as `check_writable` does, and where the disk is full.
+    Then all are replaced: a signal waits until they are, and what a killed process left is finished
+    or cleared by the next one that writes the same files; see `soilml.io.swap`. Files of an earlier
+    set that the new one does not have are in `remove`. A temporary file lies in the folder of its
+    target as `.NAME.RANDOM.part`, so that two processes do not share one. A file that is replaced
+    keeps its permissions.
+
+    Raises `InputError` as `check_writable` does, and where the disk is full.
     """
+    if not paths:
+        yield []
+        return
     targets = [check_writable(path) for path in paths]
-    parts = [t.parent / f".{t.name[:40]}.{os.urandom(4).hex()}.part" for t in targets]
+    names = ", ".join(str(path) for path in paths)
     try:
-        yield parts
-        for part in parts:
-            with part.open("rb+") as written:
-                os.fsync(written.fileno())
-        for path in paths:
-            check_writable(path)  # it may have changed since the first check
-        for part, target in zip(parts, targets, strict=True):
-            part.replace(target)
+        finish_interrupted(targets)
+        with Swap(targets, [Path(os.path.realpath(path)) for path in remove]) as swap:
+            yield swap.parts
+            for part, target in zip(swap.parts, targets, strict=True):
+                with part.open("rb+") as written:
+                    if (kind := _kind(target)) is not None:
+                        os.fchmod(written.fileno(), stat.S_IMODE(kind))
+                    os.fsync(written.fileno())
+            for path in paths:
+                check_writable(path)  # it may have changed since the first check
+            swap.replace_all(names)
     except OSError as error:
-        names = ", ".join(str(path) for path in paths)
         raise InputError(f"{names} cannot be written: {_why(error)}") from error
-    finally:
-        for part in parts:
-            part.unlink(missing_ok=True)
 
 
 @contextmanager

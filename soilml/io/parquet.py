@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import MissingLibraryError, TableError
-from soilml.io.table import TEXT, Column
+from soilml.io.table import TEXT, Column, fault_of_text
 
 
 def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -33,6 +34,7 @@ def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     for file, table in zip(files, tables, strict=True):
         if not table.schema.equals(tables[0].schema) or _metadata(table) != first:
             raise TableError(f"{file} and {files[0]} are not of one table; read one of them")
+    _check_recipe(path, first)
     arrow = pa.concat_tables(tables)
     rows = first.get("soilml_rows", "")
     if path.is_dir() and rows.isdecimal() and int(rows) != len(arrow):
@@ -70,6 +72,16 @@ def _metadata(table: Any) -> dict[str, str]:
     }
 
 
+def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
+    """Raise `TableError` where the recipe in the metadata is not the one that was written."""
+    if (recipe := metadata.get("soilml_recipe")) is None:
+        return
+    if hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
+        raise TableError(
+            f"{path}: the recipe in its metadata does not match its checksum; generate it again"
+        )
+
+
 def own_columns(metadata: dict[str, str]) -> list[str]:
     """Columns whose units are in the file's own metadata, such as parameters of effects."""
     try:
@@ -101,4 +113,8 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
         cells = column.to_pylist()
     except UnicodeDecodeError as error:
         raise TableError(f"{file}, column {name}: has text that is not UTF-8: {error}") from None
-    return np.asarray(["" if c is None else str(c).strip() for c in cells], dtype=np.str_)
+    names = ["" if c is None else str(c).strip() for c in cells]
+    for i, cell in enumerate(names):
+        if fault := fault_of_text(cell):
+            raise TableError(f"{file} line {i + 1}, column {name}: {fault}")
+    return np.asarray(names, dtype=np.str_)

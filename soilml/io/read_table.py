@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from soilml.errors import TableError
+from soilml.io.csv_file import read_csv
 from soilml.io.parquet import own_columns, plain_column, read_parquet
-from soilml.io.table import TEXT, Column, Table
+from soilml.io.table import TEXT, Table
 from soilml.quantities import COLUMNS
 
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
@@ -25,13 +24,17 @@ Limits = tuple[float, float, str]
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
 _LIMITS: dict[str, Limits] = {
     "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a fraction and not in percent"),
-    "load_N": (0.0, np.inf, "a load above zero, in N"),
+    "load_N": (1e-6, 1e7, "a load above zero and below 1e7, in N"),
+    "torque_Nm": (-1e7, 1e7, "a torque between -1e7 and 1e7, in N m"),
+    "drawbar_pull_N": (-1e7, 1e7, "a force between -1e7 and 1e7, in N"),
     "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
-    "slip_angle_rad": (-3.2, 3.2, "an angle in rad"),
+    "speed_m_s": (-100.0, 100.0, "a speed between -100 and 100, in m/s"),
+    "pass": (1.0 - 1e-9, 1e4, "the number of a pass, 1 or more"),
+    "slip_angle_rad": (-1.6, 1.6, "an angle between -1.6 and 1.6, in rad"),
     "slope_rad": (-1.4, 1.4, "a slope in rad, positive uphill"),
     "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
-    "wheel_radius_m": (0.0, np.inf, "a radius above zero, in m"),
-    "wheel_width_m": (0.0, np.inf, "a width above zero, in m"),
+    "wheel_radius_m": (0.0, 1e3, "a radius above zero, in m"),
+    "wheel_width_m": (0.0, 1e3, "a width above zero, in m"),
     "plate_radius_m": (0.0, 10.0, "a radius above zero, in m"),
     "plate_width_m": (0.0, 10.0, "a width above zero, in m"),
     "plate_length_m": (0.0, 10.0, "a length above zero, in m"),
@@ -39,6 +42,8 @@ _LIMITS: dict[str, Limits] = {
     "outer_radius_m": (0.0, 10.0, "a radius above zero, in m"),
     "shear_displacement_m": (-1.0, 10.0, "a displacement in m"),
 }
+#: Magnitude of any other number; squares and products of such are finite.
+_MOST = 1e30
 
 
 def read_table(
@@ -109,37 +114,9 @@ def read_table(
 
 
 def _read_csv(file: Path, ignore_extra: bool) -> Table:
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TableError(f"{file} cannot be read as text: {error}") from None
-    if "\0" in text:
-        raise TableError(f"{file} is not a CSV file: it contains binary data")
-    reader = csv.reader(io.StringIO(text))
-    try:
-        header = [name.strip() for name in next(reader)]
-    except StopIteration:
-        raise TableError(f"{file} is empty; needed is a header: {', '.join(RUNS)}, ...") from None
-    kept = _known_columns(file, header, ignore_extra)
-    cells: dict[str, list[str]] = {name: [] for name in kept}
-    lines = []
-    try:
-        for row in reader:
-            if not any(cell.strip() for cell in row):
-                continue
-            if len(row) != len(header):
-                raise TableError(
-                    f"{file} line {reader.line_num}: {len(row)} cells; needed are {len(header)}, "
-                    "as in the header"
-                )
-            lines.append(reader.line_num)
-            for name, cell in zip(header, row, strict=True):
-                if name in cells:
-                    cells[name].append(cell.strip())
-    except csv.Error as error:
-        raise TableError(f"{file} line {reader.line_num}: {error}") from None
-    columns = {name: _column(file, name, column, lines) for name, column in cells.items()}
-    return Table(columns, str(file), np.asarray(lines, dtype=np.int64))
+    hint = f"{', '.join(RUNS)}, ..."
+    columns, lines = read_csv(file, lambda header: _known_columns(file, header, ignore_extra), hint)
+    return Table(columns, str(file), lines)
 
 
 def _known_columns(
@@ -181,31 +158,13 @@ def _misnamed(name: str) -> str:
     return ""
 
 
-def _column(file: Path, name: str, cells: list[str], lines: list[int]) -> Column:
-    if name in TEXT:
-        return np.asarray(cells, dtype=np.str_)
-    values = np.full(len(cells), np.nan)
-    for i, cell in enumerate(cells):
-        if cell:
-            try:
-                values[i] = float(cell)
-            except ValueError:
-                values[i] = np.inf
-            if not np.isfinite(values[i]):
-                raise TableError(
-                    f"{file} line {lines[i]}, column {name}: {cell!r} is not a number; "
-                    "needed is a finite number, or a blank cell where it was not measured"
-                )
-    return values
-
-
 def _check_values(table: Table, filled: Sequence[str], limits: Mapping[str, Limits]) -> None:
     for name, values in table.columns.items():
         if name in TEXT:
             bad, needed = values == "", "a name"
             blank = bad
         else:
-            low, high, needed = limits.get(name, (-np.inf, np.inf, "a number"))
+            low, high, needed = limits.get(name, (-_MOST, _MOST, f"a number below {_MOST:g}"))
             if name.endswith("_std"):
                 low, needed = 0.0, "a standard deviation above zero"
             blank = np.isnan(values)

@@ -10,12 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.io.number_text import read_number
+from soilml.io.plain_text import is_plain
 from soilml.row_status import Status
 
 Column = NDArray[Any]
 
 #: Columns that hold text; all others hold numbers, NaN where a cell is blank.
 TEXT = ("run", "status", "source", "wheel", "gear", "test")
+#: Characters of a text; every row of a column takes the memory of the longest.
+MOST_TEXT = 256
+
+
+def fault_of_text(text: str) -> str:
+    """What is wrong with a cell of text, in words; empty where nothing is."""
+    if len(text) > MOST_TEXT:
+        return f"the text has {len(text)} characters; at most {MOST_TEXT} are read"
+    return "" if is_plain(text) else f"{text!a} has control characters; needed is plain text"
 
 
 @dataclass(frozen=True)
@@ -85,7 +96,7 @@ class Table:
             mask = column == value
         else:
             try:
-                mask = column == float(value)
+                mask = column == read_number(value.strip())
             except ValueError:
                 raise TableError(
                     f"{self.source}: column {name} contains numbers; {value!r} is not a number"

@@ -11,6 +11,9 @@ from typing import Any
 from soilml.errors import InputError
 from soilml.optional_imports import tomllib
 
+#: Tables and lists in one another that a settings file may have; none needs more than six.
+MOST_DEPTH = 20
+
 
 class Settings:
     """One table of a TOML file; each key is taken once, and `finish` rejects the others."""
@@ -94,6 +97,8 @@ def read_settings(path: str | os.PathLike[str]) -> Settings:
     file = Path(path)
     try:
         content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+        _check_depth(content, str(file))
+        _check_whole_numbers(content, str(file))
     except FileNotFoundError:
         raise InputError(f"{file}: there is no such file") from None
     except OSError as error:
@@ -102,12 +107,27 @@ def read_settings(path: str | os.PathLike[str]) -> Settings:
         raise InputError(f"{file} cannot be read: {error}") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file} is not valid TOML: {error}") from None
+    except InputError:
+        raise
     except ValueError:  # more digits than Python turns into a number
         raise InputError(f"{file} is not valid TOML: a number has thousands of digits") from None
     except RecursionError:
         raise InputError(f"{file} is not valid TOML: tables or lists are nested too deep") from None
-    _check_whole_numbers(content, str(file))
     return Settings(content, str(file), file.parent)
+
+
+def _check_depth(content: Any, where: str) -> None:
+    """Raise `InputError` for tables or lists in more than `MOST_DEPTH` others."""
+    level = [content]
+    for _ in range(MOST_DEPTH):
+        level = [
+            inner
+            for value in level
+            if isinstance(value, dict | list)
+            for inner in (value.values() if isinstance(value, dict) else value)
+        ]
+    if level:
+        raise InputError(f"{where} is not valid: tables or lists are nested too deep")
 
 
 def _check_whole_numbers(content: Any, where: str) -> None:

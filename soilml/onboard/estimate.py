@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar
@@ -188,16 +189,23 @@ class Estimate:
         return Estimate.gaussian(names, units, prior, *parts)
 
     @staticmethod
-    def stack(estimates: Sequence[Estimate], shape: tuple[int, ...]) -> Estimate:
-        """Estimates of the same quantities as one; `shape` is put before their own dimensions."""
-        first = estimates[0]
-        parts: dict[str, Any] = {
-            key: np.reshape(
-                [getattr(e, key) for e in estimates], (*shape, *getattr(first, key).shape)
-            )
-            for key in Estimate.ARRAYS
-        }
-        return replace(first, **parts)
+    def stack(estimates: Iterable[Estimate], shape: tuple[int, ...]) -> Estimate:
+        """Estimates of the same quantities as one; `shape` is put before their own dimensions.
+
+        They are taken one after the other, so that an iterator's are never held together. Raises
+        `InputError` where there is none.
+        """
+        parts: dict[str, Any] = {}
+        for i, estimate in enumerate(estimates):
+            for key in Estimate.ARRAYS:
+                value = np.asarray(getattr(estimate, key))
+                if i == 0:
+                    parts[key] = np.empty((math.prod(shape), *value.shape), value.dtype)
+                parts[key][i] = value
+        if not parts:
+            raise InputError("no reading given; needed is one or more")
+        own = {key: value.reshape(*shape, *value.shape[1:]) for key, value in parts.items()}
+        return replace(estimate, **own)
 
     @property
     def abstains(self) -> NDArray[np.bool_]:

@@ -295,5 +295,5 @@ class Estimator:
         """Every row as a set of its own."""
         rows = self._configured_sets.rows(measured)
         shape = np.broadcast_shapes(*(np.shape(value) for value in measured.values()))
-        single = [{k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size)]
-        return Estimate.stack([self._set_estimate(row, sets.start())[0] for row in single], shape)
+        single = ({k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size))
+        return Estimate.stack((self._set_estimate(row, sets.start())[0] for row in single), shape)

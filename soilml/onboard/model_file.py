@@ -119,6 +119,10 @@ def read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     """
     inputs, outputs = json.loads(metadata["inputs"]), json.loads(metadata["outputs"])
     _check_provenance(metadata)
+    if not all(
+        str(entry[key]).isprintable() for entry in (*inputs, *outputs) for key in ("name", "unit")
+    ):
+        raise ValueError("a name with control characters")
     return {
         "inputs": tuple(entry["name"] for entry in inputs),
         "names": tuple(entry["name"] for entry in outputs),

@@ -61,16 +61,18 @@ class Model:
                     f"{type(effect).__name__} is not an effect; derive it from "
                     "soilml.physics.effects.Effect"
                 )
+            if not effect.applies_to(self.gear):
+                meant = [
+                    gear.name for gear in GEARS.values() if issubclass(gear, effect.gear_types)
+                ]
+                raise InputError(
+                    f"the effect {effect.name} does not apply to the gear {self.gear.name!r}; "
+                    f"it applies to: {', '.join(meant)}"
+                )
 
     def __add__(self, effect: Effect) -> Model:
         if any(effect.name == other.name for other in self.effects):
             raise InputError(f"the model has the effect {effect.name!r} already")
-        if not effect.applies_to(self.gear):
-            meant = [gear.name for gear in GEARS.values() if issubclass(gear, effect.gear_types)]
-            raise InputError(
-                f"the effect {effect.name} does not apply to the gear {self.gear.name!r}; "
-                f"it applies to: {', '.join(meant)}"
-            )
         return replace(self, effects=(*self.effects, effect))
 
     def __call__(self, soil: Soil, at: Operating) -> Force:

@@ -224,7 +224,7 @@ def _with_reasons(
     ok = 0 * force.status
     unsolved = xp.where(exists, int(Status.NOT_CONVERGED) + ok, int(Status.TOO_HEAVY) + ok)
     status = xp.where(force.status != 0, force.status, xp.where(balanced, ok, unsolved))
-    return replace(force, status=status, load=xp.where(exists, force.load, largest_load))
+    return replace(force, status=status, load=xp.where(exists | balanced, force.load, largest_load))
 
 
 def _root_between(

@@ -5,6 +5,7 @@ import pytest
 from conftest import MODEL, RECIPE
 
 from soilml.cli import main
+from soilml.onboard import Estimator
 from soilml.onboard.model_file import metadata_checksum
 
 SPEC = '[[regressor]]\ntype = "linear"\n'
@@ -93,10 +94,13 @@ def test_model_files_signed_again(tmp_path, capsys, small_model, key, value):
 
 
 @pytest.mark.filterwarnings("error")
-def test_readings_beyond_single_precision_are_out_of_range(tmp_path, capsys, small_model):
+def test_readings_beyond_single_precision_are_out_of_range_and_refused_in_a_table(
+    tmp_path, capsys, small_model
+):
+    assert not Estimator.load(small_model)(slip=0.1, load=60.0, torque=1e308).in_range
     (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1e308\n")
-    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv")]) == 0
-    assert capsys.readouterr().out.splitlines()[1].endswith(",0")
+    command = ["estimate", str(small_model), str(tmp_path / "runs.csv")]
+    refused(command, capsys, "line 2, column torque_Nm: 1e+308 given")
 
 
 def test_a_hint_names_each_known_key_once(tmp_path, capsys):

@@ -7,7 +7,10 @@ import re
 import sys
 from pathlib import Path
 
-from soilml.cli.options import InputFile
+from soilml.cli.options import (
+    InputFile,
+    whole_number,
+)
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.optional_imports import need
@@ -40,7 +43,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
     parser.add_argument(
         "--rows",
-        type=int,
+        type=whole_number,
         default=32,
         metavar="N",
         help="rows that one step of a set takes at most; working memory grows with it (default 32)",

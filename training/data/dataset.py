@@ -6,13 +6,17 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.recipe import parse_recipe
 from soilml.errors import InputError, TableError
+from soilml.identification.compatibility import recipe_content
 from soilml.io.read_table import read_table
 from soilml.onboard.features import compute_features, inputs_of
+from soilml.physics.effects import EFFECTS
 from soilml.quantities import QUANTITIES, column
 from training.data.targets import check_measured, prior_of
 
@@ -131,7 +135,7 @@ def read_dataset(
     if float(np.ptp(truth, axis=0).min()) <= 0.0:
         raise InputError(f"{path}: a target does not vary; give it a range in the recipe")
     recipe = table.metadata.get("soilml_recipe", "{}")
-    content = json.loads(recipe)
+    content = _checked_recipe(recipe, str(path))
     check_measured(targets, content, str(path))
     ends = [_ends(prior_of(name, content), truth[:, i]) for i, name in enumerate(targets)]
     return Dataset(
@@ -147,6 +151,23 @@ def read_dataset(
         recipe=recipe,
         dropped=int(len(table) - usable.sum()),
     )
+
+
+def _checked_recipe(text: str, source: str) -> dict[str, Any]:
+    """The content of a recipe in JSON, {} where the data were not simulated.
+
+    Raises `InputError` where it is not a valid recipe. Effects of a user's file, which are not
+    known here, are not checked.
+    """
+    content = recipe_content(text, source)
+    if content:
+        effects = content.get("effect", [])
+        if isinstance(effects, list) and all(isinstance(entry, dict) for entry in effects):
+            known = [entry for entry in effects if entry.get("name") in EFFECTS]
+            parse_recipe(json.dumps(json.loads(text) | {"effect": known}), f"recipe of {source}")
+        else:
+            raise InputError(f"{source}: its recipe is damaged; generate it again")
+    return content
 
 
 def _ends(prior: object, truth: Floats) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from soilml.cli.options import (
     add_effects_option,
     add_gear_option,
     add_row_options,
+    whole_number,
 )
 from soilml.io.atomic_files import output_files
 
@@ -57,7 +58,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loads", metavar="A,B,...", help="candidate loads in N")
     parser.add_argument(
         "--count",
-        type=int,
+        type=whole_number,
         default=3,
         help="number of rows in the planned sequence, 1 to 5 (default: 3)",
     )

@@ -5,7 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option
+from soilml.cli.options import (
+    InputFile,
+    add_ignore_extra_option,
+    add_seed_option,
+    number,
+)
 from soilml.cli.output_names import CLIMB_FILES
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
@@ -54,7 +59,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--slip-limit",
-        type=float,
+        type=number,
         metavar="S",
         help="give the steepest slope at slips up to S as well",
     )

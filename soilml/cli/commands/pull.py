@@ -10,6 +10,7 @@ from soilml.cli.options import (
     add_effects_option,
     add_gear_option,
     add_row_options,
+    number,
 )
 from soilml.io.atomic_files import output_files
 
@@ -61,7 +62,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gravity", metavar="G", help="gravity of a rover: earth, moon, mars, or in m/s^2"
     )
-    parser.add_argument("--slip-limit", type=float, metavar="S", help="largest slip considered")
+    parser.add_argument("--slip-limit", type=number, metavar="S", help="largest slip considered")
     parser.add_argument(
         "--free", metavar="A,B,...", help="unknown parameters (default: those with a prior)"
     )

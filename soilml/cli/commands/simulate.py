@@ -9,6 +9,7 @@ from soilml.cli.options import (
     InputFile,
     add_effects_option,
     add_gear_option,
+    number,
 )
 from soilml.io.atomic_files import output_files
 
@@ -38,13 +39,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--load", required=True, help="vertical loads in N")
     parser.add_argument(
-        "--speed", type=float, metavar="M_S", help="speed in m/s, below 0 in reverse"
+        "--speed", type=number, metavar="M_S", help="speed in m/s, below 0 in reverse"
     )
     parser.add_argument(
-        "--pass", dest="passes", type=float, help="number of the pass: 1 on undisturbed soil"
+        "--pass", dest="passes", type=number, help="number of the pass: 1 on undisturbed soil"
     )
     parser.add_argument(
-        "--slip-angle", type=float, metavar="RAD", help="angle between wheel plane and path, in rad"
+        "--slip-angle",
+        type=number,
+        metavar="RAD",
+        help="angle between wheel plane and path, in rad",
     )
     add_effects_option(parser)
     add_gear_option(parser)

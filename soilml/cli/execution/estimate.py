@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from soilml.cli.joint_readings import (
 )
 from soilml.cli.option_values import read_rows
 from soilml.cli.output import write_columns
+from soilml.cli.progress import progress_bar
 from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (
@@ -36,6 +38,7 @@ from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.fusion.joint_errors import are_comparable
 from soilml.onboard.multi_sensor import CORRELATED, fuse_estimates
+from soilml.onboard.row_estimates import ROWS_PER_CALL
 from soilml.optional_imports import need
 from soilml.quantities import column
 
@@ -181,10 +184,33 @@ def _all_rows(
         readings = row_readings(estimator, rows)
         if alone:
             readings = joint_readings(estimator, rows, case, together=False)
-        estimate = estimator(**readings)
-        for key in Estimate.ARRAYS:
-            getattr(result, key)[usable] = getattr(estimate, key)
+        index = np.flatnonzero(usable)
+        with progress_bar(f"estimating {index.size} rows", index.size) as done:
+            for first in range(0, index.size, ROWS_PER_CALL):
+                block = slice(first, first + ROWS_PER_CALL)
+                estimate = estimator(
+                    **{k: v[block] if np.ndim(v) else v for k, v in readings.items()}
+                )
+                for key in Estimate.ARRAYS:
+                    getattr(result, key)[index[block]] = getattr(estimate, key)
+                done(min(block.stop, index.size))
     return result
+
+
+def _estimates_of_runs(
+    estimator: Estimator, readings: list[dict[str, Any]], by: str
+) -> tuple[NDArray[np.int64], Estimate]:
+    """Rows in range (groups,), and the estimates of groups of readings."""
+    in_range = np.zeros(len(readings), dtype=np.int64)
+    with progress_bar(f"estimating by {by}", len(readings)) as done:
+
+        def estimates() -> Iterator[Estimate]:
+            for i, one in enumerate(readings):
+                in_range[i] = estimator.rows_in_range(**one).sum()
+                yield estimator.run(**one)
+                done(i + 1)
+
+        return in_range, Estimate.stack(estimates(), (len(readings),))
 
 
 def _group_estimates(
@@ -194,8 +220,7 @@ def _group_estimates(
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
     readings = [joint_readings(estimator, rows, case) for _, rows in groups]
-    in_range = np.asarray([int(estimator.rows_in_range(**inputs).sum()) for inputs in readings])
-    estimate = Estimate.stack([estimator.run(**one) for one in readings], (len(readings),))
+    in_range, estimate = _estimates_of_runs(estimator, readings, by)
     position = {name: i for i, (name, _) in enumerate(groups)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])

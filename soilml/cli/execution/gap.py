@@ -14,6 +14,7 @@ from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, create_folder
+from soilml.io.number_text import read_number
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
@@ -58,11 +59,11 @@ def run(args: argparse.Namespace) -> int:
         texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
     with create_folder(args.out) as folder:
         names = [folder / name for name in texts]
-        with atomic_outputs(names) as parts:
+        # a suspected model of an earlier analysis would contradict this one
+        earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
+        with atomic_outputs(names, remove=earlier) as parts:
             for part, text in zip(parts, texts.values(), strict=True):
                 part.write_text(text, encoding="utf-8")
-        if GAP_SUSPECTED not in texts:  # one of an earlier analysis would contradict this one
-            (folder / GAP_SUSPECTED).unlink(missing_ok=True)
     print(_text(report))
     print(f"\n{', '.join(str(name) for name in names)}", file=sys.stderr)
     return 0
@@ -77,7 +78,7 @@ def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str
             names = ", ".join(sorted(kinds))
             raise InputError(f"--checked {text!r}: needed is EFFECT=STD, with one of {names}")
         try:
-            found[name] = float(value)
+            found[name] = read_number(value)
         except ValueError:
             found[name] = 0.0
         if not 0.0 < found[name] < float("inf"):

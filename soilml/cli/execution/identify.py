@@ -11,6 +11,7 @@ from typing import Any
 from soilml.cli.advice_text import advice_after_fit
 from soilml.cli.option_values import available_effects, parse_names, read_rows
 from soilml.cli.output import is_terminal, json_text, write_stdout
+from soilml.cli.progress import progress_bar, working
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import FitError
@@ -42,10 +43,13 @@ def run(args: argparse.Namespace) -> int:
         return Identification(fit, advice_after_fit(case, rows, free, fit))
 
     if args.by is None:
-        found = {"": solve(table)}
+        with working(f"identifying from {len(table)} rows"):
+            found = {"": solve(table)}
         content = found[""].as_json()
     else:
-        found, failed = _solve_groups(table.groups(args.by), solve)
+        groups = list(table.groups(args.by))
+        with progress_bar(f"identifying by {args.by}", len(groups)) as done:
+            found, failed = _solve_groups(groups, solve, done)
         if not found:
             name, why = next(iter(failed.items()))
             raise FitError(f"no {args.by} can be identified; {args.by} {name}: {why}")
@@ -87,15 +91,18 @@ class Identification:
 
 
 def _solve_groups(
-    groups: Iterable[tuple[str, Table]], solve: Callable[[Table], Identification]
+    groups: Iterable[tuple[str, Table]],
+    solve: Callable[[Table], Identification],
+    done: Callable[[int], None],
 ) -> tuple[dict[str, Identification], dict[str, str]]:
     """The result of each group, and the reason for each group without one."""
     found, failed = {}, {}
-    for name, rows in groups:
+    for number, (name, rows) in enumerate(groups, 1):
         try:
             found[name] = solve(rows)
         except FitError as error:
             failed[name] = str(error)
+        done(number)
     return found, failed
 
 

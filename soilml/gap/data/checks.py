@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.identification.data.observations import LEAST_RELATIVE_STD
 from soilml.io.table import Table
 from soilml.quantities import column
 
@@ -89,6 +90,14 @@ def _check_channels(data: CheckedData) -> Iterator[Finding]:
                 f"it from: give [noise] {key}, or {key}_std",
             )
         values = readings.reading[in_channel]
+        largest = float(np.abs(values).max(initial=0.0))
+        std = float(np.nanmax(readings.std[in_channel], initial=0.0))
+        if 0.0 < std <= LEAST_RELATIVE_STD * largest:
+            yield (
+                Severity.ERROR,
+                f"the noise of {key} is {std:.3g} or less, its largest reading {largest:.3g}: no "
+                "sensor resolves so much; declare one such as '2 % + 0.05'",
+            )
         if values.size > 3 and np.ptp(values) == 0.0:
             yield Severity.ERROR, f"{key} is the same in every row: check the sensor"
 
@@ -159,7 +168,14 @@ def estimate_repeat_noise(readings: StackedReadings) -> tuple[dict[str, float], 
         if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
             continue
         squares = float(np.sum((readings.reading[undeclared] - mean[group]) ** 2))
-        noise[name] = float(np.sqrt(squares / degrees_of_freedom))
+        std = float(np.sqrt(squares / degrees_of_freedom))
+        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.reading[undeclared]).max()):
+            notes.append(
+                f"noise of {column(name)} is not declared, and its repeated rows are equal: none "
+                "can be estimated from them"
+            )
+            continue
+        noise[name] = std
         notes.append(
             f"noise of {column(name)} is not declared: {noise[name]:.3g} was estimated from "
             "repeated rows"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError
 from soilml.identification.data.levels import Levels, load_levels, rows_driven_alike, slip_levels
 from soilml.identification.data.observations import declared_std
 from soilml.identification.data.operating_points import gear_numbers, operating_points
@@ -20,6 +21,10 @@ from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+#: Readings that a table may have. The matrices of an analysis are of this size squared, and many
+#: are held at a time: 1.8 GB in all.
+MOST_READINGS = 3600
 
 
 @dataclass(frozen=True)
@@ -187,6 +192,19 @@ def stack_readings(case: Case, table: Table) -> StackedReadings:
         slip_std=_typical_std(case, table, "slip"),
         load_std=_typical_std(case, table, "load_N"),
     )
+
+
+def check_size(table: Table) -> None:
+    """Raise `InputError` for more readings than an analysis can hold, with what to leave out."""
+    columns = [table[column(name)] for name in CHANNELS if column(name) in table]
+    count = sum(int(np.isfinite(values).sum()) for values in columns)
+    if count > MOST_READINGS:
+        every = -(-count // MOST_READINGS)
+        raise InputError(
+            f"{table.source}: {count} readings in {len(table)} rows; an analysis takes at most "
+            f"{MOST_READINGS}, because its matrices grow with the square of their number: average "
+            f"rows that were driven alike, or keep one row, or one run, of {every}"
+        )
 
 
 def positive_std(case: Case, table: Table, key: str) -> Floats:

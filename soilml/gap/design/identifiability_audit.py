@@ -28,6 +28,7 @@ from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
+from soilml.unsolvable import solvable
 
 Floats = NDArray[np.float64]
 
@@ -96,6 +97,7 @@ class Audit:
         }
 
 
+@solvable("the audit")
 def audit(
     case: Case,
     design: Table,
@@ -150,6 +152,8 @@ def audit(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
+    if not design.answered.any():
+        raise InputError(f"{design.source}: no row has the status ok")
     readings = planned_readings(case, design.rows(design.answered))
     selected = select_free(case, free if free is not None or case.prior else SHEAR)
     soil = [f for f in selected if "." not in f.path]

@@ -1,12 +1,15 @@
 """The closed form against its printed sums, against quadrature, and against sympy."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import sympy as sp
+from conftest import input_box, solved
 from scipy.integrate import quad
 
 from soilml import LinearWheel, Model, Operating, Soil, Wheel
-from soilml.physics.forces import load_at_sinkage
+from soilml.physics.forces import load_at_sinkage, stress_profile
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
 from soilml.row_status import Status
@@ -117,3 +120,60 @@ def test_a_load_just_below_a_peak_under_the_hub_is_carried():
     force = Model(gear)(soil, Operating(slip=0.2, load=loads))
     assert force.status.tolist() == [0, 0, 0, 0, Status.TOO_HEAVY]
     assert np.all(force.sinkage[:4] < sinkage[np.argmax(load)])
+
+
+@pytest.mark.parametrize("braking", ["displacement-sign", "slip-sign"])
+def test_a_deeply_braking_wheel_that_is_ok_carries_its_load(braking):
+    """The stress lines of the answer, integrated here, over the box of braking wheels."""
+    box = input_box(2048, 3)
+    box["slip"] = -np.abs(box["slip"])
+    force = solved(box, gear=partial(LinearWheel, braking=braking))
+    ok = np.flatnonzero(force.status == 0)
+    assert ok.size > 1000
+    box = {name: values[ok] for name, values in box.items()}
+    names = ("cohesion", "friction_angle", "shear_modulus", "n", "kc", "kphi", "a0", "a1")
+    soil = Soil(**{name: box[name] for name in names})
+    gear = LinearWheel(radius=box["radius"], width=box["width"], braking=braking)
+    case = LoadCase(gear, soil, Operating(slip=box["slip"], load=box["load"]), ())
+    (leave, peak), stress = stress_profile(case, force.sinkage[ok], 2)
+    corner = np.stack([leave, peak, force.entry_angle[ok]])
+    part = np.linspace(0.0, 1.0, 2001)[:, None]
+    load = 0.0
+    for first, last in ((0, 1), (1, 2)):
+        angle = corner[first] + part * (corner[last] - corner[first])
+        normal, shear = (
+            line[first] + part * (line[last] - line[first])
+            for line in (np.concatenate([s, 0.0 * s[:1]]) for s in (stress.normal, stress.shear))
+        )
+        vertical = normal * np.cos(angle) + shear * np.sin(angle)
+        load = load + np.trapezoid(vertical, angle, axis=0)
+    np.testing.assert_allclose(load * box["radius"] * box["width"], box["load"], rtol=1e-5)
+
+
+def test_an_equilibrium_just_below_the_peak_of_the_load_states_the_load_that_it_carries():
+    """The scan finds no crossing between its points there, and the root search about the peak does.
+
+    The rows are from a search through the box of braking wheels.
+    """
+    soil = Soil(
+        cohesion=np.asarray([2244.537938386202, 2269.5698998868465, 1718.0201187729836]),
+        friction_angle=np.asarray([0.8290915854051261, 0.8056745073053848, 0.5599285210253216]),
+        shear_modulus=np.asarray([0.002522120835098956, 0.002424895402394172, 0.00891222683245248]),
+        n=np.asarray([0.6438984613865615, 1.4523356430232526, 1.3096161931753159]),
+        kc=0.0,
+        kphi=np.asarray([221060.46883559917, 121741.84542676377, 2293465.7104387907]),
+        a0=np.asarray([0.4828799720853567, 0.5303402152843772, 0.5975741235539317]),
+        a1=np.asarray([0.2753545314073563, 0.027620629593729972, 0.13078034548088907]),
+    )
+    wheel = LinearWheel(
+        radius=np.asarray([0.04199350638602185, 0.30152896774138055, 0.20505270160375524]),
+        width=np.asarray([0.1911826593424846, 0.35651888483894295, 0.029130413148363316]),
+        braking="slip-sign",
+    )
+    slip = np.asarray([-0.6514795457012953, -0.4913247798569501, -0.9048998336773367])
+    load = np.asarray([100.23343566192801, 241.7760564670331, 435.97071911189147])
+    force = Model(wheel)(soil, Operating(slip=slip, load=load))
+    assert (force.status == Status.OK).all()
+    np.testing.assert_allclose(force.load, load, rtol=1e-8)
+    case = LoadCase(wheel, soil, Operating(slip=slip, load=load), ())
+    np.testing.assert_allclose(load_at_sinkage(case, force.sinkage), load, rtol=1e-8)

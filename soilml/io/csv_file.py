@@ -1,0 +1,137 @@
+"""CSV files as columns, in blocks of rows; every error names file, line and column."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import TableError
+from soilml.io.number_text import read_number, read_numbers
+from soilml.io.plain_text import cell_as_text
+from soilml.io.table import TEXT, Column, fault_of_text
+
+#: Rows that a table may have: more do not fit into the memory of a usual machine.
+MOST_ROWS = 10_000_000
+#: Rows whose cells are held as text at a time.
+BLOCK = 8192
+#: Characters of a line; a longer one is not of a table.
+_LINE = 1_000_000
+
+
+def read_csv(
+    file: Path, columns: Callable[[list[str]], Sequence[str]], header_hint: str
+) -> tuple[dict[str, Column], NDArray[np.int64]]:
+    """The columns of a CSV file by name, and the line of each row.
+
+    Parameters
+    ----------
+    columns
+        The columns to keep, of those in the header; it raises where one of these is not possible.
+    header_hint
+        What the header should be, for the message about an empty file.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be opened or read.
+    TableError
+        For text that is not UTF-8 or no table, a row with another number of cells than the header,
+        and a cell that is not what its column holds.
+    """
+    with file.open(encoding="utf-8-sig") as opened:
+        reader = csv.reader(_lines(file, opened))
+        try:
+            header = [name.strip() for name in next(reader, [])]
+            if not header:
+                raise TableError(f"{file} is empty; needed is a header: {header_hint}")
+            kept = list(columns(header))
+            places = [header.index(name) for name in kept]
+            blocks: list[list[Column]] = [[] for _ in kept]
+            lines: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
+            for numbers, rows in _blocks(file, reader, len(header)):
+                lines.append(numbers)
+                for name, place, filled in zip(kept, places, blocks, strict=True):
+                    cells = [row[place].strip() for row in rows]
+                    filled.append(_column(file, name, cells, numbers))
+        except UnicodeDecodeError as error:
+            raise TableError(f"{file} cannot be read as text: {error}") from None
+        except csv.Error as error:
+            raise TableError(f"{file} line {reader.line_num}: {error}") from None
+    empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
+    found = {
+        name: np.concatenate([empty[name], *filled])
+        for name, filled in zip(kept, blocks, strict=True)
+    }
+    return found, np.concatenate(lines)
+
+
+def _lines(file: Path, opened: TextIO) -> Iterator[str]:
+    """Lines of text; raises `TableError` for binary data and for endless lines."""
+    number = 0
+    while line := opened.readline(_LINE):
+        number += 1
+        if "\0" in line:
+            raise TableError(f"{file} is not a CSV file: it contains binary data")
+        if len(line) == _LINE:
+            raise TableError(f"{file} line {number}: the line has {_LINE} characters or more")
+        yield line
+
+
+def _blocks(
+    file: Path, reader: Any, width: int
+) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
+    """Rows that are not blank, with their lines, in blocks."""
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    total = 0
+    for row in reader:
+        if not "".join(row).strip():
+            continue
+        if len(row) != width:
+            raise TableError(
+                f"{file} line {reader.line_num}: {len(row)} cells; needed are {width}, as in the "
+                "header"
+            )
+        rows.append(row)
+        lines.append(reader.line_num)
+        total += 1
+        if total > MOST_ROWS:
+            raise TableError(f"{file} has more than {MOST_ROWS} rows; split it, or thin it")
+        if len(rows) == BLOCK:
+            yield np.asarray(lines, dtype=np.int64), rows
+            rows, lines = [], []
+    if rows:
+        yield np.asarray(lines, dtype=np.int64), rows
+
+
+def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -> Column:
+    """Cells as text or as numbers, NaN where blank."""
+    if name in TEXT:
+        for line, cell in zip(lines, cells, strict=True):
+            if fault := fault_of_text(cell):
+                raise TableError(f"{file} line {line}, column {name}: {fault}")
+        return np.asarray([cell_as_text(cell) for cell in cells], dtype=np.str_)
+    filled = [i for i, cell in enumerate(cells) if cell]
+    values = np.full(len(cells), np.nan)
+    try:
+        values[filled] = read_numbers([cells[i] for i in filled])
+    except ValueError:
+        wrong = next(i for i in filled if not _is_number(cells[i]))
+        raise TableError(
+            f"{file} line {lines[wrong]}, column {name}: {cells[wrong]!r} is not a number; needed "
+            "is a finite number, or a blank cell where it was not measured"
+        ) from None
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        read_number(cell)
+    except ValueError:
+        return False
+    return True

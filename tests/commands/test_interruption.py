@@ -1,0 +1,76 @@
+"""Ctrl-C at any moment from the first import on: one line, status 130, no file."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from conftest import MODEL
+
+#: Runs the command line; SIGINT arrives when the named module is imported.
+INTERRUPTED = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+module, *words = sys.argv[1:]
+class Interrupt:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            os.kill(os.getpid(), signal.SIGINT)
+        return None
+sys.meta_path.insert(0, Interrupt())
+from soilml.cli import main
+sys.exit(main(words))
+"""
+RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,80,3.0\na,0.5,90,5.0\n"
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [
+        ("soilml.cli.main", "simulate model.toml --slip 0.1 --load 60"),
+        ("argparse", "simulate model.toml --slip 0.1 --load 60"),
+        ("numpy", "simulate model.toml --slip 0.1 --load 60 --out out.csv"),
+        ("numpy.random", "identify model.toml runs.csv --out out.json"),
+        ("scipy.optimize", "identify model.toml runs.csv --out out.json"),
+        ("jinja2", "gap model.toml runs.csv --out found"),
+        ("pyarrow", "generate wheel out.parquet --rows 10"),
+        ("onnxruntime", "estimate {model} runs.csv"),
+    ],
+)
+def test_ctrl_c_in_an_import(tmp_path, small_model, module, words):
+    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "runs.csv").write_text(RUNS)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, module, *words.format(model=small_model).split()],
+        cwd=tmp_path, env=environment, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.stderr == "soilml: interrupted; no output was written\n"
+    assert done.returncode == 128 + signal.SIGINT
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "runs.csv"]
+
+
+def test_what_was_written_before_is_said(tmp_path):
+    """A signal after the exchange of the outputs does not say that there are none."""
+    (tmp_path / "model.toml").write_text(MODEL)
+    code = """
+import os, signal, sys
+import soilml.io.swap as swap
+signal.signal(signal.SIGINT, signal.default_int_handler)
+class Written(list):
+    def append(self, names):
+        super().append(names)
+        os.kill(os.getpid(), signal.SIGINT)
+swap.replaced = Written()
+from soilml.cli import main
+sys.exit(main())
+"""
+    words = "simulate model.toml --slip 0.1 --load 60 --out out.csv"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words.split()],
+        cwd=tmp_path, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    assert done.stderr == "soilml: interrupted; complete before that: out.csv\n"
+    assert done.returncode == 130 and (tmp_path / "out.csv").is_file()

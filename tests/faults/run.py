@@ -1,0 +1,168 @@
+"""Kill commands at random moments and run them again: `make faults FAULT_KILLS=200`.
+
+After each kill every output is whole, old or new; after the rerun the outputs are those of an
+undisturbed run, bit for bit, and nothing else lies beside them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+ROOT = Path(__file__).parents[2]
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.3, 0.8]
+shear_modulus = [0.005, 0.04]
+[noise]
+torque_Nm = "2 %"
+drawbar_pull_N = "2 % + 0.2"
+"""
+#: What is killed: the words of each command, in a folder with its inputs; it writes below `out`.
+COMMANDS = {
+    "generate": "generate wheel out/d.parquet --rows 60000 --workers 2",
+    "generate-folder": "generate wheel out/ --rows 300000 --workers 2",
+    "train": "train spec.toml data.parquet out/m.onnx",
+    "gap": "gap model.toml runs.csv --out out",
+    "estimate": "estimate wheel.onnx long.csv --out out/e.csv",
+    "simulate": "simulate model.toml --slip 0:0.6:400 --load 30:90:400 --out out/s.csv",
+}
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+
+
+def start(folder: Path, words: str) -> subprocess.Popen[str]:
+    """The command in a process group of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, "-m", "soilml", *words.split()],
+        cwd=folder,
+        env=environment,
+        text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file below `folder`, by its path."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+    }
+
+
+def completed(folder: Path, words: str) -> float:
+    """Run to the end; the seconds that it took. Raises `RuntimeError` where it fails."""
+    begun = time.monotonic()
+    process = start(folder, words)
+    error = process.communicate()[1]
+    if process.returncode:
+        raise RuntimeError(f"soilml {words}: {error.strip()}")
+    return time.monotonic() - begun
+
+
+def prepared(folder: Path) -> None:
+    """The inputs of all commands."""
+    (folder / "model.toml").write_text(MODEL)
+    (folder / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
+    shutil.copy(ROOT / "exported" / "wheel.onnx", folder / "wheel.onnx")
+    completed(folder, "generate wheel data.parquet --rows 2000 --workers 1")
+    completed(folder, "simulate model.toml --slip 0.05:0.6:6 --load 30:90:5 --run a --out one.csv")
+    completed(folder, "simulate model.toml --slip 0.05:0.6:6 --load 40:80:5 --run b --out two.csv")
+    completed(folder, "simulate model.toml --slip 0.05:0.6:60 --load 30:90:80 --out grid.csv")
+    one, two = ((folder / name).read_text().splitlines() for name in ("one.csv", "two.csv"))
+    (folder / "runs.csv").write_text("\n".join([*one, *two[1:]]) + "\n")
+    grid = (folder / "grid.csv").read_text().splitlines()
+    long = [f"run,{grid[0]}", *(f"r{i % 7},{line}" for i, line in enumerate(grid[1:]))]
+    (folder / "long.csv").write_text("\n".join(long) + "\n")
+
+
+def disturbed(
+    folder: Path, words: str, right: dict[str, str], delay: float, number: signal.Signals
+) -> list[str]:
+    """Faults after one kill and a rerun, in words; an empty list where there are none."""
+    out = folder / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    process = start(folder, words)
+    time.sleep(delay)
+    process.send_signal(number)
+    error = process.communicate()[1]
+    faults = []
+    said = process.returncode == 128 + number and error.count("soilml: interrupted") == 1
+    if not said and process.returncode not in (0, -number):
+        faults.append(f"said {error.strip()[-300:]!r} with status {process.returncode}")
+    left = digests(out)
+    whole = {name: digest for name, digest in left.items() if not Path(name).name.startswith(".")}
+    faults += [f"{name} is not whole" for name in whole if whole[name] != right.get(name)]
+    if number != signal.SIGKILL and len(whole) != len(left):
+        faults.append(f"left behind: {sorted(left.keys() - whole.keys())}")
+    time.sleep(0.2 if number == signal.SIGKILL else 0.0)  # workers end with their parent
+    completed(folder, words)
+    again = digests(out)
+    if again != right:
+        changed = sorted(name for name in {*again, *right} if again.get(name) != right.get(name))
+        faults.append(f"the rerun differs: {changed}")
+    return faults
+
+
+def run(kills: int, seed: int, commands: Sequence[str] = tuple(COMMANDS)) -> Counter[str]:
+    """Kill the commands in turn at random moments; counts of kills and faults by command."""
+    rng, counts = random.Random(seed), Counter[str]()
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        prepared(folder)
+        right, seconds = {}, {}
+        for command in commands:
+            shutil.rmtree(folder / "out", ignore_errors=True)
+            (folder / "out").mkdir()
+            seconds[command] = completed(folder, COMMANDS[command])
+            right[command] = digests(folder / "out")
+        for i in range(kills):
+            command = commands[i % len(commands)]
+            delay, number = rng.uniform(0.08, 1.1 * seconds[command]), rng.choice(SIGNALS)
+            faults = disturbed(folder, COMMANDS[command], right[command], delay, number)
+            counts[f"{command} kills"] += 1
+            counts[f"{command} faults"] += len(faults)
+            for fault in faults:
+                print(f"{command}, {number.name} after {delay:.2f} s: {fault}", flush=True)
+    return counts
+
+
+def main() -> int:
+    """Print the counts; 1 where there was a fault."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("commands", nargs="*", metavar="COMMAND", help=", ".join(COMMANDS))
+    args = parser.parse_args()
+    counts = run(args.kills, args.seed, args.commands or tuple(COMMANDS))
+    for command in args.commands or COMMANDS:
+        kills, faults = counts[f"{command} kills"], counts[f"{command} faults"]
+        print(f"{command:16} {kills:4} kills {faults:4} faults")
+    return 1 if any(counts[f"{command} faults"] for command in COMMANDS) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,70 @@
+"""Numbers written as text are decimal numbers in ASCII, wherever they are read."""
+
+import pytest
+from conftest import MODEL
+
+from soilml.cli import main
+from soilml.errors import TableError
+from soilml.io.number_text import read_number, read_whole_number
+from soilml.io.read_table import read_table
+
+#: What Python's `float` takes beside decimal numbers, and texts that it does not take.
+REFUSED = [
+    *("1_000", "0_1", "\uff11\uff12", "\u0967", "\u0661", "nan", "inf", "-Infinity", "1e999"),
+    *("0x10", "1,5", "", " ", "--1", "1e", "e5", "1 000", "\xbd"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_is_no_decimal_number_is_refused(text):
+    with pytest.raises(ValueError):
+        read_number(text)
+    with pytest.raises(ValueError):
+        read_whole_number(text)
+
+
+@pytest.mark.parametrize("text", ["1", "-0.5", "+3", ".5", "5.", "1e-3", "1E+3", "007"])
+def test_decimal_numbers_are_read_as_python_does(text):
+    assert read_number(text) == float(text)
+
+
+@pytest.mark.parametrize("text", ["1.0", "1e3", "+-1", "9" * 19, "1_0"])
+def test_whole_numbers_have_digits_only(text):
+    with pytest.raises(ValueError):
+        read_whole_number(text)
+    assert read_whole_number("-12") == -12
+
+
+@pytest.mark.parametrize("text", [text for text in REFUSED if text.strip() and "," not in text])
+def test_cells_and_selections(text, tmp_path):
+    file = tmp_path / "runs.csv"
+    file.write_text(f"run,slip,load_N,torque_Nm\na,0.1,60,1\na,0.2,60,{text}\n")
+    with pytest.raises(TableError, match="line 3, column torque_Nm"):
+        read_table(file)
+    file.write_text("run,slip,load_N,torque_Nm\na,0.1,60,1000\n")
+    with pytest.raises(TableError, match="is not a number"):
+        read_table(file).where("torque_Nm", text)
+
+
+@pytest.mark.parametrize("text", ["1_0", "\uff11\uff12", "\u0967"])
+def test_options(text, tmp_path, capsys):
+    (tmp_path / "m.toml").write_text(MODEL)
+    (tmp_path / "r.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1\n")
+    model, runs = str(tmp_path / "m.toml"), str(tmp_path / "r.csv")
+    for words in (
+        ["simulate", model, "--slip", f"0.{text}", "--load", "60"],
+        ["simulate", model, "--slip", f"0.1:0.2:{text}", "--load", "60"],
+        ["simulate", model, "--slip", "0.1", "--load", "60", "--speed", text],
+        ["gap", model, runs, "--out", str(tmp_path / "o"), "--cost", f"reverse={text}"],
+        ["gap", model, runs, "--out", str(tmp_path / "o"), "--checked", f"torque-offset={text}"],
+        ["gap", model, runs, "--out", str(tmp_path / "o"), "--seed", text],
+        ["advise", model, "--count", text],
+        ["generate", "wheel", str(tmp_path / "o.parquet"), "--rows", text],
+        ["generate", "wheel", str(tmp_path / "o.parquet"), "--workers", text],
+    ):
+        try:
+            status = main(words)
+        except SystemExit as done:
+            status = done.code
+        assert status == 2, words
+        assert capsys.readouterr().err.count("\n") == 1
