@@ -33,13 +33,13 @@ _LIMITS: dict[str, Limits] = {
     "slip_angle_rad": (-1.6, 1.6, "an angle between -1.6 and 1.6, in rad"),
     "slope_rad": (-1.4, 1.4, "a slope in rad, positive uphill"),
     "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
-    "wheel_radius_m": (0.0, 1e3, "a radius above zero, in m"),
-    "wheel_width_m": (0.0, 1e3, "a width above zero, in m"),
-    "plate_radius_m": (0.0, 10.0, "a radius above zero, in m"),
+    "wheel_radius_m": (0.0, 1e3, "a radius above zero and below 1000, in m"),
+    "wheel_width_m": (0.0, 1e3, "a width above zero and below 1000, in m"),
+    "plate_radius_m": (0.0, 10.0, "a radius above zero and below 10, in m"),
     "plate_width_m": (0.0, 10.0, "a width above zero, in m"),
     "plate_length_m": (0.0, 10.0, "a length above zero, in m"),
     "plate_area_m2": (0.0, 100.0, "an area above zero, in m^2"),
-    "outer_radius_m": (0.0, 10.0, "a radius above zero, in m"),
+    "outer_radius_m": (0.0, 10.0, "a radius above zero and below 10, in m"),
     "shear_displacement_m": (-1.0, 10.0, "a displacement in m"),
 }
 #: Magnitude of any other number; squares and products of such are finite.

@@ -89,7 +89,7 @@ def test_bad_plate_tables_end_with_one_line(tables, old, new, said, capsys):
 def test_bad_shear_tables_end_with_one_line(tables, capsys):
     for old, new, said in (
         ("normal_stress_Pa", "normal_stress_kPa", "name the column normal_stress_Pa"),
-        ("normal_stress_Pa", "wheel_radius_m", "normal_stress_Pa is missing"),
+        ("normal_stress_Pa", "time_s", "normal_stress_Pa is missing"),
         (",10000,", ",-10000,", "a normal stress above zero"),
     ):
         (tables / "bad.csv").write_text(SHEAR.replace(old, new))

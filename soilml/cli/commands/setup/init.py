@@ -22,7 +22,7 @@ corrected. An existing file is not replaced.
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", metavar="MODEL.toml", help="the file to write")
+    parser.add_argument("out", metavar="MODEL.toml", help="the file to write")
     parser.add_argument("--radius", type=float, metavar="M", help="wheel radius in m")
     parser.add_argument("--width", type=float, metavar="M", help="wheel width in m")
     parser.add_argument(
@@ -41,7 +41,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return [Path(args.model)]
+    return [Path(args.out)]
 
 
 def run(args: argparse.Namespace) -> int:

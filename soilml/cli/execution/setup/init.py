@@ -25,7 +25,7 @@ LENGTH, TRACK, HEIGHT = 1.0, 0.8, 0.35
 
 def run(args: argparse.Namespace) -> int:
     """Ask for what is missing on a terminal, and write the file."""
-    file = Path(args.model)
+    file = Path(args.out)
     if file.exists():
         raise InputError(f"{file} exists; give another name, or remove it")
     given = {key: getattr(args, key) for key in QUESTIONS}
