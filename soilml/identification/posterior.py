@@ -38,6 +38,8 @@ Z_999 = 3.09
 FEWEST_READINGS = 8
 #: Rows from which on a part of them, of the second number, is sampled first.
 MANY_ROWS, FIRST_ROWS = 512, 256
+#: Factor on the noise up to which the posterior with the declared noise shows the region.
+SIMILAR_NOISE = 2.0
 
 
 @dataclass(frozen=True)
@@ -143,23 +145,29 @@ def posterior_samples(
     if misfit <= misfit_limit(data.reading_count - len(free)):
         return PosteriorSamples(sample, misfit, 1.0)
     noise_scale = float(np.sqrt(misfit))
-    sample, _ = sample_posterior(case, data, free, noise_scale)
+    start = sample if noise_scale < SIMILAR_NOISE else None
+    sample, _ = sample_posterior(case, data, free, noise_scale, start)
     return PosteriorSamples(sample, misfit, noise_scale)
 
 
 def sample_posterior(
-    case: Case, data: Observations, free: Sequence[FreeParameter], noise_scale: float = 1.0
+    case: Case,
+    data: Observations,
+    free: Sequence[FreeParameter],
+    noise_scale: float = 1.0,
+    start: ImportanceSample | None = None,
 ) -> tuple[ImportanceSample, float]:
     """Weighted fractions of the priors, and the misfit.
 
-    Noise and discrepancy are multiplied by `noise_scale`.
+    Noise and discrepancy are multiplied by `noise_scale`. Samples of a similar posterior, `start`,
+    show the region.
 
     The misfit is the sum of squared residuals over declared variances, per degree of freedom, at
     the sample of largest weight; with a discrepancy, weighted by the inverse covariance. Raises
     `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, data, free, noise_scale)
-    sample = _from_surface(density)
+    sample = _from_surface(density, start)
     if sample is None:
         sample = importance_sample(density, len(free))
     if not np.isfinite(sample.evidence):
@@ -176,7 +184,9 @@ def sample_posterior(
     return sample, cost / max(data.reading_count - len(free), 1)
 
 
-def _from_surface(density: PosteriorDensity) -> ImportanceSample | None:
+def _from_surface(
+    density: PosteriorDensity, start: ImportanceSample | None = None
+) -> ImportanceSample | None:
     """Weighted samples with polynomials in place of the model, or None where these do not serve.
 
     Of many rows, a part shows the region in which all are evaluated.
@@ -184,8 +194,7 @@ def _from_surface(density: PosteriorDensity) -> ImportanceSample | None:
     data, p = density.data, len(density.free)
     if data.reading_count < FEWEST_READINGS:
         return None
-    start: ImportanceSample | None = None
-    if len(data.slip) > MANY_ROWS:
+    if start is None and len(data.slip) > MANY_ROWS:
         part = np.random.default_rng(0).permutation(len(data.slip))[:FIRST_ROWS]
         start = _from_surface(density.of_rows(np.sort(part)))
     sample = surface_sample(density, p, start)
