@@ -19,6 +19,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/arrays.py": {"torch", "array_api_compat"},
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
+    "soilml/io/table.py": {"pyarrow"},
     "soilml/identification/descent.py": {"scipy"},
     "soilml/numerics/sobol_points.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},

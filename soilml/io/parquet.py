@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -43,6 +43,29 @@ def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
             "command completes it"
         )
     return dict(zip(arrow.column_names, arrow.columns, strict=True)), first
+
+
+@runtime_checkable
+class ArrowStream(Protocol):
+    """What exports its rows by the Arrow PyCapsule interface: data frames of many libraries."""
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """A capsule with an ArrowArrayStream."""
+        ...
+
+
+def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
+    """Arrow columns by name of a data frame; raises `TableError` for a column that occurs twice."""
+    try:
+        import pyarrow as pa
+    except ImportError:
+        raise MissingLibraryError(
+            "reading a data frame needs pyarrow: pip install 'soilml[ground]'"
+        ) from None
+    arrow = pa.table(frame)
+    if len(set(arrow.column_names)) < len(arrow.column_names):
+        raise TableError("data frame: a column occurs twice")
+    return dict(zip(arrow.column_names, arrow.columns, strict=True))
 
 
 def _read_file(file: Path) -> Any:

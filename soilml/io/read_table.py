@@ -11,7 +11,13 @@ import numpy as np
 
 from soilml.errors import TableError
 from soilml.io.csv_file import read_csv
-from soilml.io.parquet import own_columns, plain_column, read_parquet
+from soilml.io.parquet import (
+    ArrowStream,
+    arrow_columns,
+    own_columns,
+    plain_column,
+    read_parquet,
+)
 from soilml.io.table import TEXT, Table
 from soilml.quantities import COLUMNS
 
@@ -47,21 +53,23 @@ _MOST = 1e30
 
 
 def read_table(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | ArrowStream,
     need: Sequence[str] = (),
     *,
     filled: Sequence[str] = FILLED,
     ignore_extra: bool = False,
     limits: Mapping[str, Limits] | None = None,
 ) -> Table:
-    """Read a table of measured rows from a CSV or Parquet file.
+    """Read a table of measured rows from a CSV or Parquet file, or from a data frame.
 
     Parameters
     ----------
     path
         A Parquet file where the name ends in `.parquet`, a folder of Parquet files that `soilml
         generate` wrote, otherwise a CSV file with a header and
-        comma as separator. Column names carry their units, such as load_N and torque_Nm.
+        comma as separator. Column names carry their units, such as load_N and torque_Nm. Data
+        frames of pandas, polars and pyarrow, and whatever else exports an Arrow stream, are read
+        with the same checks; `Table.to_arrow` gives one back.
     need
         Columns that must be present.
     filled
@@ -96,6 +104,12 @@ def read_table(
     >>> len(table), table["torque_Nm"]
     (2, array([ 3., nan]))
     """
+    if isinstance(path, ArrowStream):
+        file = Path("data frame")
+        columns = arrow_columns(path)
+        kept = _known_columns(file, list(columns), ignore_extra)
+        table = Table({name: plain_column(file, name, columns[name]) for name in kept}, str(file))
+        return _checked(table, file, need, filled, limits)
     file = Path(path)
     read = _read_parquet if file.suffix == ".parquet" or file.is_dir() else _read_csv
     try:
@@ -104,6 +118,17 @@ def read_table(
         raise TableError(f"{file}: there is no such file") from None
     except OSError as error:
         raise TableError(f"{file} cannot be read: {error.strerror or error}") from None
+    return _checked(table, file, need, filled, limits)
+
+
+def _checked(
+    table: Table,
+    file: Path,
+    need: Sequence[str],
+    filled: Sequence[str],
+    limits: Mapping[str, Limits] | None,
+) -> Table:
+    """The table, with its columns and values as they must be."""
     for name in need:
         if name not in table:
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")

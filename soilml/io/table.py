@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import TableError
+from soilml.errors import MissingLibraryError, TableError
 from soilml.io.number_text import read_number
 from soilml.io.plain_text import is_plain
 from soilml.row_status import Status
@@ -124,6 +124,20 @@ class Table:
         members = np.split(order, ends[:-1])
         for position in np.argsort(first):
             yield str(values[position]), self.rows(members[position])
+
+    def to_arrow(self) -> Any:
+        """The columns as a pyarrow table, which pandas, polars and others take.
+
+        >>> Table({"slip": np.array([0.1, 0.3])}).to_arrow().column_names
+        ['slip']
+        """
+        try:
+            import pyarrow as pa
+        except ImportError:
+            raise MissingLibraryError(
+                "an Arrow table needs pyarrow: pip install 'soilml[ground]'"
+            ) from None
+        return pa.table(self.columns)
 
     def place(self, row: int) -> str:
         """File and line of a row, for a message."""

@@ -1,0 +1,54 @@
+"""Data frames in and out, by the Arrow interface that pandas, polars and pyarrow share."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from soilml import identify, read_case, read_table
+from soilml.errors import TableError
+
+COLUMNS = {
+    "run": ["a", "a", "b"],
+    "slip": [0.1, 0.2, 0.3],
+    "load_N": [40, 80, 40],
+    "torque_Nm": [1.513, 4.826, None],
+}
+
+
+class Frame:
+    """Any library's data frame: it has nothing but the Arrow stream."""
+
+    def __init__(self, columns):
+        self.table = pa.table(columns)
+
+    def __arrow_c_stream__(self, requested_schema=None):
+        return self.table.__arrow_c_stream__(requested_schema)
+
+
+@pytest.mark.parametrize("frame", [pa.table(COLUMNS), Frame(COLUMNS)])
+def test_a_frame_is_read_as_the_file_would_be(frame, model_file):
+    table = read_table(frame, need=("run", "slip"))
+    assert table["run"].tolist() == ["a", "a", "b"]
+    assert table["load_N"].dtype == np.float64 and np.isnan(table["torque_Nm"][2])
+    identify(read_case(model_file), table.rows(np.asarray([0, 1])))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"slip": [10.0, 20.0, 30.0]}, "row 1, column slip: 10 given; needed is a slip ratio"),
+        ({"slipp": [0.1, 0.2, 0.3]}, "data frame: column 'slipp': did you mean 'slip'"),
+        ({"load_N": ["40", "80", "40"]}, "column load_N: has type string; needed are numbers"),
+        ({"slip": [None, 0.2, 0.3]}, "row 1, column slip: the cell is blank"),
+    ],
+)
+def test_a_frame_is_checked_as_a_file_is(change, said):
+    with pytest.raises(TableError, match=said):
+        read_table(Frame(COLUMNS | change))
+
+
+def test_a_table_goes_back_to_arrow():
+    table = read_table(Frame(COLUMNS))
+    again = read_table(table.to_arrow())
+    assert again["run"].tolist() == table["run"].tolist()
+    assert np.array_equal(again["torque_Nm"], table["torque_Nm"], equal_nan=True)
