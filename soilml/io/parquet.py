@@ -123,6 +123,8 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
 
     if pa.types.is_dictionary(column.type):
         column = column.cast(column.type.value_type)
+    if pa.types.is_string_view(column.type):  # of polars
+        column = column.cast(pa.string())
     kind = column.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
