@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_hints
 
@@ -18,6 +19,8 @@ def print_table_hints(table: Table, case: Case | None, radius: float | None = No
     The radius of the wheel (m) is that of the case, else `radius`; None where it is not known.
     """
     used = table.rows(table.answered)
+    if case is not None and case.gears:
+        used = with_rover_columns(case, used)
     radii = radius if case is None else _radii(used, case)
     if len(used):
         for hint in table_hints(used.columns, radii):

@@ -150,6 +150,10 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
         )
     mass = _bounded(settings, "mass", settings.number("mass"), _MASS)
     centre = _place(settings, "centre_of_mass", 3, "[forward, left, height] in m")
+    if centre[2] < 0.0:
+        settings.fail(
+            f"centre_of_mass is {list(centre)!r}; its height above the ground cannot be negative"
+        )
     gravity = read_gravity(settings.take("gravity", (int, float, str), _NEEDED, "earth"), settings)
     entries = settings.table("wheels")
     wheels = {}

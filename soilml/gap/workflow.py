@@ -66,6 +66,7 @@ from soilml.gap.verdict.report_entries import (
 from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import updated_case
 from soilml.identification.compatibility import check_wheel_size
+from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.identification.free_parameters import FreeParameter
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
@@ -151,6 +152,7 @@ def gap(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
+    table = with_rover_columns(case, table)
     check_wheel_size(case, table)
     check_size(table)
     usable = table.answered

@@ -13,6 +13,7 @@ from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings, positive_std
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.data.operating_points import operating_points
+from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
@@ -27,6 +28,7 @@ USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 
 def planned_readings(case: Case, design: Table) -> StackedReadings:
     """The readings that a case expects of a design, in the channels with declared noise."""
+    design = with_rover_columns(case, design)
     check_wheel_size(case, design)
     at = operating_points(design)
     force = forces(case, at)

@@ -23,8 +23,9 @@ def with_rover_columns(case: Case, table: Table) -> Table:
     unknown = ~np.isin(names, list(case.rover.wheels))
     if unknown.any():
         row = int(np.argmax(unknown))
+        given = repr(str(names[row])) if names[row] else "the cell is blank"
         raise TableError(
-            f"{table.place(row)}, column wheel: {str(names[row])!r}; wheels of [rover] are: "
+            f"{table.place(row)}, column wheel: {given}; wheels of [rover] are: "
             f"{', '.join(case.rover.wheels)}"
         )
     columns = dict(table.columns)

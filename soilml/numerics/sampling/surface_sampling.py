@@ -40,8 +40,9 @@ SPREAD, JITTER = 1.5, 0.3
 #: Effective number of points that the final error is judged by, at least.
 FEWEST_POINTS = 8.0
 #: Largest probability of the outermost twentieth of a region: more shows that the density goes on
-#: beyond.
-MOST_AT_FACES = 1e-3
+#: beyond. The next regions then reach farther by the second value: the tail of an exponential
+#: distribution ends at seven standard deviations, that of a normal one at four.
+MOST_AT_FACES, FARTHER = 1e-3, 1.25
 #: Share of new points without a prediction above which the region has an edge that no polynomial
 #: describes.
 MOST_UNPREDICTED = 0.01
@@ -82,7 +83,7 @@ def surface_sample(
     """
     rng = np.random.default_rng(seed)
     points, predictions = [], []
-    samples, surrogate = start, None
+    samples, surrogate, reach = start, None, REACH
     for _ in range(MOST_ROUNDS):
         if samples is None:
             u = latin_hypercube(POINTS_IN_CUBE * p, p, rng)
@@ -94,7 +95,7 @@ def surface_sample(
             return None
         points.append(u[known])
         predictions.append(y[known])
-        region = Region.cube(p) if samples is None else Region.of(samples)
+        region = Region.cube(p) if samples is None else Region.of(samples, reach)
         surface, errors = _fitted(np.concatenate(points), np.concatenate(predictions), region)
         if surrogate is not None and surrogate.power == 1.0:
             if known.mean() < 1.0 - MOST_UNPREDICTED:
@@ -103,6 +104,7 @@ def surface_sample(
                 final = SurrogateDensity(density, region, surface).sample(LEAST_EFFECTIVE_SIZE)
                 if region.share_at_faces(final) <= MOST_AT_FACES:
                     return final
+                reach *= FARTHER
         found = _approached(SurrogateDensity(density, region, surface), errors, rng)
         if found is None:
             return None
@@ -113,8 +115,9 @@ def surface_sample(
 def _fitted(u: Floats, y: Floats, region: Region) -> tuple[PolynomialSurface, Floats]:
     """The surface of the degree with the least leave-one-out errors, and these errors (n, k)."""
     p, distance = u.shape[1], region.distance(u)
+    reach = max(REACH, region.half_width)
     enough = int(np.ceil(POINTS_PER_TERM * term_count(p, DEGREES[0])))
-    near = np.argsort(distance)[: max(int(np.count_nonzero(distance <= REACH)), enough)]
+    near = np.argsort(distance)[: max(int(np.count_nonzero(distance <= reach)), enough)]
     u, y = u[near], y[near]
     degrees = [d for d in DEGREES if POINTS_PER_TERM * term_count(p, d) <= len(near)]
     fits = [fit_surface(region.scaling, degree, u, y) for degree in degrees or DEGREES[:1]]

@@ -15,7 +15,7 @@ from soilml.numerics.sampling.polynomial_surface import PolynomialSurface, Scali
 
 Floats = NDArray[np.float64]
 
-#: A region ends so many standard deviations from its middle.
+#: A region ends so many standard deviations from its middle, unless the density goes on beyond.
 REACH = 4.5
 #: Most predictions that are held at once: few enough to stay in a processor's cache.
 BLOCK = 100_000
@@ -48,9 +48,9 @@ class Region:
         return Region(Scaling(np.full(p, 0.5), np.eye(p) / sqrt(12.0)), sqrt(3.0))
 
     @staticmethod
-    def of(samples: ImportanceSample) -> Region:
+    def of(samples: ImportanceSample, reach: float = REACH) -> Region:
         """The box about the middle of samples."""
-        return Region(Scaling.of(samples.u, samples.weights), REACH)
+        return Region(Scaling.of(samples.u, samples.weights), reach)
 
     def points(self, fractions: Floats) -> Floats:
         """Points (n, p) of the cube's space at fractions (n, p) of the box."""

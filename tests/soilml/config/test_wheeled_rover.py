@@ -98,6 +98,7 @@ def test_the_section_is_read_and_written_back(model_file):
         ("mass = 30", "mass = -1", "mass is -1 kg; needed is 0.01 to 100000"),
         ("[0.05, 0.0, 0.3]", "[0.05, 0.3]", r"centre_of_mass is \[0.05, 0.3\]; needed is"),
         ("[0.05, 0.0, 0.3]", "[0.05, 0.0, 300]", "lengths in m"),
+        ("[0.05, 0.0, 0.3]", "[0.05, 0.0, -0.3]", "height above the ground cannot be negative"),
         ('"mars"', '"venus"', "gravity is 'venus'; needed is a number in m/s.2, or one of earth"),
         ('"mars"', "981", "gravity is 981 m/s.2; needed is 0.01 to 30"),
         ("[0.4, 0.0] }", '[0.4, 0.0], gear = "lugged" }', "gear is 'lugged'; gears of this file"),

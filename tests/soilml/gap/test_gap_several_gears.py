@@ -5,11 +5,13 @@ import pytest
 from gap_sets import case_of
 
 from soilml import Operating, identify
+from soilml.cli.table_remarks import print_table_hints
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.gap import gap
 from soilml.gap.data.candidate_effects import candidate_effects, with_effect
 from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.design.planned_readings import planned_readings
 from soilml.gap.statistics.coordinates import (
     linearise,
     predict_readings,
@@ -196,3 +198,31 @@ def test_lugs_of_one_wheel_are_named_and_written_for_that_wheel():
 def test_two_wheels_without_a_gap():
     case = case_of(WHEELS.replace("0.12", "0.08", 1) + REST)
     assert gap(case, rows(case, slips=6)).status == "no-gap"
+
+
+ROVER = """
+[rover]
+mass = 20
+centre_of_mass = [0.0, 0.0, 0.2]
+[rover.wheels]
+nose = { position = [0.4, 0.0], gear = "smooth" }
+tail = { position = [-0.4, 0.0], gear = "lugged" }
+"""
+
+
+def test_wheels_of_a_rover_stand_for_their_gears(capsys):
+    case = case_of(WHEELS.replace("0.15", "0.05", 1) + REST + ROVER)
+    columns = dict(rows(case, loads=(20.0, 30.0), slips=4).columns)
+    own_pass = np.where(columns["gear"] == "smooth", 1.0, 2.0)
+    by_gear = Table(columns | {"pass": own_pass})
+    wheel = np.where(columns.pop("gear") == "smooth", "nose", "tail")
+    by_wheel = Table(columns | {"wheel": wheel})
+    np.testing.assert_array_equal(
+        planned_readings(case, by_gear).reading, planned_readings(case, by_wheel).reading
+    )
+    found = [gap(case, table, effects={}).soil_before for table in (by_gear, by_wheel)]
+    assert found[0] == found[1]
+    deep = by_wheel.rows(wheel == "tail")
+    deep.columns["sinkage_m"][:] = 0.1  # above the radius of the nose wheel alone
+    print_table_hints(deep, case)
+    assert "more than the radius" not in capsys.readouterr().err

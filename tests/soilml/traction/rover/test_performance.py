@@ -123,6 +123,8 @@ def test_a_column_of_wheels_stands_for_gear_and_pass(case):
     assert table["pass"].tolist() == [1.0, 2.0]
     with pytest.raises(TableError, match=r"'nose'; wheels of \[rover\] are: front-left"):
         with_rover_columns(case, measured(case, ["front-left", "nose"]))
+    with pytest.raises(TableError, match="column wheel: the cell is blank; wheels of"):
+        with_rover_columns(case, measured(case, ["front-left", ""]))
     again = replace(case, model=case.model + EFFECTS["multipass"]())
     identify(again, measured(again, list(FOUR)), None, "nonlinear")  # the effect needs the pass
 
