@@ -198,6 +198,8 @@ def _from_surface(
         part = np.random.default_rng(0).permutation(len(data.slip))[:FIRST_ROWS]
         start = _from_surface(density.of_rows(np.sort(part)))
     sample = surface_sample(density, p, start)
+    if sample is None and start is not None:  # it may have shown the wrong region
+        sample = surface_sample(density, p)
     if sample is not None and density.linearise_input_noise(sample):
         sample = surface_sample(density, p, sample)
     return sample
