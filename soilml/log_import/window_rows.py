@@ -115,8 +115,9 @@ def _exact_speeds(
     ground = (
         places[ground_role][rows] if ground_is_place else _rate(inputs, "ground_speed", rows, n)
     )
+    interval = max(inputs.intervals.get(role, 0.0) for role in (rim_role, ground_role))
     _, error, rim_rate, ground_rate = travel_ratio(
-        inputs.step, scale * rim, ground, rim_is_place, ground_is_place
+        inputs.step, scale * rim, ground, rim_is_place, ground_is_place, interval
     )
     if np.isfinite(rim_rate) and np.isfinite(ground_rate):
         means[rate_key], means["ground_speed"] = rim_rate / scale, ground_rate

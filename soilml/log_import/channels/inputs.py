@@ -41,6 +41,8 @@ class Inputs:
     places
         Roles that were given as angle or place, of which `values` has the rates under
         `wheel_speed` and `ground_speed`; here as they were given.
+    intervals
+        Sampling interval of the places in the log, s, by role; on the grid they are interpolated.
     constants
         Roles that do not vary, with their value.
     rest
@@ -54,6 +56,7 @@ class Inputs:
     time: Floats
     values: dict[str, Floats] = field(default_factory=dict)
     places: dict[str, Floats] = field(default_factory=dict)
+    intervals: dict[str, float] = field(default_factory=dict)
     constants: dict[str, float] = field(default_factory=dict)
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
     tare_error: dict[str, float] = field(default_factory=dict)
@@ -98,6 +101,8 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         channel = wheel.channels[role]
         if channel.unwrap:
             several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
+        if role in _PLACES:
+            inputs.intervals[role] = max(sampling_interval(t, v) for t, v in several)
         sampled = [on_grid(grid, t, v, continuous=role in _PLACES) for t, v in several]
         _add(inputs, channel, sampled)
     _tare(inputs, wheel)

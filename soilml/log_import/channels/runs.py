@@ -203,6 +203,16 @@ def _increasing(clock: Floats) -> NDArray[np.bool_]:
     return np.asarray(filled > before)
 
 
+def alike_structs(recordings: Sequence[Recording]) -> list[int]:
+    """Places of the recordings of a file that have the same columns as others; most of a kind."""
+    kinds: dict[frozenset[str], list[int]] = {}
+    for i, recording in enumerate(recordings):
+        if recording.name:
+            kinds.setdefault(frozenset(recording.columns), []).append(i)
+    most = max(kinds.values(), key=len, default=[])
+    return most if len(most) > 1 else []
+
+
 def _divided(
     name: str, members: Sequence[Member], log_map: LogMap
 ) -> list[tuple[str, list[Member]]]:
@@ -218,6 +228,17 @@ def _divided(
             raise InputError(f"[runs] column: {_missing(recordings, column)}")
         own = recordings[at[0]]
         labels = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
+    elif log_map.each_struct:
+        alike = alike_structs([recording for recording, _ in members])
+        if not alike:
+            raise InputError(
+                f"[runs] each_struct: {members[0][0].file} has no two structs with the same columns"
+            )
+        shared = [m for i, m in enumerate(members) if i not in alike]
+        return [
+            (f"{name}_{members[i][0].name.rpartition('.')[2]}", [members[i], *shared])
+            for i in alike
+        ]
     elif log_map.split_at_reset:
         at = [0]
         clock = _clock(members[0][0], log_map, members[0][1])

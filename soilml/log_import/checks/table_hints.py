@@ -146,9 +146,10 @@ def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Itera
         )
     slip = columns.get("slip")
     if slip is not None and known.sum() >= 4 and np.ptp(slip[known]) > 0.2:
-        order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.02 else 0.0
-        if order < -0.8 and float(np.median(ratio[slip[known] > 0.2], axis=0)) < -0.05:
-            yield "drawbar pull falls as slip grows, and is below zero: probably its sign is turned"
+        # at large slip a pull may fall, but not from small slip on
+        order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.05 else 0.0
+        if order < -0.8 and float(np.min(slip[known])) < 0.25:
+            yield "drawbar pull falls as slip grows: probably its sign is turned"
 
 
 def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:

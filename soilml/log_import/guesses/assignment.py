@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from soilml.log_import.guesses.axes import axes_of
 from soilml.log_import.guesses.candidates import Candidate
 from soilml.log_import.guesses.column_words import WHEEL_WORDS, wheel_word, words_of
 
@@ -26,11 +27,12 @@ _SIDES = {"fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "rig
 
 @dataclass
 class Assignment:
-    """Columns by role: shared ones, those of each wheel, and the runners-up."""
+    """Columns by role: shared ones, those of each wheel, the runners-up, and y, z of the place."""
 
     shared: dict[str, Candidate] = field(default_factory=dict)
     wheels: dict[str, dict[str, Candidate]] = field(default_factory=dict)
     others: dict[str, list[Candidate]] = field(default_factory=dict)
+    axes: list[Candidate] = field(default_factory=list)
 
     def roles(self) -> set[str]:
         """All roles that have a column."""
@@ -49,7 +51,9 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         ),
         key=lambda p: (-p[0], -p[1]),
     )
-    taken: set[str] = set()
+    place = next((c for _, _, role, c in pairs if role == "position"), None)
+    found.axes = axes_of(place, candidates)[1:] if place is not None else []
+    taken = {candidate.address for candidate in found.axes}
     for _, _, role, candidate in pairs:
         if candidate.address in taken:
             continue
@@ -65,6 +69,8 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         for role in present:
             if role != best:
                 found.others.setdefault(role, []).insert(0, found.shared.pop(role))
+    if "position" not in found.shared or found.shared["position"] is not place:
+        found.axes = []
     _take_wheels(found)
     if {"wheel_speed", "wheel_angle", "rim_speed"} & found.roles() and (
         {"ground_speed", "position"} & found.roles()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
 from soilml.log_import.guesses.column_words import name_scores, words_of
 from soilml.log_import.mapping.channel import ROLES
@@ -104,6 +105,8 @@ def _score(
     if role == "load" and own.middle != 0.0:
         steady = abs(own.high - own.low) < 1.5 * abs(own.middle)
         score += 1.0 if steady else -0.5
+    if role == "drawbar_pull" and abs(own.high - own.low) < 0.3 * abs(own.middle):
+        score -= 1.5  # a pull varies with slip
     if role == "slip" and kind is None and own.size > 150.0:
         score -= 4.0
     if role == "time" or words_of(name)[:1] == ["std"]:
@@ -122,3 +125,21 @@ def _unit_suffices(role: str, kind: str) -> bool:
         ("load", "N"),
         ("wheel_angle", "count"),
     )
+
+
+def liveliest(runs: Sequence[Run]) -> Run:
+    """The run with the most columns that vary: one in which no sensor is dead."""
+    return max(
+        runs,
+        key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings)),
+    )
+
+
+def describe(columns: Sequence[Candidate]) -> list[str]:
+    """A line for each column: its name, unit and range."""
+    width = max((len(c.address) for c in columns), default=0)
+    return [
+        f"{c.address:<{min(width, 44)}}  {c.unit or '-':<7} {c.about.low:>11.5g} .. "
+        f"{c.about.high:<11.5g}" + (" constant" if c.about.constant else "")
+        for c in columns
+    ]

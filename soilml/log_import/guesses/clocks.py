@@ -7,9 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from soilml.errors import InputError
+from soilml.log_import.channels.runs import alike_structs
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.candidates import candidates_of
-from soilml.log_import.guesses.column_words import name_scores
+from soilml.log_import.guesses.column_words import WHEEL_WORDS, name_scores, words_of
 from soilml.log_import.recording import Recording
 
 #: Lowest score of a clock, and most runs of one file.
@@ -46,6 +48,19 @@ def guess_run_column(recordings: Sequence[Recording]) -> tuple[str, int]:
     return "", 0
 
 
+def structs_are_runs(recordings: Sequence[Recording], clock: str) -> int:
+    """How many structs of a file have the same columns and clock, and are not one for each wheel.
+
+    `test_1`, `test_2` are runs; `front_left`, `front_right` and `wheel_1`, `wheel_2` are wheels.
+    """
+    alike = [recordings[i] for i in alike_structs(recordings)]
+    if not alike or any(r.clock is not None or clock not in r.columns for r in alike):
+        return 0
+    words = {word for r in alike for word in words_of(r.name)}
+    sides = {word for word in words if word in WHEEL_WORDS and not word.isdigit()}
+    return 0 if sides or words & {"wheel", "motor", "drive", "axle"} else len(alike)
+
+
 def restarts(recordings: Sequence[Recording], column: str) -> int:
     """How often the clock starts again from its beginning."""
     for recording in recordings:
@@ -55,3 +70,14 @@ def restarts(recordings: Sequence[Recording], column: str) -> int:
             back = steps < -0.2 * np.nanmax(np.abs(values - values[0]))
             return int(back.sum()) if back.sum() == np.sum(steps < 0.0) else 0
     return 0
+
+
+def refuse_a_table_of_runs(log: Sequence[Recording]) -> None:
+    """Raise `InputError` for a table whose rows are means already."""
+    for recording in log:
+        held = {*recording.columns, *recording.texts}
+        if {"run", "slip", "load_N"} <= held and not {"time", "t"} & held:
+            raise InputError(
+                f"{recording.file} is a table of runs already, with one row for each operating "
+                "point: give it to `soilml identify`, `estimate` or `gap` as it is"
+            )

@@ -15,6 +15,7 @@ WHEEL_WORDS = (
     *("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back"),
     *"12345678",
 )
+_PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -39,10 +40,12 @@ def _patterns() -> dict[str, list[tuple[float, re.Pattern[str]]]]:
 
 def name_scores(name: str) -> dict[str, float]:
     """How well a name fits each role; roles that it does not fit are left out."""
-    text = " ".join(words_of(name))
+    words = words_of(name)
+    # "velocity front left wheel" is a velocity of a wheel: words of the place stand between
+    texts = {" ".join(words), " ".join(word for word in words if word not in _PLACES)}
     scores = {}
     for role, patterns in _patterns().items():
-        fits = [weight for weight, pattern in patterns if pattern.search(text)]
+        fits = [w for w, pattern in patterns if any(pattern.search(text) for text in texts)]
         best = max([w for w in fits if w > 0], default=0.0)
         if best:
             scores[role] = best + sum(w for w in fits if w < 0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import SoilmlError
-from soilml.log_import.channels.inputs import Inputs, wheel_inputs
+from soilml.log_import.channels.inputs import Inputs, resting, wheel_inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.candidates import Candidate
 from soilml.log_import.guesses.unit_guess import guess_rotation_unit, guess_unit
@@ -22,7 +22,7 @@ from soilml.log_import.units.conversion import dimension
 from soilml.log_import.units.uncertain_value import Uncertain
 
 #: Share of the reading while driving from which a reading at rest is an offset.
-_OFFSET = 0.03
+_OFFSET = 0.01
 #: Roles that read zero while a wheel rests.
 ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
 
@@ -41,28 +41,65 @@ class Draft:
         if why:
             self.comments[key] = why
 
+    def without(self, shared: Draft) -> Draft:
+        """The keys that are not in another draft."""
+        return Draft({k: v for k, v in self.keys.items() if k not in shared.keys}, self.comments)
+
+
+def keys_alike(wheels: Sequence[dict[str, Draft]]) -> dict[str, Draft]:
+    """The keys that all wheels share, by role, with the comments of the first wheel."""
+    return {
+        role: Draft(
+            {
+                key: value
+                for key, value in first.keys.items()
+                if all(key in w[role].keys and w[role].keys[key] == value for w in wheels)
+            },
+            first.comments,
+        )
+        for role, first in (wheels[0] if wheels else {}).items()
+    }
+
 
 def draft_channels(
-    chosen: dict[str, Candidate], run: Run, stated: dict[str, tuple[str, str]]
+    chosen: dict[str, Candidate],
+    run: Run,
+    stated: dict[str, tuple[str, str]],
+    axes: Sequence[Candidate] = (),
 ) -> dict[str, Draft]:
-    """Tables of the channels of one wheel, with units, signs and tares as the samples show them."""
-    drafts = {role: _draft(role, column, run, stated) for role, column in chosen.items()}
+    """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
+
+    `axes` are the columns of y and z, where the chosen place is x.
+    """
+    drafts = {
+        role: _draft(role, column, run, stated, axes if role == "position" else ())
+        for role, column in chosen.items()
+    }
     _rotation_unit(drafts, stated)
     inputs = inputs_of(drafts, run)
     if inputs is not None:
         _signs(drafts, inputs)
+        _sign_of_pull(drafts, inputs)
         _tares(drafts, inputs)
+        _lifted(drafts, inputs)
     return drafts
 
 
-def _draft(role: str, column: Candidate, run: Run, stated: dict[str, tuple[str, str]]) -> Draft:
+def _draft(
+    role: str,
+    column: Candidate,
+    run: Run,
+    stated: dict[str, tuple[str, str]],
+    axes: Sequence[Candidate],
+) -> Draft:
     draft = Draft(column=column)
-    draft.put("column", column.address)
+    draft.put("column", [c.address for c in (column, *axes)] if axes else column.address)
     _, values = run.find(column.address)
     known = values[np.isfinite(values)]
     moving = float(np.percentile(np.abs(known), 90)) if known.size else 0.0
     if role in ("position", "wheel_angle", "sinkage") and known.size:
-        moving = float(np.ptp(known))
+        moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
+                     (run.find(c.address)[1] for c in (column, *axes)))  # fmt: skip
     unit, why = guess_unit(role, column, moving)
     if dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
@@ -170,17 +207,38 @@ def _signs(drafts: dict[str, Draft], inputs: Inputs) -> None:
             middle = float(np.nanmedian(inputs.values[key][moving]))
             if middle < 0.0:
                 drafts[role].put("reverse", True, "it is negative in the log; forward is positive")
-    for role in ("torque", "motor_current", "load"):
+    for role in ("torque", "motor_current", "load", "sinkage"):
         if role not in inputs.values or role not in drafts:
             continue
         values = inputs.values[role]
         driving = float(np.nanmedian(values[moving]))
-        if role != "load":
+        if role not in ("load", "sinkage"):
             driving -= np.nan_to_num(inputs.rest.get(role, (0.0, 0.0))[0])
         scatter = float(np.nanstd(values[moving]))
         if driving < -0.5 * scatter:
-            why = "a load is positive" if role == "load" else "positive where it drives forward"
+            why = {"load": "a load is positive", "sinkage": "sinkage is positive"}.get(
+                role, "positive where it drives forward"
+            )
             drafts[role].put("reverse", True, f"it is negative in the log; {why}")
+
+
+def _sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Turn a pull that falls where the torque rises."""
+    if not {"torque", "drawbar_pull"} <= drafts.keys() & inputs.values.keys():
+        return
+    torque, pull = inputs.values["torque"], inputs.values["drawbar_pull"]
+    kept = np.flatnonzero(_moving(inputs) & np.isfinite(torque) & np.isfinite(pull))
+    width = max(1, round(1.0 / inputs.step))
+    count = kept.size // width
+    if count < 6:
+        return
+    blocks = kept[: count * width].reshape(count, width)
+    means = np.stack([torque[blocks].mean(axis=1), pull[blocks].mean(axis=1)])
+    if np.ptp(means, axis=1).min() > 0.0:
+        sign = -1.0 if drafts["torque"].keys.get("reverse") else 1.0
+        if sign * float(np.corrcoef(means)[0, 1]) < -0.8:
+            why = "it falls in the log where the torque rises"
+            drafts["drawbar_pull"].put("reverse", True, why)
 
 
 def _tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
@@ -200,6 +258,27 @@ def _tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
             )  # fmt: skip
 
 
+def _lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Tare a load where the log starts with the wheel above the ground and reads an offset."""
+    rest = resting(inputs)
+    if rest is None or "load" not in inputs.values or "load" not in drafts:
+        return
+    values, shortest = inputs.values["load"][rest], round(0.4 / inputs.step)
+    driving = float(np.nanmedian(inputs.values["load"][_moving(inputs)]))
+    first = float(np.nanmedian(values[:shortest])) if values.size >= shortest > 0 else math.nan
+    if not _OFFSET * abs(driving) < abs(first) < 0.6 * abs(driving):
+        return
+    landed = np.abs(values - first) > 0.25 * abs(driving - first)
+    end = int(np.argmax(landed)) if landed.any() else values.size
+    if end < shortest:
+        return
+    start, stop = float(inputs.time[0]), float(inputs.time[0] + 0.8 * end * inputs.step)
+    drafts["load"].put(
+        "tare", [round(start, 2), round(stop, 2)], f"CHANGE: from, until, s; it reads {first:.3g} "
+        f"there and {driving:.3g} while driving: right if the wheel was above the ground"
+    )  # fmt: skip
+
+
 def fastest_ratio(inputs: Inputs) -> float:
     """Largest ratio of travel (m/s) to rotation (rad/s, or rim speed), of means over a second."""
     rotation = inputs.values.get("rim_speed", inputs.values.get("wheel_speed"))
@@ -215,13 +294,3 @@ def fastest_ratio(inputs: Inputs) -> float:
     blocks = kept[: count * width].reshape(count, width)
     ratios = np.abs(ground[blocks].mean(axis=1)) / np.abs(rotation[blocks].mean(axis=1))
     return float(np.percentile(ratios, 95))
-
-
-def describe(columns: Sequence[Candidate]) -> list[str]:
-    """A line for each column: its name, unit and range."""
-    width = max((len(c.address) for c in columns), default=0)
-    return [
-        f"{c.address:<{min(width, 44)}}  {c.unit or '-':<7} {c.about.low:>11.5g} .. "
-        f"{c.about.high:<11.5g}" + (" constant" if c.about.constant else "")
-        for c in columns
-    ]

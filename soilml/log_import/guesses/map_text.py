@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from soilml.errors import InputError
-from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
+from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.assignment import Assignment, assign, axle_of
-from soilml.log_import.guesses.candidates import Candidate, candidates_of
-from soilml.log_import.guesses.clocks import guess_clock, guess_run_column, restarts
+from soilml.log_import.guesses.candidates import Candidate, candidates_of, describe, liveliest
+from soilml.log_import.guesses.clocks import (
+    guess_clock,
+    guess_run_column,
+    refuse_a_table_of_runs,
+    restarts,
+    structs_are_runs,
+)
+from soilml.log_import.guesses.column_words import words_of
 from soilml.log_import.guesses.draft import (
     Draft,
-    describe,
     draft_channels,
     fastest_ratio,
     inputs_of,
+    keys_alike,
 )
 from soilml.log_import.guesses.file_kinds import clocks_differ, guess_file_kinds
 from soilml.log_import.guesses.stated_constants import number_in_names, stated_constants
+from soilml.log_import.guesses.toml_value import toml_value
 from soilml.log_import.guesses.windows_guess import guess_windows
 from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
@@ -60,14 +64,16 @@ class _MapText:
         self.time_column, self.time_unit = guess_clock(first)
         self.run_column, self.run_count = guess_run_column(logs[0])
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
-        _refuse_a_table_of_runs(logs[0], self.time_column)
+        self.structs = structs_are_runs(logs[0], self.time_column)
+        for log in logs:
+            refuse_a_table_of_runs(log)
         self.stated = stated_constants([line for recording in first for line in recording.about])
         self.rate = 0.0
         if not self.time_column and all(recording.clock is None for recording in first):
             self.rate = float(self.stated.get("rate", ("100", ""))[0].split()[0])
         self.kinds = self._with_clocks(guess_file_kinds(logs))
         self.runs = runs_of(logs, self._map(self.kinds))
-        self.run = _liveliest(self.runs[:_LOOKED])
+        self.run = liveliest(self.runs[:_LOOKED])
         clocks = {self.time_column, *(kind.time_column for kind in self.kinds)}
         self.columns = [c for c in candidates_of(self.run.recordings) if c.name not in clocks]
         self.found: Assignment = assign(self.columns)
@@ -82,7 +88,8 @@ class _MapText:
             self.time_unit,
             self.rate,
             self.run_column,
-            self.restarts > 0,
+            self.restarts > 0 and not self.structs,
+            self.structs > 0,
         )
 
     def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
@@ -107,7 +114,7 @@ class _MapText:
         lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
         drafts = {
-            name: draft_channels(self.found.shared | own, self.run, self.stated)
+            name: draft_channels(self.found.shared | own, self.run, self.stated, self.found.axes)
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
@@ -118,12 +125,17 @@ class _MapText:
                 lines += self._channel(f"[{role}]", role, first[role])
             elif role not in self.found.roles():
                 lines += self._absent(role)
+        of_wheels = self.found.wheels.items()
+        alike = keys_alike([{role: drafts[name][role] for role in own} for name, own in of_wheels])
+        for role, draft in alike.items():
+            lines += self._channel(f"[{role}]", role, draft, "; each wheel has a column of its own")
         for name, own in self.found.wheels.items():
             lines += ["", f"[wheels.{name}]"]
             if axle := axle_of(name):
                 lines.append(f'axle = "{axle}"')
             for role in own:
-                lines += self._channel(f"[wheels.{name}.{role}]", role, drafts[name][role])
+                draft = drafts[name][role].without(alike[role])
+                lines += self._table(f"[wheels.{name}.{role}]", role, draft)
         lines += guess_windows(self.runs, first)
         return "\n".join(lines) + "\n"
 
@@ -147,19 +159,19 @@ class _MapText:
     def _files(self) -> list[str]:
         lines = []
         for kind in self.kinds:
-            lines += ["", f"[files.{kind.name}]", f"pattern = {_toml(kind.pattern)}"]
+            lines += ["", f"[files.{kind.name}]", f"pattern = {toml_value(kind.pattern)}"]
             why = "their clocks share no time: each starts at 0" if kind.clock == "start" else (
                 "times can be compared; 'start' where each clock starts at 0"
             )  # fmt: skip
             lines.append(f'clock = "{kind.clock}"  # {why}')
             if kind.time_column:
-                lines.append(f"time = {_toml(kind.time_column)}")
-                lines.append(f"time_unit = {_toml(kind.time_unit)}")
+                lines.append(f"time = {toml_value(kind.time_column)}")
+                lines.append(f"time_unit = {toml_value(kind.time_unit)}")
         return lines
 
     def _time_lines(self) -> list[str]:
         if self.time_column:
-            column, unit = _toml(self.time_column), _toml(self.time_unit)
+            column, unit = toml_value(self.time_column), toml_value(self.time_unit)
             return ["", "[time]", f"column = {column}", f"unit = {unit}"]
         if not self.rate:
             return ["", "# Time comes from the messages."]
@@ -168,8 +180,10 @@ class _MapText:
 
     def _run_lines(self) -> list[str]:
         if self.run_column:
-            column = _toml(self.run_column)
+            column = toml_value(self.run_column)
             return ["", "[runs]", f"column = {column}  # {self.run_count} values, one run each"]
+        if self.structs:
+            return ["", "[runs]", f"each_struct = true  # {self.structs} with the same columns"]
         if self.restarts:
             why = f"the time starts again {self.restarts} times"
             return ["", "[runs]", f"split_where_time_restarts = true  # {why}"]
@@ -212,8 +226,8 @@ class _MapText:
             return [
                 "",
                 "[load]",
-                f"file_name = {_toml(pattern)}  # the names say {shown}",
-                f"unit = {_toml(unit)}",
+                f"file_name = {toml_value(pattern)}  # the names say {shown}",
+                f"unit = {toml_value(unit)}",
             ]
         count = max(1, len(self.found.wheels))
         mass = self.stated.get("mass", ("", ""))[0]
@@ -227,14 +241,18 @@ class _MapText:
             f"# wheels = {count}",
         ]
 
-    def _channel(self, header: str, role: str, draft: Draft) -> list[str]:
-        lines = ["", f"{header}  # {ROLES[role][1]}"]
+    def _table(self, header: str, role: str, draft: Draft) -> list[str]:
+        lines = ["", header]
         for key, value in draft.keys.items():
             comment = draft.comments.get(key, "")
-            lines.append(f"{key} = {_toml(value)}" + (f"  # {comment}" if comment else ""))
+            lines.append(f"{key} = {toml_value(value)}" + (f"  # {comment}" if comment else ""))
         others = [c.address for c in self.found.others.get(role, [])[:4]]
-        if others:
+        if others and "column" in draft.keys:
             lines.append(f"# or: {', '.join(others)}")
+        return lines
+
+    def _channel(self, header: str, role: str, draft: Draft, more: str = "") -> list[str]:
+        lines = self._table(f"{header}  # {ROLES[role][1]}{more}", role, draft)
         if role in ("torque", "load", "drawbar_pull", "position", "ground_speed", "rim_speed"):
             share = {"torque": "2 %", "load": "1 %"}.get(role)
             if share:
@@ -249,9 +267,19 @@ class _MapText:
                 return [
                     "",
                     "[slip]",
-                    f"file_name = {_toml(in_name[0])}",
-                    f"unit = {_toml(in_name[1])}",
+                    f"file_name = {toml_value(in_name[0])}",
+                    f"unit = {toml_value(in_name[1])}",
                 ]
+        rotation = {"wheel_speed", "wheel_angle", "rim_speed", "slip"} & self.found.roles()
+        if role == "wheel_speed" and not rotation and not others:
+            commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
+            return [
+                "",
+                "# NEEDED: no column is the rotation of the wheel. One of these:",
+                "# [wheel_angle]",
+                "# [wheel_speed]",
+                *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
+            ]
         if role == "ground_speed" and not ({"position", "slip"} & self.found.roles() or others):
             return [
                 "",
@@ -260,34 +288,6 @@ class _MapText:
                 '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
             ]
         if others:
-            return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {_toml(others[0].address)}"]
+            column = toml_value(others[0].address)
+            return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {column}"]
         return []
-
-
-def _refuse_a_table_of_runs(log: Sequence[Recording], clock: str) -> None:
-    """Raise `InputError` for a table whose rows are means already."""
-    for recording in log:
-        held = {*recording.columns, *recording.texts}
-        if {"run", "slip", "load_N"} <= held and not clock and recording.clock is None:
-            raise InputError(
-                f"{recording.file} is a table of runs already, with one row for each operating "
-                "point: give it to `soilml identify`, `estimate` or `gap` as it is"
-            )
-
-
-def _liveliest(runs: Sequence[Run]) -> Run:
-    """The run with the most columns that vary: one in which no sensor is dead."""
-    return max(
-        runs,
-        key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings)),
-    )
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float | int | np.number):
-        return f"{float(value):g}" if float(value) != int(value) else f"{int(value)}"
-    if isinstance(value, str) and "\\" in value and "'" not in value:
-        return f"'{value}'"
-    return json.dumps(value, ensure_ascii=False)

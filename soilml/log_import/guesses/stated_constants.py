@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 from soilml.log_import.units.conversion import dimension
 
-_VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ]\s*([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
-_UNIT_BEFORE = re.compile(r"[\[(]\s*([^\])]*)\s*[\])]")
+_VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ][:=,;\s]*"
+_VALUE += r"([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
+_UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
-    "radius": (r"(?:wheel[ _]?)?(?:radius|radius[ _]wheel|wheel[ _]r)", "m"),
-    "diameter": (r"(?:wheel[ _]?)?(?:diameter|durchmesser)", "m"),
+    "radius": (r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r)", "m"),
+    "diameter": (r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser)", "m"),
     "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
     "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
     "torque_constant": (r"(?:torque[ _]?const\w*|kt|k_t|km)", "N m/A"),
@@ -38,12 +39,15 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
         for name, (words, ours) in _STATED.items():
             if name in found:
                 continue
-            match = re.search(rf"\b{words}\b{_VALUE}", line, re.IGNORECASE)
+            match = re.search(rf"\b{words}(?:_(?:mm|cm|m|kg|n))?\b{_VALUE}", line, re.IGNORECASE)
             if match is None:
                 continue
             number, unit = match[1].replace(",", "."), match[2].strip()
-            if not unit and (before := _UNIT_BEFORE.search(line[: match.start(1)])):
-                unit = before[1]
+            inverse = re.match(r"\s*[:/]\s*(\d+(?:[.,]\d+)?)", line[match.end(1) :])
+            if name == "gear_ratio" and float(number) == 1.0 and inverse:  # 1:64
+                number = inverse[1].replace(",", ".")
+            if not unit and (before := _UNIT_BEFORE.search(line[match.start() : match.start(1)])):
+                unit = before[1] or before[2]
             if ours == "Hz":
                 found[name] = (f"{number} Hz", line)
             elif unit and dimension(unit) in (ours, "1" if ours == "1" else ours):

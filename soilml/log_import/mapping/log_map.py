@@ -9,6 +9,7 @@ from typing import Any
 
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.log_import.mapping.channel import ROLES, Channel, take_channel
+from soilml.log_import.mapping.wheel_tables import shared_keys, with_shared_keys
 from soilml.log_import.units.uncertain_value import Uncertain, take_uncertain
 
 _ZERO = Uncertain(0.0)
@@ -89,6 +90,7 @@ class LogMap:
     rate: float = 0.0
     run_column: str = ""
     split_at_reset: bool = False
+    each_struct: bool = False
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
@@ -121,6 +123,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     runs = settings.table("runs")
     run_column = runs.text("column", "")
     at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
+    each_struct = bool(runs.take("each_struct", bool, "true or false", False))
     runs.finish()
     vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
     shared_wheel = settings.table("wheel")
@@ -128,11 +131,13 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     gear = shared_wheel.text("gear", "")
     shared_wheel.finish()
     named = settings.table("wheels")
+    defaults = shared_keys(settings, named.content)
     shared = _take_channels(settings)
     wheels = []
     for name in named.content:
+        content = named.take(name, dict, f"a table [wheels.{name}]")
         own = Settings(
-            named.take(name, dict, f"a table [wheels.{name}]"),
+            with_shared_keys(content, defaults),
             f"{settings.where} [wheels.{name}]",
             settings.folder,
         )
@@ -159,6 +164,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         rate,
         run_column,
         at_reset,
+        each_struct,
         vehicle,
         _take_windows(settings.table("windows")),
         tuple(_take_left_out(entry) for entry in settings.tables("leave_out")),

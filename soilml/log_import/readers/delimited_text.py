@@ -17,6 +17,8 @@ from soilml.log_import.recording import Floats, Recording
 
 #: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
 _LOOKED, _NUMBERS = 300, 0.5
+_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
+_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?")
 
 
@@ -101,6 +103,7 @@ def _columns(
 
 def as_numbers(cells: list[str], decimal_comma: bool = False) -> tuple[Floats, int]:
     """The cells as numbers, NaN where they are none, and how many are numbers."""
+    cells = without_thousands(cells, decimal_comma)
     if decimal_comma:
         cells = [cell.replace(",", ".") for cell in cells]
     try:
@@ -109,6 +112,15 @@ def as_numbers(cells: list[str], decimal_comma: bool = False) -> tuple[Floats, i
         values = np.array([_number(cell) for cell in cells], dtype=np.float64)
     values[~np.isfinite(values)] = np.nan
     return values, int(np.isfinite(values).sum())
+
+
+def without_thousands(cells: list[str], decimal_comma: bool) -> list[str]:
+    """The cells with 12,345.6 (or 12.345,6) as 12345.6, where all marks are of that kind."""
+    mark, pattern = (".", _DOTS) if decimal_comma else (",", _COMMAS)
+    marked = [cell for cell in cells if mark in cell]
+    if not marked or not all(pattern.fullmatch(cell.strip().strip('"')) for cell in marked):
+        return cells
+    return [cell.replace(mark, "").strip('"') for cell in cells]
 
 
 def _number(cell: str) -> float:

@@ -34,6 +34,9 @@ MISSING = frozenset(
 COMMENTS = ("#", "%", "//", ";;")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?")
+#: Thousands that cannot be taken for decimals: both marks, or two groups.
+_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}")
+_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
@@ -94,7 +97,9 @@ def is_number(cell: str, decimal_comma: bool = False) -> bool:
     text = cell.strip()
     if text.lower() in MISSING or _NUMBER.fullmatch(text):
         return True
-    return decimal_comma and bool(_COMMA_NUMBER.fullmatch(text))
+    if decimal_comma:
+        return bool(_COMMA_NUMBER.fullmatch(text) or _DOTS.fullmatch(text))
+    return bool(_COMMAS.fullmatch(text))
 
 
 def name_and_unit(cell: str) -> tuple[str, str]:

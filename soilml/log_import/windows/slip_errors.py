@@ -15,12 +15,18 @@ _NOISY = -0.2
 
 
 def travel_ratio(
-    step: float, rim: Floats, ground: Floats, rim_is_place: bool, ground_is_place: bool
+    step: float,
+    rim: Floats,
+    ground: Floats,
+    rim_is_place: bool,
+    ground_is_place: bool,
+    interval: float = 0.0,
 ) -> tuple[float, float, float, float]:
     r"""Ratio k of travel to rim displacement, its standard error, and both mean speeds, m/s.
 
     `rim` and `ground` (n,) are speeds in m/s, or places in m. The mean speed of a place is the
-    slope of its least-squares line.
+    slope of its least-squares line. `interval` is the sampling interval of the slower place, s,
+    where it is interpolated to the step.
 
     What the two differ by, :math:`E = x - k R`, wanders by real fluctuations of slip and is
     blurred by noise of the places. Its rates from part to part of the window have a long-run
@@ -44,7 +50,8 @@ def travel_ratio(
     difference = _as_place(ground, ground_is_place, step) - ratio * _as_place(
         rim, rim_is_place, step
     )
-    return ratio, _slope_error(time[both], difference[both]) / abs(rim_rate), rim_rate, rate
+    error = _slope_error(time[both], difference[both], interval)
+    return ratio, error / abs(rim_rate), rim_rate, rate
 
 
 def _as_place(values: Floats, is_place: bool, step: float) -> Floats:
@@ -59,11 +66,15 @@ def _slope(time: Floats, values: Floats) -> float:
     return float(centred @ values / (centred @ centred))
 
 
-def _slope_error(time: Floats, difference: Floats) -> float:
+def _slope_error(time: Floats, difference: Floats, interval: float) -> float:
     """Standard error of the mean rate of a place that wanders and is noisy, m/s."""
     span = float(time[-1] - time[0])
     residual = difference - difference.mean() - _slope(time, difference) * (time - time.mean())
-    rates, length = _rates(residual, span, min(_FINE, residual.size // 2))
+    fine = min(_FINE, residual.size // 2)
+    if interval > 0.0:
+        # between two samples a place is a straight line, in which noise looks like real motion
+        fine = max(min(fine, int(span / (2.0 * interval))), min(_COARSE[0], fine))
+    rates, length = _rates(residual, span, fine)
     size, neighbours = _two_correlations(rates)
     if neighbours > _NOISY * size:
         tau, last = time_and_window(rates)

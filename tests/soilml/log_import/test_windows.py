@@ -69,16 +69,23 @@ def test_the_autocorrelation_time_is_that_of_the_process():
     assert autocorrelation_time(np.random.default_rng(8).standard_normal(20000)) < 1.2
 
 
-@pytest.mark.parametrize("blur", [0.0, 0.0005, 0.003])
-def test_slip_from_places_is_calibrated(blur):
-    """Places in m with white noise, rotation exact, slip that wanders by 0.02."""
+@pytest.mark.parametrize("blur, interval", [(0.0, 0), (0.0005, 0), (0.003, 0), (0.003, 0.2)])
+def test_slip_from_places_is_calibrated(blur, interval):
+    """Places in m with white noise, rotation exact, slip that wanders by 0.02.
+
+    With `interval`, places come at 5 Hz and are interpolated: noise is no motion between them.
+    """
     rng = np.random.default_rng(9)
     n, step, scores = 800, 0.02, []
     for _ in range(200):
         speed = 0.05 * (0.7 - wandering(rng, n, step, 0.02, 0.2))
         place = np.cumsum(speed) * step + blur * rng.standard_normal(n)
+        if interval:
+            time = step * np.arange(n)
+            seen = slice(None, None, round(interval / step))
+            place = np.interp(time, time[seen], place[seen])
         rim = 0.05 * step * np.arange(1, n + 1)
-        ratio, error, rim_rate, rate = travel_ratio(step, rim, place, True, True)
+        ratio, error, rim_rate, rate = travel_ratio(step, rim, place, True, True, interval)
         scores.append((ratio - 0.7) / error)
     assert rim_rate == pytest.approx(0.05) and rate == pytest.approx(0.035, rel=0.1)
     assert np.mean(np.abs(scores) < 1.645) == pytest.approx(0.90, abs=0.09)

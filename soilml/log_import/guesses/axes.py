@@ -1,0 +1,31 @@
+"""The columns of a place in x, y and z, found by the name of one of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from soilml.log_import.guesses.candidates import Candidate
+
+_X = re.compile(r"[xX]")
+
+
+def axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The columns of x, y and, where there is one, z, of which `column` is x; else only itself.
+
+    A rover drives in any direction, so that x alone is a share of its travel. Without y, z is no
+    part of the place: it may be the sinkage of a gantry.
+    """
+    known = {candidate.address: candidate for candidate in candidates}
+    for match in reversed(list(_X.finditer(column.address))):
+        others = []
+        for letter in "yz":
+            own = letter if match[0] == "x" else letter.upper()
+            address = column.address[: match.start()] + own + column.address[match.end() :]
+            if address in known and not known[address].about.constant:
+                others.append(known[address])
+            elif letter == "y":
+                break
+        if others:
+            return [column, *others]
+    return [column]
