@@ -69,10 +69,10 @@ bench-gap: $(VENV)/.ready ## 182 sets with hidden effects against gates and base
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --write
 
 fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make fuzz FUZZ_SECONDS=3600
-	@$(BIN)/python tests/fuzz/run.py --seconds $(or $(FUZZ_SECONDS),3600)
+	@$(BIN)/python tests/fuzz/fuzz_run.py --seconds $(or $(FUZZ_SECONDS),3600)
 
 faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
-	@$(BIN)/python tests/faults/run.py --kills $(or $(FAULT_KILLS),200)
+	@$(BIN)/python tests/faults/fault_run.py --kills $(or $(FAULT_KILLS),200)
 
 bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
 	@$(BIN)/python bench/bounds.py

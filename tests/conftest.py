@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,8 @@ from filelock import FileLock
 from scipy.stats import qmc
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a job in the background of a shell
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # processes of tests are interrupted
 sys.path.insert(0, str(Path(__file__).parent))
 
 from compiled_c_fixtures import compiled as compiled

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from run import CORPUS, EXAMPLES, fuzz
+from fuzz_run import CORPUS, EXAMPLES, fuzz
 from targets import TARGETS, check
 
 KEPT = sorted(path for path in CORPUS.rglob("*") if path.is_file())
