@@ -115,7 +115,8 @@ class FixedSizeSolution:
 
     def bytes(self, rows: int, inputs: int, outputs: int) -> int:
         """Memory of a solution beyond its training rows: scaled copies, residuals and chunks."""
-        return 8 * rows * (2 * inputs + 5 * outputs) + streaming_bytes(self.prototypes(rows))
+        growing = 8 * rows * (2 * inputs + 5 * outputs)
+        return growing + streaming_bytes(self.prototypes(rows)) + SMALL_BYTES
 
     def _select_width(
         self,
@@ -166,6 +167,10 @@ def _errors(
             residual = centred - projected @ weights
         errors.append(np.mean(residual**2))
     return np.asarray(errors)
+
+
+#: Arrays and objects that grow neither with the rows nor with the prototypes.
+SMALL_BYTES = 1 << 20
 
 
 class _Steps:
