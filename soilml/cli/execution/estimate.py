@@ -23,7 +23,7 @@ from soilml.cli.option_values import read_rows
 from soilml.cli.output import write_columns
 from soilml.cli.progress import progress_bar
 from soilml.cli.table_remarks import print_table_hints
-from soilml.cli.usual_model_error import usual_answer
+from soilml.cli.usual_errors.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (
     apply_case_option,
     check_table_wheel,

@@ -13,6 +13,7 @@ from soilml.cli.option_values import available_effects, parse_names, read_rows
 from soilml.cli.output import is_terminal, json_text, write_stdout
 from soilml.cli.progress import progress_bar, working
 from soilml.cli.table_remarks import print_table_hints
+from soilml.cli.usual_errors.usual_fit import UsualFit, usual_fit
 from soilml.config.case import read_case
 from soilml.errors import FitError
 from soilml.experiment_design import Advice, is_identified
@@ -30,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     need("scipy", "identify")
     from soilml.identification import identify
 
-    case = read_case(args.model, available_effects(args))
+    case = read_case(args.model, available_effects(args), with_bias=True)
     table = read_rows(args, RUNS)
     print_table_hints(table, case)
     free = parse_names(args.free)
@@ -38,9 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
     def solve(rows: Table) -> Identification:
         fit = identify(case, rows, free, args.method)
-        if fit.method != "posterior":
-            return Identification(fit)
-        return Identification(fit, advice_after_fit(case, rows, free, fit))
+        advice = advice_after_fit(case, rows, free, fit) if fit.method == "posterior" else None
+        return Identification(fit, usual_fit(case, rows, free, args.method, fit), advice)
 
     if args.by is None:
         with working(f"identifying from {len(table)} rows"):
@@ -70,14 +70,17 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class Identification:
-    """A fit and, for the posterior method, the advised next measurement."""
+    """A fit, the one with usual errors, and the next measurement that the posterior advises."""
 
     fit: Fit
+    usual: UsualFit | None = None
     advice: Advice | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file, for one fit."""
         content = self.fit.as_json()
+        if self.usual is not None:
+            content |= {"as_usual": self.usual.as_json()}
         if self.advice is not None:
             identified = is_identified(self.advice.current_fraction).tolist()
             flags = dict(zip(self.advice.names, identified, strict=True))
@@ -85,9 +88,10 @@ class Identification:
         return content
 
     def text(self) -> str:
-        """The fit as a table, its warnings, and the advised next measurement."""
+        """The fit as a table, its warnings, the second answer, and the advised measurement."""
+        usual = [] if self.usual is None else ["", self.usual.text()]
         messages = [] if self.advice is None else ["", *next_row_messages(self.advice)]
-        return "\n".join([_fit_text(self.fit), *messages])
+        return "\n".join([_fit_text(self.fit), *usual, *messages])
 
 
 def _solve_groups(
