@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -37,11 +37,14 @@ demo-import: $(VENV)/.ready ## from the raw logs of a rig to the soil: map, impo
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/python -m pytest -n 2 --dist loadfile
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long"
+
+test-long: $(VENV)/.ready ## tests that `make test` leaves out: all versions of the runtime, larger samples
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m long
 
 test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, under a minute
 	@$(MAKE) --no-print-directory check
-	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network"
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network and not long"
 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \

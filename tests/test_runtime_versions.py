@@ -30,11 +30,18 @@ WHEEL = {
 #: Python, onnxruntime and numpy: the oldest that are allowed, and releases that fused nodes with
 #: names of their own making; the newest are those of the other tests.
 MATRIX = [
+    ("3.10", "1.19.0", "2.1.0"),
     ("3.11", "1.19.0", "2.1.0"),
     ("3.11", "1.20.1", None),
     ("3.11", "1.21.1", None),
     ("3.11", "1.22.1", None),
-    ("3.10", "1.19.0", "2.1.0"),
+]
+#: The oldest of all in `make test`, the others in `make test-long`.
+PARAMETERS = [
+    pytest.param(
+        entry, id=f"python{entry[0]}-ort{entry[1]}", marks=[pytest.mark.long] if number else []
+    )
+    for number, entry in enumerate(MATRIX)
 ]
 #: Runs on the other Python: estimates of the files that it is given, as JSON.
 PROGRAM = """
@@ -83,7 +90,7 @@ def find_python(version):
     return pytest.skip(f"no Python {version} on this machine")
 
 
-@pytest.fixture(scope="module", params=MATRIX, ids=lambda entry: f"python{entry[0]}-ort{entry[1]}")
+@pytest.fixture(scope="module", params=PARAMETERS)
 def board(request, tmp_path_factory):
     """The interpreter of an environment with these versions."""
     version, runtime, numpy = request.param

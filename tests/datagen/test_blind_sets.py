@@ -175,7 +175,7 @@ def strays(tier, count=60):
     return np.array(found)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_readings_stray_as_the_tier_says():
     plain, linked, struck, louder = (strays(tier) for tier in ("N0", "N2", "N3", "N4"))
     assert plain.std() == pytest.approx(1.0, abs=0.03)

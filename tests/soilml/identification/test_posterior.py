@@ -76,7 +76,7 @@ def test_the_posterior_is_that_of_brute_force_on_a_grid(case):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_truths_stand_anywhere_in_their_posteriors_alike_and_no_fit_is_nearer(case):
     rng = np.random.default_rng(5)
     inside, error, other = [], [], []

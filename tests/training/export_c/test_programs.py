@@ -65,7 +65,7 @@ def test_no_access_out_of_bounds_and_nothing_undefined(exported, compiled, tmp_p
         pytest.skip("gcc has no sanitizers here")
     odd = np.array([np.nan, np.inf, -np.inf, 0.0, -1.0, 2.0, 1e-40, 3e38], np.float32)
     sets = []
-    for _ in range(12):
+    for _ in range(6):
         rows = np.stack([rows_of(rng, 40)[name] for name in FIELDS], axis=1)
         spoilt = rng.random(rows.shape) < 0.03
         rows[spoilt] = rng.choice(odd, spoilt.sum())
