@@ -10,9 +10,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from rig import write_logs
 
 from soilml.cli import main
-from soilml.gap.html.svg_image import report_style
 from soilml.log_import import import_log
 from soilml.log_import.report.figures import draw_run, draw_slip
+from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")
 #: What a look at the map changes: the gear ratio, which no log tells.

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from soilml.gap.html.formatting import channel_name, format_number
-from soilml.gap.html.svg_image import (
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.results import GapReport
+from soilml.report.figure_style import (
     AFTER,
     BEFORE,
     UNCHANGED,
@@ -16,8 +17,7 @@ from soilml.gap.html.svg_image import (
     report_style,
     svg_image,
 )
-from soilml.gap.report_parts import GapReduction
-from soilml.gap.results import GapReport
+from soilml.report.numbers import channel_name, format_number
 
 #: Titles of the charts, by the names of the figures in gap.json.
 _TITLES = {

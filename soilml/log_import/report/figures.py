@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.html.svg_image import AFTER, SvgImage, new_figure, report_style, svg_image
 from soilml.log_import.recording import Floats
 from soilml.log_import.result import ImportedLog, WheelSeries
 from soilml.quantities import Z_90
+from soilml.report.figure_style import AFTER, SvgImage, new_figure, report_style, svg_image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,10 +1,10 @@
-"""Numbers, units and names as the page shows them."""
+"""Numbers, units and names as reports and tables show them: rounded to what is known of them."""
 
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
-from soilml.gap.report_parts import EstimatedValue, decimal
 from soilml.quantities import COLUMNS
 
 _SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")
@@ -33,6 +33,30 @@ _NAMES = {
     "a1": "its growth with slip",
 }
 _SYMBOLS |= {"a_1": "a₁"}
+
+
+class Estimated(Protocol):
+    """An estimate in an SI unit, with its standard deviation."""
+
+    @property
+    def value(self) -> float:
+        """The estimate."""
+
+    @property
+    def std(self) -> float:
+        """Its standard deviation."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of both."""
+
+
+def decimal(value: float, digits: int = 3) -> str:
+    """A number with this many significant digits, never with a power of ten."""
+    if not math.isfinite(value):
+        return f"{value:g}"
+    exponent = 0 if value == 0.0 else math.floor(math.log10(abs(value)))
+    return f"{value:.{max(0, digits - 1 - exponent)}f}"
 
 
 def format_number(x: float, digits: int = 3) -> str:
@@ -100,13 +124,13 @@ def format_unit(unit: str) -> str:
     return base + (exponent.translate(_SUPERSCRIPT).replace(" ", "") if caret else "")
 
 
-def format_estimate(value: EstimatedValue) -> str:
+def format_estimate(value: Estimated) -> str:
     """An estimate ± standard deviation in its display unit."""
     factor, unit = display_unit(value.unit, value.value)
     return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
 
 
-def format_in_si(value: EstimatedValue) -> str:
+def format_in_si(value: Estimated) -> str:
     """The same in SI units; empty where that is the display unit."""
     factor, _ = display_unit(value.unit, value.value)
     if factor == 1.0:
