@@ -99,6 +99,16 @@ def format_with_std(value: float, std: float) -> str:
     return _minus(f"({inside}) × 10{_raised(power)}")
 
 
+def format_interval(low: float, high: float, std: float) -> str:
+    """Both ends to the second significant digit of the standard deviation: 0.85 to 1.24."""
+    ends = [format_with_std(end, std).split(" ± ")[0].lstrip("(") for end in (low, high)]
+    power = format_with_std(low, std).rpartition(") ")[2]
+    text = f"{ends[0]} to {ends[1]}"
+    if not power.startswith("×"):
+        return text
+    return f"{format_number(low, 3)} to {format_number(high, 3)}"
+
+
 def format_change(x: float, std: float) -> str:
     """A change with its sign, to the second significant digit of its standard deviation."""
     decimals = 1 - math.floor(math.log10(std)) if std > 0.0 and math.isfinite(std) else 3
@@ -167,6 +177,11 @@ def format_range(low: float, high: float, digits: int = 3) -> str:
     """A range, or a single value where both ends agree."""
     one, two = (_trimmed(format_number(x, digits)) for x in (low, high))
     return one if one == two else f"{one} to {two}" if low < 0.0 else f"{one}–{two}"
+
+
+def capitalised(text: str) -> str:
+    """The text as the beginning of a sentence; a symbol of one letter stays."""
+    return text if len(text) < 2 or text[1] in "_ " else text[0].upper() + text[1:]
 
 
 def format_variance_component(key: str, value: float) -> tuple[str, str]:

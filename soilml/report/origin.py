@@ -56,7 +56,7 @@ class Origin:
         """The origin of a report that the words after `soilml` asked for."""
         from soilml import __version__
 
-        records = tuple(InputRecord.of(path) for path in dict.fromkeys(map(os.fspath, files)))
+        records = tuple(InputRecord.of(path) for path in dict.fromkeys(os.fspath(f) for f in files))
         return Origin(shlex.join(["soilml", *words]), __version__, records)
 
 
@@ -83,7 +83,11 @@ def report_entry(
         "command": origin.command,
         "soilml_version": origin.version,
         "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
-        "answer": list(answer),
-        "warnings": list(warnings),
-        "next": list(next_steps),
+        "answer": _plain(answer),
+        "warnings": _plain(warnings),
+        "next": _plain(next_steps),
     }
+
+
+def _plain(texts: Sequence[str]) -> list[str]:
+    return [text.replace("\N{NO-BREAK SPACE}", " ") for text in texts]

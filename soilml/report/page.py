@@ -119,5 +119,6 @@ def _environment(package: str) -> Environment:
         "chance": numbers.format_p_value,
         "channel": numbers.channel_name,
         "gain": numbers.format_gain,
+        "sentence": numbers.capitalised,
     }
     return environment

@@ -12,6 +12,7 @@ import numpy as np
 from soilml.cli.advice_text import mean_covariates
 from soilml.cli.option_values import available_effects, parse_names, parse_numbers, read_rows
 from soilml.cli.output import write_columns
+from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
 from soilml.experiment_design import (
@@ -50,7 +51,9 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is None:
         ranges, at = candidate_grid(slips, loads), None
     else:
-        data = read_observations(case, read_rows(args, RUNS))
+        table = read_rows(args, RUNS)
+        print_table_hints(table, case)
+        data = read_observations(case, table)
         ranges, at = candidate_grid(slips, loads, data.load), data.at
     if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(

@@ -1,7 +1,8 @@
 """The report as one self-contained HTML page.
 
 A section consists of a template `section_NAME.html.j2`, which `gap_page.html.j2` includes,
-and, where it needs more than the report itself, a builder in a module of that name; `_content` calls it.
+and, where it needs more than the report itself, a builder in a module of that name; `_content`
+calls it.
 """
 
 from __future__ import annotations

@@ -1,0 +1,195 @@
+"""The result of `identify` as text, as JSON and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.config.case import Case
+from soilml.experiment_design import Advice, is_identified
+from soilml.experiment_design.messages import next_row_messages, summary
+from soilml.identification.fit_result import Fit
+from soilml.io.text_tables import format_table
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.report import numbers
+from soilml.report.figure_style import picture
+from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.parameter_figure import ParameterIntervals
+from soilml.report.terminal import interval, rounded, shown_unit
+
+#: Most results that the page describes in sentences; more are in its table.
+_MOST_SENTENCES = 4
+
+
+@dataclass(frozen=True)
+class Identification:
+    """A fit and, for the posterior method, the advised next measurement."""
+
+    fit: Fit
+    advice: Advice | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of the file, for one fit."""
+        content = self.fit.as_json()
+        if self.advice is not None:
+            identified = is_identified(self.advice.current_fraction).tolist()
+            flags = dict(zip(self.advice.names, identified, strict=True))
+            content |= {"told": flags, "advice": summary(self.advice)}
+        return content
+
+    def text(self) -> str:
+        """The fit as a table, its warnings, and the advised next measurement."""
+        messages = [] if self.advice is None else ["", *next_row_messages(self.advice)]
+        return "\n".join([_fit_text(self.fit), *messages])
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A parameter in its display unit, for a page."""
+
+    name: str
+    value: str
+    ends: str
+    unit: str
+    left: float | None
+
+    @property
+    def known(self) -> bool:
+        return self.left is None or self.left <= NOT_IDENTIFIED_ABOVE
+
+    @property
+    def sentence(self) -> str:
+        range_ = numbers.with_unit(self.ends, self.unit)
+        if not self.known:
+            return (
+                f"{numbers.capitalised(self.name)} is not determined by these rows: {self.left:.0%} "
+                f"of the width of its prior remains (90 %: {range_})."
+            )
+        value = numbers.with_unit(self.value, self.unit)
+        return f"{numbers.capitalised(self.name)} = {value} (90 %: {range_})."
+
+
+def identify_report(
+    case: Case,
+    found: Mapping[str, Identification],
+    failed: Mapping[str, str],
+    by: str | None,
+    files: tuple[str, str],
+) -> Report:
+    """The page of `identify`: results by group, groups without one; model file and table."""
+    lines = {name: _lines(one.fit) for name, one in found.items()}
+    every = [line for own in lines.values() for line in own]
+    first = next(iter(found.values())).fit
+    known, total = sum(line.known for line in every), len(every)
+    badge = "identified" if known == total else "partly identified" if known else "not identified"
+    head = {name: f"{by} {name}: " if by else "" for name in (*found, *failed)}
+    if len(found) <= _MOST_SENTENCES:
+        answer = [head[name] + " ".join(x.sentence for x in own) for name, own in lines.items()]
+    else:
+        answer = [f"The table has a result for each of {len(found)} values of {by}."]
+    warnings = [head[name] + text for name, one in found.items() for text in one.fit.warnings]
+    warnings += [f"{by} {name} has no result: {why}" for name, why in failed.items()]
+    steps = [
+        head[name] + text
+        for name, one in found.items()
+        if one.advice is not None
+        for text in next_row_messages(one.advice)
+    ]
+    if first.method != "posterior":
+        steps.append("--method posterior tells which measurement would help most.")
+    steps.append("soilml gap tells whether the model explains the rows.")
+    rows = sum(one.fit.rows_used for one in found.values())
+    channels = ", ".join(numbers.channel_name(c) for c in first.channels)
+    return Report(
+        kind="identify",
+        title=f"Soil of {Path(files[1]).name}, by the model {Path(files[0]).name}",
+        badge=badge,
+        meaning=f"from {rows} rows by the method {first.method}; channels: {channels}",
+        answer=answer,
+        tone="named" if known == total else "suspected",
+        pictures=[_picture(case, found, by)],
+        tables=[_table(lines, found, by)],
+        warnings=warnings,
+        next_steps=steps,
+        notation=[
+            ("±", "one standard deviation of the error that is expected."),
+            ("90 %", "interval that holds the value with that probability, under model and noise."),
+            ("left of prior", "width of the estimate over that of the prior; blank without one."),
+        ],
+    )
+
+
+def _picture(case: Case, found: Mapping[str, Identification], by: str | None) -> ReportPicture:
+    parts = [one.fit.intervals(case.prior, name) for name, one in found.items()]
+    whole = ParameterIntervals(
+        parts[0].names,
+        parts[0].units,
+        [name for part in parts for name in part.labels],
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([part.low for part in parts]),
+        np.concatenate([part.high for part in parts]),
+        parts[0].prior_low,
+        parts[0].prior_high,
+    )
+    text = "; ".join(line.sentence for line in _lines(next(iter(found.values())).fit))
+    image = picture(whole.plot, len(whole.names), 1, whole.size, text if by is None else f"by {by}")
+    title = "Estimates and 90 % intervals"
+    shaded = any(np.isfinite(whole.prior_low))
+    return ReportPicture(title, image, "Grey: the range of the prior." if shaded else "")
+
+
+def _table(
+    lines: Mapping[str, list[_Line]], found: Mapping[str, Identification], by: str | None
+) -> ReportTable:
+    rows = []
+    for name, own in lines.items():
+        for line in own:
+            left = "" if line.left is None else f"{line.left:.0%}".replace("%", " %")
+            value = line.value if line.known else f"not determined ({line.value})"
+            rows.append([*([name] if by else []), line.name, value, line.ends, line.unit, left])
+    header = ["parameter", "value ± std", "90 % interval", "unit", "left of prior"]
+    return ReportTable(
+        "Parameters", [*([by] if by else []), *header], rows, text_columns=2 if by else 1
+    )
+
+
+def _lines(fit: Fit) -> list[_Line]:
+    found = []
+    for name, value, std, low, high, unit in zip(
+        fit.names, fit.values, fit.std, *fit.interval, fit.units, strict=True
+    ):
+        factor, shown = numbers.display_unit(unit, float(abs(value)))
+        found.append(
+            _Line(
+                numbers.parameter_name(name),
+                numbers.format_with_std(factor * value, factor * std),
+                numbers.format_interval(factor * low, factor * high, factor * std),
+                shown,
+                fit.remaining_fraction.get(name),
+            )
+        )
+    return found
+
+
+def _fit_text(found: Fit) -> str:
+    remaining = found.remaining_fraction
+    rows = []
+    for name, value, std, low, high, unit in zip(
+        found.names, found.values, found.std, *found.interval, found.units, strict=True
+    ):
+        factor, shown = shown_unit(unit, float(abs(value)))
+        value, std, low, high = (factor * float(v) for v in (value, std, low, high))
+        left = f"{remaining[name]:.0%}" if name in remaining else ""
+        rows.append(
+            (name, rounded(value, std), rounded(std, std), interval(low, high, std), shown, left)
+        )
+    table = format_table(
+        ("parameter", "value", "std", "90 % interval", "unit", "posterior/prior"), rows
+    )
+    warnings = "\n".join(f"! {text}" for text in found.warnings)
+    head = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
+    return f"{head}\n\n{table}\n{warnings}".rstrip()
