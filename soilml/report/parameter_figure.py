@@ -68,7 +68,7 @@ class ParameterIntervals:
         value, low, high = (factor * v[:, k] for v in (self.values, self.low, self.high))
         prior = factor * self.prior_low[k], factor * self.prior_high[k]
         many = len(self.labels) > MOST_LINES
-        place = np.arange(len(self.labels))
+        place = np.arange(1, len(self.labels) + 1)
         known = np.isfinite(value)
         errors = np.maximum(np.stack([value - low, high - value]), 0.0)[:, known]
         style: dict[str, Any] = {"color": AFTER, "elinewidth": 1.2 if many else 3, "lw": 0}
@@ -77,12 +77,13 @@ class ParameterIntervals:
             if np.isfinite(prior).all():
                 panel.axhspan(*prior, color=PRIOR, lw=0, zorder=0)
             panel.set_ylabel(unit)
-            panel.set_xlabel("result")
+            panel.xaxis.get_major_locator().set_params(integer=True)
+            panel.set_xlabel("number of the result" if k == len(self.names) - 1 else "")
         else:
             panel.errorbar(value[known], place[known], xerr=errors, fmt="o", ms=6, **style)
             if np.isfinite(prior).all():
                 panel.axvspan(*prior, color=PRIOR, lw=0, zorder=0)
-            panel.set_ylim(len(self.labels) - 0.4, -0.6)
+            panel.set_ylim(len(self.labels) + 0.6, 0.4)
             panel.set_yticks(place if len(place) > 1 else [], self.labels if len(place) > 1 else [])
         title = parameter_name(self.names[k])
         panel.set_title(f"{title} ({unit})" if unit else title)

@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from soilml.cli.reports.parameter_lines import ParameterLine, parameter_lines, parameter_table
 from soilml.config.case import Case
 from soilml.experiment_design import Advice, is_identified
 from soilml.experiment_design.messages import next_row_messages, summary
 from soilml.identification.fit_result import Fit
 from soilml.io.text_tables import format_table
-from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report import numbers
 from soilml.report.figure_style import picture
-from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.page import Report, ReportPicture
 from soilml.report.parameter_figure import ParameterIntervals
 from soilml.report.terminal import interval, rounded, shown_unit
 
@@ -45,32 +45,6 @@ class Identification:
         """The fit as a table, its warnings, and the advised next measurement."""
         messages = [] if self.advice is None else ["", *next_row_messages(self.advice)]
         return "\n".join([_fit_text(self.fit), *messages])
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A parameter in its display unit, for a page."""
-
-    name: str
-    value: str
-    ends: str
-    unit: str
-    left: float | None
-
-    @property
-    def known(self) -> bool:
-        return self.left is None or self.left <= NOT_IDENTIFIED_ABOVE
-
-    @property
-    def sentence(self) -> str:
-        range_ = numbers.with_unit(self.ends, self.unit)
-        if not self.known:
-            return (
-                f"{numbers.capitalised(self.name)} is not determined by these rows: {self.left:.0%} "
-                f"of the width of its prior remains (90 %: {range_})."
-            )
-        value = numbers.with_unit(self.value, self.unit)
-        return f"{numbers.capitalised(self.name)} = {value} (90 %: {range_})."
 
 
 def identify_report(
@@ -112,7 +86,7 @@ def identify_report(
         answer=answer,
         tone="named" if known == total else "suspected",
         pictures=[_picture(case, found, by)],
-        tables=[_table(lines, found, by)],
+        tables=[parameter_table(lines, by)],
         warnings=warnings,
         next_steps=steps,
         notation=[
@@ -142,37 +116,9 @@ def _picture(case: Case, found: Mapping[str, Identification], by: str | None) ->
     return ReportPicture(title, image, "Grey: the range of the prior." if shaded else "")
 
 
-def _table(
-    lines: Mapping[str, list[_Line]], found: Mapping[str, Identification], by: str | None
-) -> ReportTable:
-    rows = []
-    for name, own in lines.items():
-        for line in own:
-            left = "" if line.left is None else f"{line.left:.0%}".replace("%", " %")
-            value = line.value if line.known else f"not determined ({line.value})"
-            rows.append([*([name] if by else []), line.name, value, line.ends, line.unit, left])
-    header = ["parameter", "value ± std", "90 % interval", "unit", "left of prior"]
-    return ReportTable(
-        "Parameters", [*([by] if by else []), *header], rows, text_columns=2 if by else 1
-    )
-
-
-def _lines(fit: Fit) -> list[_Line]:
-    found = []
-    for name, value, std, low, high, unit in zip(
-        fit.names, fit.values, fit.std, *fit.interval, fit.units, strict=True
-    ):
-        factor, shown = numbers.display_unit(unit, float(abs(value)))
-        found.append(
-            _Line(
-                numbers.parameter_name(name),
-                numbers.format_with_std(factor * value, factor * std),
-                numbers.format_interval(factor * low, factor * high, factor * std),
-                shown,
-                fit.remaining_fraction.get(name),
-            )
-        )
-    return found
+def _lines(fit: Fit) -> list[ParameterLine]:
+    left = [fit.remaining_fraction.get(name) for name in fit.names]
+    return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left)
 
 
 def _fit_text(found: Fit) -> str:

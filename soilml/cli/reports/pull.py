@@ -16,6 +16,7 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report import numbers
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.terminal import significant
 from soilml.traction.by_load import LoadPrediction
 from soilml.traction.plot import figure_size
 from soilml.traction.report import PullReport
@@ -136,7 +137,7 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
             pulled, climbed = _bests(one)
             unknown = [share > NOT_IDENTIFIED_ABOVE for share in one.remaining_fraction]
             known += [not any(unknown)]
-            load = numbers.format_number(one.posterior.load, 4)
+            load = significant(one.posterior.load)
             parts = [
                 f"{what} {'is not known better than before the rows' if vague else 'is'} {value}"
                 for what, value, vague in zip(
@@ -205,7 +206,7 @@ def _page_rows(one: LoadPrediction) -> list[list[str]]:
     pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
     rows = []
     for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
-        cells = [numbers.format_number(known.load, 4), f"{known.slip[i]:.3g}"]
+        cells = [significant(known.load), f"{known.slip[i]:.3g}"]
         for band, factor in ((pull, 1.0), (slope, DEGREES)):
             low, middle, high = (factor * v[i] for v in (band.lower, band.middle, band.upper))
             cells += [f"{middle:.1f}", f"{low:.1f} to {high:.1f}"]

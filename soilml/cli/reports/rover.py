@@ -111,9 +111,9 @@ def _cells(draws: np.ndarray, form: str, needs: float = 0.0) -> list[str]:
     return [form.format(float(v)) for v in (band.middle, band.lower, band.upper)]
 
 
-def _range(draws: np.ndarray, form: str) -> str:
+def _range(draws: np.ndarray, form: str, unit: str = "") -> str:
     band = quantile_band(draws)
-    return f"{band.middle:{form}} ({band.lower:{form}} to {band.upper:{form}})"
+    return f"{band.middle:{form}}{unit} ({band.lower:{form}} to {band.upper:{form}})"
 
 
 def _ends(draws: np.ndarray) -> str:
@@ -191,8 +191,8 @@ def _sentence(report: RoverReport) -> str:
         still = float(np.mean(~np.isfinite(found.steepest_slope)))
         return f"There is no steepest slope: {still:.0%} of the soils do not let the rover move."
     return (
-        f"The steepest slope is {_range(np.rad2deg(found.steepest_slope), '.1f')}°, at slips up to "
-        f"{found.slip_limit:.2g}; the best slip on level ground is "
+        f"The steepest slope is {_range(np.rad2deg(found.steepest_slope), '.1f', '°')}, at slips "
+        f"up to {found.slip_limit:.2g}; the best slip on level ground is "
         f"{_range(found.best_slip, '.2f')}."
     )
 
