@@ -94,11 +94,9 @@ def _common_error_note(sets: SetPosterior) -> list[str]:
         "sinkage_bias": "sinkage {:g} mm",
         "drawbar_pull_bias": "drawbar pull {:g} N",
     }
-    factors = {"sinkage_bias": 1e3}
+    factors = {"slip_bias": 1.0, "sinkage_bias": 1e3, "drawbar_pull_bias": 1.0}  # gains in %
     said = [
-        texts[name].format(
-            std * (100.0 if name.endswith("gain") else 1e3 if "sink" in name else 1.0)
-        )
+        texts[name].format(factors.get(name, 100.0) * std)
         for name, std in sets.common_errors.items()
         if std > 0.0 and name in texts
     ]

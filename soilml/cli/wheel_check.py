@@ -42,7 +42,7 @@ def describe_file(estimator: Estimator) -> str:
     effects = [e["name"] for e in json.loads(estimator.metadata["recipe"]).get("effect", [])]
     with_effects = f"with {', '.join(effects)}" if effects else "without effects"
     priors = [
-        f"{entry['name'].replace('_', ' ')} {_bounds(*ends, entry['unit'])}"
+        f"{entry['name'].replace('_', ' ')} {_prior_text(ends[0], ends[1], entry['unit'])}"
         if (scale := entry.get("scale")) is None or scale in fixed
         else f"{entry['name'].replace('_', ' ')} {entry['lower']:.3g} to 1 {scale}"
         for entry, *ends in zip(
@@ -59,7 +59,7 @@ def describe_file(estimator: Estimator) -> str:
     )
 
 
-def _bounds(low: float, high: float, unit: str) -> str:
+def _prior_text(low: float, high: float, unit: str) -> str:
     """A range in the unit in which a terminal shows it."""
     factor, shown = shown_unit(unit, high)
     return f"{significant(factor * low)} to {significant(factor * high)} {shown}".rstrip()

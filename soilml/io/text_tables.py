@@ -70,7 +70,7 @@ def format_table(
     left = {*range(text_columns), *([len(header) - 1] if last_left else [])}
     before = sum(widths[:-1]) + 2 * (len(widths) - 1)
     if len(header) - 1 in left and before + widths[-1] > width:
-        widths[-1] = max(width - before, _LEAST_WRAPPED)
+        widths[-1] = min(widths[-1], max(width - before, _LEAST_WRAPPED))
     lines = []
     for row in table:
         first, *more = textwrap.wrap(row[-1], widths[-1]) or [""]

@@ -121,7 +121,7 @@ def save_png(
     with report_style():
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots(rows, columns, squeeze=False))
-        figure.savefig(path, format="png", dpi=130, metadata={"Software": "soilml"})
+        figure.savefig(path, format="png", dpi=110, metadata={"Software": "soilml"})
 
 
 def svg_image(figure: Figure, alt: str) -> SvgImage:

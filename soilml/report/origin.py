@@ -56,7 +56,8 @@ class Origin:
         """The origin of a report that the words after `soilml` asked for."""
         from soilml import __version__
 
-        records = tuple(InputRecord.of(path) for path in dict.fromkeys(os.fspath(f) for f in files))
+        names = [name for name in dict.fromkeys(os.fspath(f) for f in files) if Path(name).exists()]
+        records = tuple(InputRecord.of(name) for name in names)
         return Origin(shlex.join(["soilml", *words]), __version__, records)
 
 

@@ -63,6 +63,8 @@ class ParameterIntervals:
         return np.asarray(axes)
 
     def _draw(self, panel: Axes, k: int) -> None:
+        from matplotlib.ticker import MaxNLocator
+
         scale = [v for v in (*self.values[:, k], self.prior_high[k]) if np.isfinite(v)]
         factor, unit = display_unit(self.units[k], max(map(abs, scale), default=1.0))
         value, low, high = (factor * v[:, k] for v in (self.values, self.low, self.high))
@@ -77,7 +79,7 @@ class ParameterIntervals:
             if np.isfinite(prior).all():
                 panel.axhspan(*prior, color=PRIOR, lw=0, zorder=0)
             panel.set_ylabel(unit)
-            panel.xaxis.get_major_locator().set_params(integer=True)
+            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
             panel.set_xlabel("number of the result" if k == len(self.names) - 1 else "")
         else:
             panel.errorbar(value[known], place[known], xerr=errors, fmt="o", ms=6, **style)

@@ -79,7 +79,7 @@ def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
     message = capsys.readouterr().out
     assert "6 climbs on 3 slopes" in message and "steepest slope" in message
     assert sorted(f.name for f in (folder / "found").iterdir()) == [
-        "climb.json", "climbs.csv", "curve.csv",
+        "climb.json", "climbs.csv", "curve.csv", "report.html",
     ]  # fmt: skip
     with (folder / "found" / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))

@@ -97,7 +97,9 @@ def run(args: argparse.Namespace) -> int:
         page = estimate_report(columns, notes, estimators[0], args.by, files)
         return page, {**content, "notes": notes}
 
-    write_with_report(args, {args.out: partial(save_columns, columns)}, build)
+    write_with_report(
+        args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
+    )
     tell_columns(columns, args.out)
     print("\n".join(notes), file=sys.stderr)
     return 0

@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 #: Ending of the columns of the second answer.
 USUAL = "usual"
+#: What the two answers are called on a page.
+AS_RIGHT, WITH_ERRORS = "model taken as right", "with the usual errors of a model"
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
 
@@ -102,7 +104,7 @@ def estimate_report(
             )
         ],
         tables=[parameter_table(lines, group)],
-        warnings=[note for note in notes if not _is_step(note)],
+        warnings=[_without_columns(note) for note in notes if not _is_step(note)],
         next_steps=[note for note in notes if _is_step(note)],
         notation=[
             ("±", "one standard deviation of the error that is expected."),
@@ -129,8 +131,8 @@ def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, en
         for part in ("", "_std", "_p05", "_p95")
     )
     own = columns[by] if by else np.arange(1, len(values) + 1)
-    said = {"": "" if f"in_range_{USUAL}" not in columns else ", model taken as right"}
-    text = said.get(end, ", with the usual errors of a model")
+    said = {"": "" if f"in_range_{USUAL}" not in columns else f", {AS_RIGHT}"}
+    text = said.get(end, f", {WITH_ERRORS}")
     labels = np.asarray([f"{name}{text}" for name in own], dtype=np.str_)
     inside = np.nan_to_num(np.asarray(columns[f"in_range{end}"], float)) > 0.5
     return _Answer(labels, values, std, low, high, np.asarray(inside))
@@ -139,3 +141,9 @@ def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, en
 def _is_step(note: str) -> bool:
     """Whether a note names the next measurement."""
     return "next row" in note or "Most informative next" in note
+
+
+def _without_columns(note: str) -> str:
+    """The note with the names that the two answers have on a page."""
+    note = note.replace(f"columns without _{USUAL}", f"those marked “{AS_RIGHT}”")
+    return note.replace(f"columns with _{USUAL}", f"those marked “{WITH_ERRORS}”")

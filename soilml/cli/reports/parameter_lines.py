@@ -37,9 +37,10 @@ class ParameterLine:
         if not self.known:
             return (
                 f"{numbers.capitalised(self.name)} is not determined by these rows: "
-                f"{self.left:.0%} of the width of its prior remains (90 %: {range_})."
+                f"{100.0 * (self.left or 0.0):.0f} % of the width of its prior remains (90 %: "
+                f"{range_})."
             )
-        value = numbers.with_unit(self.value, self.unit)
+        value = numbers.with_unit(self.value, self.unit).replace(" ", "\N{NO-BREAK SPACE}")
         return f"{numbers.capitalised(self.name)} = {value} (90 %: {range_})."
 
 

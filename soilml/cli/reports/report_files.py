@@ -39,6 +39,7 @@ def write_with_report(
     args: argparse.Namespace,
     contents: Mapping[str | None, Content],
     build: Callable[[], tuple[Report, Mapping[str, Any]]],
+    read: Iterable[str] = (),
 ) -> None:
     """Write the outputs of a command, and those of --report, as one set.
 
@@ -48,10 +49,12 @@ def write_with_report(
         What is written to each path; None as a path is an option that was not given.
     build
         Gives the report and the result in SI units; called where --report is given.
+    read
+        Input files that no argument names.
     """
     files = {Path(path): content for path, content in contents.items() if path is not None}
     if args.report is not None:
         report, content = build()
         names = (REPORT_FILES[0], REPORT_FILES[1])
-        files |= report_texts(report, origin_of(args), content, names, Path(args.report))
+        files |= report_texts(report, origin_of(args, read), content, names, Path(args.report))
     write_files(files, folders=[args.report])
