@@ -47,6 +47,7 @@ COMMANDS = {
     "init": "soilml.cli.commands.setup.init",
     "models": "soilml.cli.commands.setup.models",
     "doctor": "soilml.cli.commands.setup.doctor",
+    "completion": "soilml.cli.commands.setup.completion",
     "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",
@@ -155,7 +156,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
         args = parser(words[0] if words else "").parse_args(words)
-        args.command_line = words
+        args.command_line, args.make_parser = words, parser
         check_outputs(args.outputs(args), input_files(args))
         status = int(args.run(args) or 0)
         if sys.stdout is not None:

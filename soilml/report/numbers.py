@@ -181,7 +181,8 @@ def format_range(low: float, high: float, digits: int = 3) -> str:
 
 def capitalised(text: str) -> str:
     """The text as the beginning of a sentence; a symbol of one letter stays."""
-    return text if len(text) < 2 or text[1] in "_ " else text[0].upper() + text[1:]
+    symbol = len(text) < 2 or text[1] in "_ "
+    return text if symbol or text.startswith("soilml ") else text[0].upper() + text[1:]
 
 
 def format_variance_component(key: str, value: float) -> tuple[str, str]:
