@@ -82,7 +82,7 @@ def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--where` and `--ignore-extra`, which `option_values.read_rows` follows."""
+    """Declare `--where` and `--ignore-extra`, which `table_reading.read_rows` follows."""
     parser.add_argument("--where", metavar="COLUMN=VALUE", help="use only the rows with this value")
     add_ignore_extra_option(parser)
 

@@ -140,6 +140,12 @@ def format_estimate(value: Estimated) -> str:
     return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
 
 
+def format_quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A number in an SI unit, in the display unit of its kind."""
+    factor, shown = display_unit(unit, abs(value))
+    return with_unit(format_number(factor * value, digits), shown)
+
+
 def format_in_si(value: Estimated) -> str:
     """The same in SI units; empty where that is the display unit."""
     factor, _ = display_unit(value.unit, value.value)
@@ -180,9 +186,10 @@ def format_range(low: float, high: float, digits: int = 3) -> str:
 
 
 def capitalised(text: str) -> str:
-    """The text as the beginning of a sentence; a symbol of one letter stays."""
-    symbol = len(text) < 2 or text[1] in "_ "
-    return text if symbol or text.startswith("soilml ") else text[0].upper() + text[1:]
+    """The text as the beginning of a sentence; symbols, files and commands stay."""
+    first = text.split(" ", 1)[0].rstrip(":,;.")
+    word = len(first) > 1 and first.isalpha() and first != "soilml"
+    return text[0].upper() + text[1:] if word or first == "a" else text
 
 
 def format_variance_component(key: str, value: float) -> tuple[str, str]:

@@ -119,6 +119,7 @@ def _environment(package: str) -> Environment:
         "chance": numbers.format_p_value,
         "channel": numbers.channel_name,
         "gain": numbers.format_gain,
+        "quantity": numbers.format_quantity,
         "sentence": numbers.capitalised,
     }
     return environment

@@ -223,9 +223,9 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
+    from soilml.cli.table_reading import read_long_table
     from soilml.config.case import read_case_of_one_gear
     from soilml.identification.trained_estimator import for_simulated_case
-    from soilml.io.read_table import read_table
     from soilml.onboard.estimator import Estimator
     from soilml.report.figure_style import save_png
     from training.benchmark import user_report as report
@@ -236,7 +236,7 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
         raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")
     model, test, *files = args.files
     case = read_case_of_one_gear(model)
-    table = read_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
+    table = read_long_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
     estimators = {Path(file).stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names

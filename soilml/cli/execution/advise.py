@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from soilml.cli.advice_text import mean_covariates
-from soilml.cli.option_values import available_effects, parse_names, parse_numbers, read_rows
+from soilml.cli.option_values import available_effects, parse_names, parse_numbers
 from soilml.cli.output import write_columns
+from soilml.cli.progress import working
+from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
@@ -60,9 +62,10 @@ def run(args: argparse.Namespace) -> int:
             f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
             f"at most {MAX_POINTS} operating points are possible"
         )
-    samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
-    known = {} if at is None else mean_covariates(at)
-    advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
+    with working("rating the rows that could be next"):
+        samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
+        known = {} if at is None else mean_covariates(at)
+        advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:
         from soilml.experiment_design.plot import save_maps
 

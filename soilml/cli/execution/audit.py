@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import available_effects, parse_costs, parse_names
 from soilml.cli.output import json_text
+from soilml.cli.progress import working
+from soilml.cli.table_reading import read_long_table
 from soilml.config.case import read_case
 from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import save_text
-from soilml.io.read_table import read_table
 from soilml.io.text_tables import format_table
 
 if TYPE_CHECKING:
@@ -25,10 +26,11 @@ def run(args: argparse.Namespace) -> int:
 
     effects = available_effects(args)
     case = read_case(args.model, effects)
-    design = read_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
-    found = audit(
-        case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
-    )
+    design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
+    with working(f"auditing {len(design)} rows"):
+        found = audit(
+            case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
+        )
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     print(_text(found))

@@ -20,11 +20,11 @@ from soilml.cli.joint_readings import (
     row_readings,
     unused_std_note,
 )
-from soilml.cli.option_values import read_rows
 from soilml.cli.output import save_columns, tell_columns
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.estimate import check_size, estimate_report
 from soilml.cli.reports.report_files import write_with_report
+from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (

@@ -12,12 +12,13 @@ from soilml.cli.output import json_text
 from soilml.cli.output_names import GAP_SUSPECTED
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.report_files import origin_of
+from soilml.cli.table_reading import read_long_table
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.number_text import read_number
-from soilml.io.read_table import RUNS, read_table
+from soilml.io.read_table import RUNS
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     check_seed(args)
     effects = available_effects(args)
     case = read_case(args.model, effects)
-    table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(

@@ -7,11 +7,12 @@ import sys
 from collections.abc import Callable, Iterable
 
 from soilml.cli.advice_text import advice_after_fit
-from soilml.cli.option_values import available_effects, parse_names, read_rows
+from soilml.cli.option_values import available_effects, parse_names
 from soilml.cli.output import is_terminal, json_text, write_stdout
 from soilml.cli.progress import progress_bar, working
 from soilml.cli.reports.identify import Identification, identify_report
 from soilml.cli.reports.report_files import write_with_report
+from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import FitError

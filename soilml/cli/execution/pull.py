@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from soilml.cli.option_values import available_effects, parse_names, parse_numbers, read_rows
-from soilml.cli.progress import progress_bar
+from soilml.cli.option_values import available_effects, parse_names, parse_numbers
+from soilml.cli.progress import progress_bar, working
 from soilml.cli.reports.presentation import write_results
+from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import Case, read_case, read_case_of_one_gear
 from soilml.config.wheeled_rover import read_gravity
@@ -81,14 +82,15 @@ def _by_group(
 ) -> tuple[dict[str, Report], dict[str, str]]:
     """The answer for each group of --by that has one, and why the others have none."""
     found, failed = {}, {}
-    groups = [("", table)] if args.by is None else list(table.groups(args.by))
-    with progress_bar(f"predicting from {len(table)} rows", len(groups)) as done:
+    if args.by is None:
+        with working(f"predicting from {len(table)} rows"):
+            return {"": answer(table)}, {}
+    groups = list(table.groups(args.by))
+    with progress_bar(f"predicting by {args.by}", len(groups)) as done:
         for number, (name, rows) in enumerate(groups, 1):
             try:
                 found[name] = answer(rows)
             except FitError as error:
-                if args.by is None:
-                    raise
                 failed[name] = str(error)
             done(number)
     if not found:

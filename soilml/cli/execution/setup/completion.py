@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Sequence
 
-from soilml.cli.commands.setup.completion import SHELLS
 from soilml.cli.output import write_stdout
 from soilml.errors import InputError
 
@@ -57,7 +56,7 @@ function __soilml_candidates
 end
 complete -c soilml -f -a '(__soilml_candidates)'
 """
-_SCRIPTS = dict(zip(SHELLS, (_BASH, _ZSH, _FISH), strict=True))
+_SCRIPTS = {"bash": _BASH, "zsh": _ZSH, "fish": _FISH}
 
 
 def run(args: argparse.Namespace) -> int:
@@ -66,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         found = candidates(args.make_parser, args.candidates or [""])
         write_stdout("".join(f"{word}\n" for word in found))
     elif args.shell is None:
-        raise InputError(f"which shell? give one of {', '.join(SHELLS)}")
+        raise InputError(f"which shell? give one of {', '.join(_SCRIPTS)}")
     else:
         write_stdout(_SCRIPTS[args.shell])
     return 0
@@ -160,9 +159,9 @@ def _named(command: str, dest: str, metavar: str) -> Iterable[str]:
 
         return GRAVITY
     if dest == "rule":
-        from soilml.cli.commands.estimate import FUSION_RULES
+        from soilml.onboard.multi_sensor import ACROSS_FILES
 
-        return FUSION_RULES
+        return ACROSS_FILES
     return ("run", "gear") if dest == "by" else ()
 
 
