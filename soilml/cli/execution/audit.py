@@ -49,11 +49,11 @@ def _text(found: Audit) -> str:
             f"{e.separating_snr:.3g}",
             "never" if math.isinf(e.detectable_size) else f"{e.detectable_size:.2g}",
             f"{e.absorbed:.0%}",
-            ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:2]),
+            ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:1]),
         )
         for e in found.effects
     ]
-    header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rivals")
+    header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rival")
     parts = [format_table(header, rows, text_columns=2, last_left=True)]
     if found.classes:
         parts.append(
