@@ -19,7 +19,7 @@ BLOCK = 8192
 #: Characters of a line of an aligned table.
 WIDTH = 100
 #: Fewest characters to which a column is wrapped.
-_LEAST_WRAPPED = 24
+_LEAST_WRAPPED = 16
 
 
 def csv_text(columns: Columns) -> str:

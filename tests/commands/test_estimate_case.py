@@ -49,7 +49,7 @@ def test_the_description_precedes_the_other_notes(folder, capsys):
     assert first.startswith(f"{WHEEL}: for a wheel of radius 0.15 m")
     assert main(["estimate", ANY_WHEEL, "runs.csv", "--case", "small.toml"]) == 0
     first = capsys.readouterr().err.splitlines()[0]
-    assert "radius 0.12 m" in first and "cohesion 0 to 3000 Pa" in first
+    assert "radius 0.12 m" in first and "cohesion 0 to 3 kPa" in first
 
 
 @pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])

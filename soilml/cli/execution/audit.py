@@ -15,6 +15,7 @@ from soilml.config.case import read_case
 from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import save_text
 from soilml.io.text_tables import format_table
+from soilml.report.terminal import shown_unit, significant
 
 if TYPE_CHECKING:
     from soilml.gap import Audit
@@ -44,14 +45,17 @@ def _text(found: Audit) -> str:
         (
             e.name,
             "yes" if e.separating_snr >= 3.0 else "no",
-            f"{e.size:g} {e.unit}".removesuffix(" 1"),
-            f"{e.residual_signal:.3g}",
-            f"{e.separating_snr:.3g}",
-            "never" if math.isinf(e.detectable_size) else f"{e.detectable_size:.2g}",
+            f"{significant(factor * e.size)} {unit}".rstrip(),
+            significant(e.residual_signal, 3),
+            significant(e.separating_snr, 3),
+            "never"
+            if math.isinf(e.detectable_size)
+            else significant(factor * e.detectable_size, 2),
             f"{e.absorbed:.0%}",
             ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:1]),
         )
         for e in found.effects
+        for factor, unit in [shown_unit(e.unit)]
     ]
     header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rival")
     parts = [format_table(header, rows, text_columns=2, last_left=True)]

@@ -118,7 +118,12 @@ def _picture(case: Case, found: Mapping[str, Identification], by: str | None) ->
 
 def _lines(fit: Fit) -> list[ParameterLine]:
     left = [fit.remaining_fraction.get(name) for name in fit.names]
-    return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left)
+    doubted = [
+        name
+        for name in fit.names
+        if any(f"{name} is not identified" in text for text in fit.warnings)
+    ]
+    return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left, doubted)
 
 
 def _fit_text(found: Fit) -> str:

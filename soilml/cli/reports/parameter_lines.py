@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,27 +17,33 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ParameterLine:
-    """A parameter in its display unit; `left` is the width over that of the prior, or None."""
+    """A parameter in its display unit; `left` is the width over that of the prior, or None.
+
+    `doubted` is whether a warning says that the rows do not identify it.
+    """
 
     name: str
     value: str
     ends: str
     unit: str
     left: float | None
+    doubted: bool = False
 
     @property
     def known(self) -> bool:
         """Whether the rows determine it."""
-        return self.left is None or self.left <= NOT_IDENTIFIED_ABOVE
+        return not self.doubted and (self.left is None or self.left <= NOT_IDENTIFIED_ABOVE)
 
     @property
     def sentence(self) -> str:
         """What was found, with unit and interval."""
         range_ = numbers.with_unit(self.ends, self.unit)
         if not self.known:
+            remains = ""
+            if self.left is not None:
+                remains = f": {100.0 * self.left:.0f} % of the width of its prior remains"
             return (
-                f"{numbers.capitalised(self.name)} is not determined by these rows: "
-                f"{100.0 * (self.left or 0.0):.0f} % of the width of its prior remains (90 %: "
+                f"{numbers.capitalised(self.name)} is not determined by these rows{remains} (90 %: "
                 f"{range_})."
             )
         value = numbers.with_unit(self.value, self.unit).replace(" ", "\N{NO-BREAK SPACE}")
@@ -52,6 +58,7 @@ def parameter_lines(
     low: Floats,
     high: Floats,
     left: Sequence[float | None],
+    doubted: Container[str] = (),
 ) -> list[ParameterLine]:
     """A line for each of p parameters, from arrays (p,) in SI units."""
     found = []
@@ -66,6 +73,7 @@ def parameter_lines(
                 numbers.format_interval(factor * ends[0], factor * ends[1], factor * error),
                 shown,
                 share,
+                name in doubted,
             )
         )
     return found

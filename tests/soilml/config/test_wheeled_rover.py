@@ -115,7 +115,7 @@ def test_what_is_wrong_is_told(model_file, old, new, said):
 def test_a_track_is_no_wheel_of_a_rover(model_file):
     text = model_file.read_text().replace('type = "wheel"', 'type = "track"\nbase = 0.5')
     model_file.write_text(text + ROVER)
-    with pytest.raises(InputError, match="its gear is a track, but .rover. shares the load"):
+    with pytest.raises(InputError, match=r"its gear is a track, but .rover. shares the load"):
         read_case(model_file)
 
 

@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
         raise ModelFileError(
             "this installation has no released model files; train one with soilml train"
         )
-    header = ("name", "gear", "reads", "estimates", "several readings", "kB")
+    header = ("name", "gear", "reads", "estimates", "readings", "kB")
     rows = []
     for name, file in files.items():
         estimator = Estimator.load(file)
