@@ -27,6 +27,8 @@ def shown_unit(unit: str, size: float = 0.0) -> tuple[float, str]:
         for factor, prefix in ((1e6, "M"), (1e3, "k")):
             if abs(size) >= factor:
                 return 1.0 / factor, prefix + unit
+    if unit == "Pa/m":
+        return 1e-3, "kPa/m"
     return _UNITS.get(unit, (1.0, "" if unit in ("1", "-") else unit))
 
 
