@@ -39,6 +39,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/log_import/readers/parquet_log.py": {"pyarrow"},
     "soilml/log_import/report/figures.py": {"matplotlib"},
     "soilml/log_import/units/conversion.py": {"pint"},
+    "soilml/physics/computing_device.py": {"torch"},
     "soilml/optional_imports.py": {"tomli"},  # before Python 3.11
 }
 

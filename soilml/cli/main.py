@@ -32,6 +32,7 @@ friction angle and shear modulus, each with its uncertainty.
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
   from a model file to C       soilml export-c
+  to a graph of fixed shapes   soilml export-step
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
@@ -59,6 +60,7 @@ COMMANDS = {
     "generate": "datagen.commands.generate",
     "train": "training.commands.train",
     "export-c": "training.commands.export_c",
+    "export-step": "training.commands.export_step",
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",
     "pull": "soilml.cli.commands.pull",

@@ -19,7 +19,11 @@ from soilml.identification.compatibility import (
     recipe_case,
     value_differences,
 )
-from soilml.identification.trained_estimator import condition_on_case, with_sensors_of
+from soilml.identification.trained_estimator import (
+    condition_on_case,
+    narrower_priors,
+    with_sensors_of,
+)
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import QUANTITIES
@@ -88,7 +92,7 @@ def apply_case_option(
             notes += own_notes
         elif case is not None:
             together = estimator.sets is not None and args.by is not None
-            notes += _compare(args, estimator, case, ignores_noise=not together)
+            notes += _compare(args, estimator, case, together)
             estimator = with_sensors_of(estimator, case) if together else estimator
         given.append(estimator)
     if case is not None and case.discrepancy:
@@ -97,7 +101,7 @@ def apply_case_option(
 
 
 def _compare(
-    args: argparse.Namespace, estimator: Estimator, case: Case, ignores_noise: bool
+    args: argparse.Namespace, estimator: Estimator, case: Case, together: bool
 ) -> list[str]:
     """Notes on what differs between a file for one wheel and the case.
 
@@ -117,10 +121,11 @@ def _compare(
             f"{estimator.path} is not for the wheel of {args.case}: {said}; train a file for this "
             "model, or correct [gear] and [[effect]]"
         )
+    used = narrower_priors(estimator, case) if together else {}
     different = chain(
         (text for text in values if text not in of_effects),
-        prior_differences(case, own, estimator.names),
-        _noise_differences(case, own) if ignores_noise else (),
+        prior_differences(case, own, [name for name in estimator.names if name not in used]),
+        () if together else _noise_differences(case, own),
     )
     return [
         f"{estimator.path}: {text.replace('the model file', args.case)}, which is ignored"

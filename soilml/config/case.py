@@ -141,7 +141,11 @@ def _path_of_gear(name: str, path: str) -> str:
     return path if name == UNNAMED_GEAR else f"gears.{name}.{rest}"
 
 
-def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
+def read_case(
+    path: str | os.PathLike[str],
+    effects: Mapping[str, type[Effect]] = EFFECTS,
+    with_bias: bool = False,
+) -> Case:
     """Read a case from a TOML model file.
 
     Parameters
@@ -151,6 +155,9 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
         [noise], [discrepancy] and [rover].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
+    with_bias
+        Whether [bias] is read; otherwise it is refused, so that nobody takes it as used where it is
+        not.
 
     Returns
     -------
@@ -186,6 +193,8 @@ def read_case(path: str | os.PathLike[str], effects: Mapping[str, type[Effect]] 
     """
     settings = read_settings(path)
     case = take_case(settings, effects)
+    if with_bias:
+        case = replace(case, bias=take_bias(settings.table("bias")))
     settings.finish()
     return case
 
@@ -198,8 +207,7 @@ def read_case_of_one_gear(
 ) -> Case:
     """Read the case of one gear; `gear` names it where the file has several.
 
-    The table [bias] is read with `with_bias`; otherwise it is refused, so that nobody takes it as
-    used where it is not.
+    The table [bias] is read with `with_bias`, as by `read_case`.
 
     Raises
     ------

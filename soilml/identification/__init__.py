@@ -21,6 +21,7 @@ from soilml.identification.linear import linear
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
+from soilml.identification.shared_errors.sizes import included_bias, usual_errors
 from soilml.io.table import Table
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.unsolvable import solvable
@@ -42,7 +43,12 @@ CLOSED_FORM = ("linear", "newton")
 
 @solvable("the identification")
 def identify(
-    case: Case, table: Table, free: Sequence[str] | None = None, method: str = "nonlinear"
+    case: Case,
+    table: Table,
+    free: Sequence[str] | None = None,
+    method: str = "nonlinear",
+    *,
+    as_usual: bool = False,
 ) -> Fit:
     """Identify parameters of a case from measured rows.
 
@@ -58,6 +64,11 @@ def identify(
         a prior.
     method
         A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
+    as_usual
+        Whether sensors and model have the errors that they usually have
+        (`soilml.identification.shared_errors.sizes`), beside those that the case declares; for
+        `nonlinear` and `posterior`. Otherwise the model is right, but for its [discrepancy], and
+        sensors have the errors of [noise] and [bias] alone.
 
     Returns
     -------
@@ -108,8 +119,15 @@ def identify(
             f"{table.source}: {len(table)} rows in one fit; at most {MOST_ROWS} are possible: "
             f"average rows that were driven alike, keep every {every}th, or fit each run by itself"
         )
-    data = read_observations(case, table)
-    fit = METHODS[method](case, data, select_free(case, free))
+    if as_usual and method in CLOSED_FORM:
+        raise InputError(
+            f"the {method} method takes the model as right; take nonlinear or posterior"
+        )
+    data, selected = read_observations(case, table), select_free(case, free)
+    if as_usual:
+        errors = usual_errors(case, data.load, [f.path for f in selected])
+        data = replace(data, shared_errors=errors)
+    fit = METHODS[method](case, data, selected)
     texts = [*_method_limits(fit, data, free), *_about_discrepancy(case, fit, data), *data.notes]
     return replace(fit, warnings=(*fit.warnings, *texts))
 
@@ -128,10 +146,13 @@ def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> 
 
 
 def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[str]:
-    """Whether the discrepancy of the case is in the intervals."""
+    """Whether discrepancy and bias of the case are in the intervals."""
     if fit.method in CLOSED_FORM:
-        return ignored_discrepancy(case, f"the {fit.method} method")
-    return included_discrepancy(case, data)
+        return [
+            *ignored_discrepancy(case, f"the {fit.method} method"),
+            *([f"the {fit.method} method ignores [bias]"] if case.bias else []),
+        ]
+    return [*included_discrepancy(case, data), *included_bias(case)]
 
 
 __all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]

@@ -20,6 +20,7 @@ from soilml.identification.predictions import (
     propagated_input_noise,
     stack_channels,
 )
+from soilml.identification.shared_errors.columns import SharedErrors, linearised_errors
 from soilml.numerics.noise_and_process import Whitener
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.sobol_points import sobol_points
@@ -65,11 +66,12 @@ class LeastSquaresProblem:
     reading: Floats  # (k,)
     std: Floats  # (k,)
     columns: Floats  # (k, q) of the model discrepancy
+    shared: SharedErrors
 
     @cached_property
     def whitener(self) -> Whitener:
-        """Inverse root of the covariance of noise and discrepancy."""
-        return Whitener.of(self.std, self.columns)
+        """Inverse root of the covariance of noise, discrepancy and shared errors."""
+        return Whitener.of(self.std, np.hstack([self.columns, self.shared.columns]))
 
     @cached_property
     def normal(self) -> NDArray[np.bool_]:
@@ -100,7 +102,7 @@ class LeastSquaresProblem:
 
     def residual(self, prediction: Floats) -> Floats:
         """Residuals in the units of the readings."""
-        residual = prediction - self.reading
+        residual = prediction + self.shared.offset - self.reading
         return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
 
     def linearised(self, u: Floats) -> tuple[Floats, Floats]:
@@ -109,7 +111,10 @@ class LeastSquaresProblem:
         return self.whitened(prediction), self.whitener(np.nan_to_num(jacobian).T).T
 
     def with_noise_at(self, optimum: Optimum) -> LeastSquaresProblem:
-        """The same problem, noise taken at the optimum's predictions or from its residuals."""
+        """The same problem, noise taken at the optimum's predictions or from its residuals.
+
+        Errors that all rows share are linearised there.
+        """
         case, data, free = self.case, self.data, self.free
         prediction = self.predict(optimum.u[None, :])
         declared = noise_at_prediction(case, data, prediction)[0]
@@ -117,7 +122,9 @@ class LeastSquaresProblem:
         from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
         total = np.hypot(declared, stack_channels(data, from_inputs)[0])
         estimated = _residual_noise(data, self.reading, self.residual(prediction)[0], len(free))
-        return replace(self, std=np.where(np.isfinite(total), total, estimated))
+        std = np.where(np.isfinite(total), total, estimated)
+        shared = linearised_errors(case, free, optimum.u, data, std, self.columns)
+        return replace(self, std=std, shared=shared)
 
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:

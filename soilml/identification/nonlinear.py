@@ -16,11 +16,13 @@ from soilml.identification.discrepancy import discrepancy_columns, stacked_colum
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.predictions import stacked_readings
+from soilml.identification.shared_errors.columns import SharedErrors
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Rounds in which undeclared noise is estimated from residuals and the fit repeated.
+#: Rounds in which the fit is repeated with noise estimated from its residuals, and with shared
+#: errors linearised at its optimum.
 NOISE_ROUNDS = 3
 #: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
 INITIAL_NOISE = 0.05
@@ -36,7 +38,8 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Noise of slip and load is propagated into sigma (effective variance). Relative noise is taken
     relative to the prediction: relative to the reading it would bias the fit low, by about twice
     its square, since readings with negative errors would have the larger weights. With a model
-    discrepancy, residuals are weighted by the inverse covariance of noise and discrepancy.
+    discrepancy, or errors that all rows share, residuals are weighted by the inverse covariance of
+    noise, discrepancy and these errors.
 
     Normal priors take part in the sum. The covariance is that of the linearised problem with a
     Gaussian prior of the uniform one's variance, enlarged by the squared distance between the
@@ -79,9 +82,13 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     reading, declared = stacked_readings(data)
     std = np.where(np.isfinite(declared), declared, _initial_noise(data))
     columns = stacked_columns(discrepancy_columns(case, data))
-    problem = LeastSquaresProblem(case, data, free, reading, std, columns)
+    shared = SharedErrors.none(reading.size)
+    problem = LeastSquaresProblem(case, data, free, reading, std, columns, shared)
     optimum = global_optimum(problem)
-    for _ in range(NOISE_ROUNDS if undeclared else 1):
+    if data.shared_errors:  # the optimum without them may be far from the one with them
+        problem = problem.with_noise_at(optimum)
+        optimum = global_optimum(problem)
+    for _ in range(NOISE_ROUNDS if undeclared or data.shared_errors else 1):
         problem = problem.with_noise_at(optimum)
         optimum = descend(problem, optimum.u)
     with_prior = optimum

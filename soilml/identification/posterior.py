@@ -38,6 +38,8 @@ Z_999 = 3.09
 FEWEST_READINGS = 8
 #: Rows from which on a part of them, of the second number, is sampled first.
 MANY_ROWS, FIRST_ROWS = 512, 256
+#: Rounds in which errors that all rows share are linearised where the posterior is.
+SHARED_ROUNDS = 2
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0
 
@@ -68,8 +70,8 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Its mean has the least expected squared error of all estimators on data from this model, prior
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
-    integrated out: its covariance is added to that of the noise. A parameter that the rows do not
-    determine has its prior as posterior.
+    integrated out: its covariance is added to that of the noise, and so is that of errors that all
+    rows share. A parameter that the rows do not determine has its prior as posterior.
 
     From eight readings on, polynomials of the parameters take the place of the model in the region
     of the posterior. They are used if they change the log density there by at most 0.1 (one
@@ -200,8 +202,9 @@ def _from_surface(
     sample = surface_sample(density, p, start)
     if sample is None and start is not None:  # it may have shown the wrong region
         sample = surface_sample(density, p)
-    if sample is not None and density.linearise_input_noise(sample):
-        sample = surface_sample(density, p, sample)
+    for _ in range(SHARED_ROUNDS if data.shared_errors else 1):
+        if sample is not None and density.linearise_at_mean(sample):
+            sample = surface_sample(density, p, sample)
     return sample
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
-from soilml.identification.discrepancy import discrepancy_columns
+from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.predictions import (
     noise_at_prediction,
@@ -19,6 +19,7 @@ from soilml.identification.predictions import (
     stack_channels,
     stacked_readings,
 )
+from soilml.identification.shared_errors.columns import SharedErrors, linearised_errors
 from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
 from soilml.numerics.sampling.importance_sampling import ImportanceSample
 from soilml.quantities import column
@@ -49,8 +50,12 @@ class PosteriorDensity:
         self.reading = stacked_readings(data)[0]
         self.columns = discrepancy_columns(case, data)
         self.noisy_input = bool(np.any(data.slip_std > 0.0) or np.any(data.load_std > 0.0))
-        #: noise that slip and load cause, (k,); linearised at the best of the first samples
+        #: whether noise of slip and load, or errors that all rows share, change the readings
+        self.linearises = self.noisy_input or bool(data.shared_errors)
+        #: noise that slip and load cause, (k,), and shared errors; linearised at the best of the
+        #: first samples
         self.input_std: Floats | None = None
+        self.shared = SharedErrors.none(self.reading.size)
 
     def __call__(self, u: Floats) -> Floats:
         """Log density (sets,) of parameter sets `u` (sets, p)."""
@@ -73,16 +78,19 @@ class PosteriorDensity:
         """Readings (sets, k) that parameter sets `u` (sets, p) predict."""
         size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
         y = np.concatenate([self._predict(u[i : i + size]) for i in range(0, len(u), size)])
-        if self.noisy_input and self.input_std is None:
+        if self.linearises and self.input_std is None:
             squares = self._squares_and_log_determinant(y, self._std(y))[0]
-            self.input_std = self._propagated(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
+            self._linearise(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
         return y
 
-    def linearise_input_noise(self, sample: ImportanceSample) -> bool:
-        """Linearise noise of slip and load at the mean of samples; False where there is none."""
-        if self.noisy_input:
-            self.input_std = self._propagated(sample.mean(sample.u))
-        return self.noisy_input
+    def linearise_at_mean(self, sample: ImportanceSample) -> bool:
+        """Linearise noise of slip and load, and shared errors, at the mean of samples.
+
+        False where there are none.
+        """
+        if self.linearises:
+            self._linearise(sample.mean(sample.u))
+        return self.linearises
 
     def of_predictions(self, y: Floats) -> Floats:
         """Log posterior density (sets,) of parameters that predict these readings (sets, k)."""
@@ -93,11 +101,15 @@ class PosteriorDensity:
 
     def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
         """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
+        groups, shared = self.columns, self.shared.columns
+        if shared.shape[1]:  # they act on several channels
+            groups = (np.hstack([stacked_columns(self.columns), shared]),)
+        residual = y + (self.shared.offset - self.reading)
         squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
-        for columns in self.columns:
+        for columns in groups:
             start, stop = stop, stop + len(columns)
             own = squared_residuals_and_log_determinant(
-                y[:, start:stop] - self.reading[start:stop], std[:, start:stop], columns
+                residual[:, start:stop], std[:, start:stop], columns
             )
             squares, log_determinant = squares + own[0], log_determinant + own[1]
         return squares, log_determinant
@@ -110,9 +122,11 @@ class PosteriorDensity:
     def _predict(self, u: Floats) -> Floats:
         return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
 
-    def _propagated(self, u: Floats) -> Floats:
-        data = self.data
-        noise = propagated_input_noise(
-            self.case, self.free, u, data.at, data.slip_std, data.load_std
-        )
-        return np.asarray(stack_channels(data, noise)[0])
+    def _linearise(self, u: Floats) -> None:
+        """Take changes of the readings with slip, load and shared errors at fractions (p,)."""
+        case, free, data = self.case, self.free, self.data
+        noise = propagated_input_noise(case, free, u, data.at, data.slip_std, data.load_std)
+        self.input_std = np.asarray(stack_channels(data, noise)[0])
+        std = self._std(self._predict(u[None, :]))[0]
+        process = stacked_columns(self.columns)
+        self.shared = linearised_errors(case, free, u, data, std, process)

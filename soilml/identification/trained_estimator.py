@@ -26,6 +26,8 @@ Floats = NDArray[np.float64]
 
 #: Fixed coefficients of the angle of maximum stress in such a file.
 FIXED_ANGLE = {"a0": 0.4, "a1": 0.15}
+#: Distance of the ends of two priors, in widths, up to which they are the same.
+SAME_PRIOR = 0.02
 
 
 def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list[str]]:
@@ -159,6 +161,25 @@ def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
     return conditioned.on(noise={"torque_bias": (0.0, 0.0)}, **exact)
 
 
+def narrower_priors(estimator: Estimator, case: Case) -> dict[str, tuple[float, float]]:
+    """Ends of the case's uniform priors that lie in those of a file and are not the same."""
+    found = {}
+    for i, name in enumerate(estimator.names):
+        own, low, high = case.prior.get(name), *_ends(estimator, i)
+        slack = SAME_PRIOR * (high - low)
+        if own is None or own.log or own.normal_std is not None:
+            continue
+        inside = low - slack <= own.lower and own.upper <= high + slack
+        if inside and max(own.lower - low, high - own.upper) > slack:
+            found[name] = (max(own.lower, low), min(own.upper, high))
+    return found
+
+
+def _ends(estimator: Estimator, i: int) -> tuple[float, float]:
+    """Ends of the prior of quantity `i`."""
+    return float(estimator.prior.lower[i]), float(estimator.prior.upper[i])
+
+
 def _log_std(prior: Prior, bearing: float) -> float:
     """Standard deviation of the logarithm of the bearing modulus."""
     if prior.log:
@@ -168,15 +189,17 @@ def _log_std(prior: Prior, bearing: float) -> float:
 
 def _prior_differences(estimator: Estimator, case: Case) -> list[str]:
     """Priors that differ from those of the file."""
-    texts = []
+    texts, used = [], narrower_priors(estimator, case)
     for i, name in enumerate(estimator.names):
-        own, ends = case.prior.get(name), (estimator.prior.lower[i], estimator.prior.upper[i])
+        own, ends = case.prior.get(name), _ends(estimator, i)
         width = ends[1] - ends[0]
+        if name in used:
+            continue
         if (
             own is None
             or own.log
             or own.normal_std is not None
-            or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > (0.02 * width)
+            or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > SAME_PRIOR * width
         ):
             unit = declared(Soil)[name].unit
             texts.append(

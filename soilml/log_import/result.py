@@ -80,42 +80,33 @@ class ImportedLog:
         return [(s.run, stretch) for s in self.series for stretch in s.stretches if stretch.why]
 
     def bias_toml(self) -> str:
-        """The table [bias] of a model file, and what identify and gap take in its place."""
+        """The table [bias] of a model file, and the options that `gap` takes in its place."""
         if not self.bias:
             return (
                 "# No constant of the map has a standard deviation: rows share no stated error.\n"
             )
         lines = [
             "# Errors that all rows share, from the uncertainties of the map. Add this table to",
-            "# the model file for `soilml estimate --case`; zero declares a sensor to be exact.",
+            "# the model file for `soilml identify` and `soilml estimate --case`; zero declares a",
+            "# sensor to be exact.",
             "[bias]",
         ]
         lines += [f"{key} = {_setting(noise)}" for key, noise in self.bias.items()]
-        lines += self._effect_lines()
+        lines += self._options_of_gap()
         return "\n".join(lines) + "\n"
 
-    def _effect_lines(self) -> list[str]:
-        """Commented effects that `identify` integrates out, and options for `gap`."""
-        effects = []
+    def _options_of_gap(self) -> list[str]:
+        """Commented options that tell `gap` of these errors."""
         torque, slip = self.bias.get("torque_Nm"), self.bias.get("slip")
         load = self.bias.get("load_N")
-        if torque is not None and torque.share:
-            effects.append(("torque-gain", "gain", torque.share))
-        if torque is not None and torque.constant:
-            effects.append(("torque-offset", "offset", torque.constant))
-        if slip is not None and slip.constant:
-            effects.append(("slip-offset", "offset", slip.constant))
-        if load is not None and load.share:
-            effects.append(("load-gain", "gain", load.share))
-        if not effects:
-            return []
-        lines = ["", "# `soilml identify` and `gap` refuse [bias]. For identify, write them as"]
-        lines.append("# effects with a prior:")
-        for name, parameter, std in effects:
-            lines += ["#", "# [[effect]]", f'# name = "{name}"', "# [effect.prior]"]
-            lines.append(f"# {parameter} = {{ normal = {std:.3g} }}")
-        options = " ".join(f"--checked {name}={std:.3g}" for name, _, std in effects)
-        return [*lines, "#", f"# For gap: {options}"]
+        sizes = {
+            "torque-gain": torque.share if torque else 0.0,
+            "torque-offset": torque.constant if torque else 0.0,
+            "slip-offset": slip.constant if slip else 0.0,
+            "load-gain": load.share if load else 0.0,
+        }
+        options = [f"--checked {name}={std:.3g}" for name, std in sizes.items() if std]
+        return ["", f"# soilml gap refuses [bias]; for it: {' '.join(options)}"] if options else []
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the rows over slip with 90 % intervals, a panel for each measured channel.

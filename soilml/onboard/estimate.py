@@ -258,6 +258,40 @@ class Estimate:
         ends = self.prior.lower, self.prior.upper
         return ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends).plot(ax)
 
+    def within(self, **box: tuple[float, float]) -> Estimate:
+        """The estimate where the soil is known to lie in a box within the prior.
+
+        Parameters
+        ----------
+        **box : (float, float)
+            Least and largest value of a quantity in SI units, by its name; the prior is uniform
+            between them. Other quantities keep their prior.
+
+        Returns
+        -------
+        Estimate
+            Its `prior` is the narrower one. Where hardly any of the estimate lies in the box, the
+            readings contradict it: `in_range` is false, and the answer is the narrower prior, as it
+            is where the estimate was the prior.
+
+        Raises
+        ------
+        InputError
+            For a name that is not estimated, and ends that are not in the prior and in order.
+
+        Examples
+        --------
+        >>> from soilml.onboard import Estimator
+        >>> estimator = Estimator.load("exported/wheel.onnx")
+        >>> wide = estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0, 60.0])
+        >>> narrow = wide.within(cohesion=(200.0, 800.0))
+        >>> bool(narrow["friction_angle"][1] < wide["friction_angle"][1])
+        True
+        """
+        from soilml.onboard.fusion.estimate_within import estimate_within
+
+        return estimate_within(self, box)
+
     def __getitem__(self, name: str) -> tuple[Floats, Floats]:
         """Mean and standard deviation (...) of one quantity; `InputError` for another name."""
         if name not in self.names:

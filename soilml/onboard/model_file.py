@@ -20,6 +20,8 @@ from soilml.onboard.set_posterior import SetPosterior
 
 #: Version of the file format: names of inputs and outputs, keys of the metadata.
 FORMAT = "3"
+#: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
+ONE_STEP = "step"
 #: Metadata key of each array of `RunConditions`, and of `RunPattern`.
 CONDITION_KEYS = {"lower": "lower", "upper": "upper", "std": "std"}
 PATTERN_KEYS = {
@@ -89,6 +91,11 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         raise ModelFileError(
             f"{file} has format {metadata['soilml_format']}; this version of soilml reads format "
             f"{FORMAT}"
+        )
+    if metadata.get("soilml_kind") == ONE_STEP:
+        raise ModelFileError(
+            f"{file} is one step of a stream, written by soilml export-step for other programs; "
+            "needed is the file that it was made from"
         )
     if not _is_intact(content, metadata):
         raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")

@@ -13,6 +13,12 @@ from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import check, mapped, values
 from soilml.physics.coarse_search import SinkageEstimate
+from soilml.physics.computing_device import (
+    DEVICE_CHUNK,
+    current_device,
+    from_device,
+    to_device,
+)
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect, apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, sensor_readings
@@ -95,9 +101,12 @@ class Model:
             For a value outside its bounds, or a missing field that an effect needs.
         """
         load_case, shape = self.load_case(soil, at)
-        xp = namespace(load_case.at.slip)
+        xp, device = namespace(load_case.at.slip), current_device()
         with np.errstate(all="ignore"):  # rows without an answer are flagged, not warned about
-            force = in_chunks(load_case, sensor_readings)
+            if device is not None and xp is np:
+                force = from_device(in_chunks(to_device(load_case, device), sensor_readings))
+            else:
+                force = in_chunks(load_case, sensor_readings)
         return Force(**{f.name: xp.reshape(getattr(force, f.name), shape) for f in fields(Force)})
 
     def profile(self, soil: Soil, at: Operating, points: int = 101) -> Profile:
@@ -178,10 +187,12 @@ def in_chunks(load_case: LoadCase, solve: Callable[..., Force], *columns: Array)
     at = apply_stage(load_case.effects, "on_operating", load_case.at, load_case)
     braking: Array = at.slip < 0
     size = braking.shape[0]
+    on_processor = str(getattr(braking, "device", "cpu")).startswith("cpu")
+    chunk = CHUNK if on_processor else DEVICE_CHUNK
     parts, order = [], []
     for group in (xp.nonzero(~braking)[0], xp.nonzero(braking)[0]):
-        for start in range(0, group.shape[0], CHUNK):
-            index = group[start : min(start + CHUNK, group.shape[0])]
+        for start in range(0, group.shape[0], chunk):
+            index = group[start : min(start + chunk, group.shape[0])]
             if index.shape[0] == size:
                 parts.append(solve(load_case, *columns))
             else:

@@ -104,5 +104,5 @@ def test_a_bias_that_cannot_be_is_refused(folder, line, said):
 
 def test_commands_that_do_not_use_a_bias_refuse_it(folder, capsys):
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")
-    assert main(["identify", "biased.toml", "runs.csv"]) == 2
+    assert main(["gap", "biased.toml", "runs.csv", "--out", "found"]) == 2
     assert "bias" in capsys.readouterr().err

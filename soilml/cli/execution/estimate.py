@@ -26,7 +26,7 @@ from soilml.cli.reports.estimate import check_size, estimate_report
 from soilml.cli.reports.report_files import write_with_report
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
-from soilml.cli.usual_model_error import usual_answer
+from soilml.cli.usual_errors.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (
     apply_case_option,
     check_table_wheel,
@@ -34,6 +34,7 @@ from soilml.cli.wheel_check import (
     trained_radius,
 )
 from soilml.errors import InputError, TableError
+from soilml.identification.trained_estimator import narrower_priors
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
@@ -218,16 +219,17 @@ def _all_rows(
 
 
 def _estimates_of_runs(
-    estimator: Estimator, readings: list[dict[str, Any]], by: str
+    estimator: Estimator, readings: list[dict[str, Any]], by: str, box: dict[str, Any]
 ) -> tuple[NDArray[np.int64], Estimate]:
-    """Rows in range (groups,), and the estimates of groups of readings."""
+    """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
     in_range = np.zeros(len(readings), dtype=np.int64)
     with progress_bar(f"estimating by {by}", len(readings)) as done:
 
         def estimates() -> Iterator[Estimate]:
             for i, one in enumerate(readings):
                 in_range[i] = estimator.rows_in_range(**one).sum()
-                yield estimator.run(**one)
+                found = estimator.run(**one)
+                yield found.within(**box) if box else found
                 done(i + 1)
 
         return in_range, Estimate.stack(estimates(), (len(readings),))
@@ -240,7 +242,8 @@ def _group_estimates(
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
     readings = [joint_readings(estimator, rows, case) for _, rows in groups]
-    in_range, estimate = _estimates_of_runs(estimator, readings, by)
+    box = {} if case is None else narrower_priors(estimator, case)
+    in_range, estimate = _estimates_of_runs(estimator, readings, by, box)
     position = {name: i for i, (name, _) in enumerate(groups)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])
@@ -254,7 +257,7 @@ def _group_estimates(
         columns[key] = np.where(answered, values[index], np.nan)
     columns["in_range"] = answered & estimate.in_range[index]
     names = [name for name, _ in groups]
-    second, second_notes = usual_answer(estimator, case, by, names, readings, estimate)
+    second, second_notes = usual_answer(estimator, case, by, names, readings, estimate, box)
     columns |= {key: np.where(answered, values[index], np.nan) for key, values in second.items()}
     notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
     notes += width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")

@@ -14,6 +14,7 @@ from soilml.cli.reports.identify import Identification, identify_report
 from soilml.cli.reports.report_files import write_with_report
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
+from soilml.cli.usual_errors.usual_fit import usual_fit
 from soilml.config.case import read_case
 from soilml.errors import FitError
 from soilml.io.read_table import RUNS
@@ -29,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
         need("matplotlib", "identify --report")
     from soilml.identification import identify
 
-    case = read_case(args.model, available_effects(args))
+    case = read_case(args.model, available_effects(args), with_bias=True)
     table = read_rows(args, RUNS)
     print_table_hints(table, case)
     free = parse_names(args.free)
@@ -37,9 +38,8 @@ def run(args: argparse.Namespace) -> int:
 
     def solve(rows: Table) -> Identification:
         fit = identify(case, rows, free, args.method)
-        if fit.method != "posterior":
-            return Identification(fit)
-        return Identification(fit, advice_after_fit(case, rows, free, fit))
+        advice = advice_after_fit(case, rows, free, fit) if fit.method == "posterior" else None
+        return Identification(fit, usual_fit(case, rows, free, args.method, fit), advice)
 
     if args.by is None:
         with working(f"identifying from {len(table)} rows"):

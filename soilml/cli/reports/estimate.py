@@ -10,7 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.cli.reports.parameter_lines import parameter_lines, parameter_table
+from soilml.cli.reports.parameter_lines import (
+    AS_RIGHT,
+    WITH_ERRORS,
+    parameter_lines,
+    parameter_table,
+)
 from soilml.errors import InputError
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
@@ -22,8 +27,6 @@ Floats = NDArray[np.float64]
 
 #: Ending of the columns of the second answer.
 USUAL = "usual"
-#: What the two answers are called on a page.
-AS_RIGHT, WITH_ERRORS = "model taken as right", "with the usual errors of a model"
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
 

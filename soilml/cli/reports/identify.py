@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from soilml.cli.reports.parameter_lines import ParameterLine, parameter_lines, parameter_table
+from soilml.cli.reports.parameter_lines import (
+    AS_RIGHT,
+    WITH_ERRORS,
+    ParameterLine,
+    parameter_lines,
+    parameter_table,
+)
+from soilml.cli.usual_errors.usual_fit import UsualFit, fit_cells
 from soilml.config.case import Case
 from soilml.experiment_design import Advice, is_identified
 from soilml.experiment_design.messages import next_row_messages, summary
@@ -19,7 +26,6 @@ from soilml.report import numbers
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.terminal import interval, rounded, shown_unit
 
 #: Most results that the page describes in sentences; more are in its table.
 _MOST_SENTENCES = 4
@@ -27,14 +33,17 @@ _MOST_SENTENCES = 4
 
 @dataclass(frozen=True)
 class Identification:
-    """A fit and, for the posterior method, the advised next measurement."""
+    """A fit, the one with usual errors, and the next measurement that the posterior advises."""
 
     fit: Fit
+    usual: UsualFit | None = None
     advice: Advice | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file, for one fit."""
         content = self.fit.as_json()
+        if self.usual is not None:
+            content |= {"as_usual": self.usual.as_json()}
         if self.advice is not None:
             identified = is_identified(self.advice.current_fraction).tolist()
             flags = dict(zip(self.advice.names, identified, strict=True))
@@ -42,9 +51,10 @@ class Identification:
         return content
 
     def text(self) -> str:
-        """The fit as a table, its warnings, and the advised next measurement."""
+        """The fit as a table, its warnings, the second answer, and the advised measurement."""
+        usual = [] if self.usual is None else ["", self.usual.text()]
         messages = [] if self.advice is None else ["", *next_row_messages(self.advice)]
-        return "\n".join([_fit_text(self.fit), *messages])
+        return "\n".join([_fit_text(self.fit), *usual, *messages])
 
 
 def identify_report(
@@ -55,17 +65,28 @@ def identify_report(
     files: tuple[str, str],
 ) -> Report:
     """The page of `identify`: results by group, groups without one; model file and table."""
-    lines = {name: _lines(one.fit) for name, one in found.items()}
-    every = [line for own in lines.values() for line in own]
+    answers = _answers(found, by)
+    lines = {label: _lines(fit) for label, fit in answers.items()}
+    # what is believed decides: the first answer of each group
+    every = [line for own in list(lines.values())[: len(found)] for line in own]
     first = next(iter(found.values())).fit
     known, total = sum(line.known for line in every), len(every)
     badge = "identified" if known == total else "partly identified" if known else "not identified"
     head = {name: f"{by} {name}: " if by else "" for name in (*found, *failed)}
-    if len(found) <= _MOST_SENTENCES:
-        answer = [head[name] + " ".join(x.sentence for x in own) for name, own in lines.items()]
+    if len(answers) <= _MOST_SENTENCES:
+        answer = [
+            (f"{numbers.capitalised(label)}: " if label else "")
+            + " ".join(line.sentence for line in own)
+            for label, own in lines.items()
+        ]
     else:
         answer = [f"The table has a result for each of {len(found)} values of {by}."]
     warnings = [head[name] + text for name, one in found.items() for text in one.fit.warnings]
+    warnings += [
+        head[name] + _with_marks(one.usual.note())
+        for name, one in found.items()
+        if one.usual is not None
+    ]
     warnings += [f"{by} {name} has no result: {why}" for name, why in failed.items()]
     steps = [
         head[name] + text
@@ -85,8 +106,8 @@ def identify_report(
         meaning=f"from {rows} rows by the method {first.method}; channels: {channels}",
         answer=answer,
         tone="named" if known == total else "suspected",
-        pictures=[_picture(case, found, by)],
-        tables=[parameter_table(lines, by)],
+        pictures=[_picture(case, answers)],
+        tables=[parameter_table(lines, "answer" if len(answers) > 1 else None)],
         warnings=warnings,
         next_steps=steps,
         notation=[
@@ -97,8 +118,27 @@ def identify_report(
     )
 
 
-def _picture(case: Case, found: Mapping[str, Identification], by: str | None) -> ReportPicture:
-    parts = [one.fit.intervals(case.prior, name) for name, one in found.items()]
+def _answers(found: Mapping[str, Identification], by: str | None) -> dict[str, Fit]:
+    """The fits by what they are called on the page; those that are to be believed first."""
+    usual, right = {}, {}
+    for name, one in found.items():
+        head = f"{by} {name}" if by else ""
+        if one.usual is None:
+            right[head] = one.fit
+        else:
+            usual[f"{head}, {WITH_ERRORS}".removeprefix(", ")] = one.usual.usual
+            right[f"{head}, {AS_RIGHT}".removeprefix(", ")] = one.fit
+    return usual | right
+
+
+def _with_marks(note: str) -> str:
+    """A note on the two answers with their names on the page."""
+    note = note.replace("the second answer", f"the answer “{WITH_ERRORS}”")
+    return note.replace("the first is", "the other is")
+
+
+def _picture(case: Case, answers: Mapping[str, Fit]) -> ReportPicture:
+    parts = [fit.intervals(case.prior, label) for label, fit in answers.items()]
     whole = ParameterIntervals(
         parts[0].names,
         parts[0].units,
@@ -109,11 +149,11 @@ def _picture(case: Case, found: Mapping[str, Identification], by: str | None) ->
         parts[0].prior_low,
         parts[0].prior_high,
     )
-    text = "; ".join(line.sentence for line in _lines(next(iter(found.values())).fit))
-    image = picture(whole.plot, len(whole.names), 1, whole.size, text if by is None else f"by {by}")
-    title = "Estimates and 90 % intervals"
+    text = "; ".join(line.sentence for line in _lines(next(iter(answers.values()))))
+    image = picture(whole.plot, len(whole.names), 1, whole.size, text)
     shaded = any(np.isfinite(whole.prior_low))
-    return ReportPicture(title, image, "Grey: the range of the prior." if shaded else "")
+    caption = "Grey: the range of the prior." if shaded else ""
+    return ReportPicture("Estimates and 90 % intervals", image, caption)
 
 
 def _lines(fit: Fit) -> list[ParameterLine]:
@@ -128,16 +168,10 @@ def _lines(fit: Fit) -> list[ParameterLine]:
 
 def _fit_text(found: Fit) -> str:
     remaining = found.remaining_fraction
-    rows = []
-    for name, value, std, low, high, unit in zip(
-        found.names, found.values, found.std, *found.interval, found.units, strict=True
-    ):
-        factor, shown = shown_unit(unit, float(abs(value)))
-        value, std, low, high = (factor * float(v) for v in (value, std, low, high))
-        left = f"{remaining[name]:.0%}" if name in remaining else ""
-        rows.append(
-            (name, rounded(value, std), rounded(std, std), interval(low, high, std), shown, left)
-        )
+    rows = [
+        (*cells, f"{remaining[cells[0]]:.0%}" if cells[0] in remaining else "")
+        for cells in fit_cells(found)
+    ]
     table = format_table(
         ("parameter", "value", "std", "90 % interval", "unit", "posterior/prior"), rows
     )

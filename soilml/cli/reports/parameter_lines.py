@@ -14,6 +14,9 @@ from soilml.report.page import ReportTable
 
 Floats = NDArray[np.float64]
 
+#: What the two answers of `identify` and `estimate` are called on a page.
+AS_RIGHT, WITH_ERRORS = "model taken as right", "with the usual errors of a model"
+
 
 @dataclass(frozen=True)
 class ParameterLine:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from soilml.errors import FitError
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.data.operating_points import operating_points, operating_points_of_rows
 from soilml.identification.data.rover_rows import with_rover_columns
+from soilml.identification.shared_errors.sizes import declared_errors
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
@@ -49,6 +51,8 @@ class Observations:
         Columns that are not fitted, since their noise is not declared and that of others is.
     notes
         Warnings about the table.
+    shared_errors
+        Standard deviations of the errors that all rows share, by name, as [bias] declares them.
     """
 
     at: Operating
@@ -57,6 +61,7 @@ class Observations:
     channels: tuple[Channel, ...]
     excluded_channels: tuple[str, ...]
     notes: tuple[str, ...] = ()
+    shared_errors: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def slip(self) -> Floats:
@@ -128,6 +133,7 @@ def read_observations(case: Case, table: Table) -> Observations:
         channels=tuple(used),
         excluded_channels=tuple(excluded),
         notes=tuple(notes),
+        shared_errors=declared_errors(case),
     )
 
 

@@ -137,7 +137,7 @@ def test_the_bias_is_read_by_estimate(tmp_path, model_file):
     model_file.write_text(model_file.read_text() + imported.bias_toml())
     bias = read_case_of_one_gear(model_file, with_bias=True).bias
     assert bias["torque_Nm"].share == 0.02 and bias["torque_Nm"].constant == 0.05
-    assert "gain = { normal = 0.02 }" in imported.bias_toml()
+    assert "--checked torque-gain=0.02 --checked torque-offset=0.05" in imported.bias_toml()
 
 
 def test_each_wheel_is_a_run_and_the_load_knows_the_slope(tmp_path):

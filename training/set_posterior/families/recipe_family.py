@@ -14,6 +14,7 @@ from scipy.stats import qmc
 from datagen.recipe import Recipe
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
+from soilml.identification.shared_errors.sizes import PULL_OFFSET_SHARE
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
@@ -29,7 +30,6 @@ from training.set_posterior.families.run_patterns import run_patterns
 from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
-    PULL_OFFSET_SHARE,
     SMALLEST,
     USUAL_ERRORS,
     ContextValues,

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.identification.shared_errors.sizes import USUAL_SENSOR_ERRORS
 from soilml.onboard.set_contract import LEAST_STD
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import Coordinate
@@ -21,19 +22,8 @@ SMALLEST = LEAST_STD
 #: taken: the logarithm of a normal variable that may be negative is not normal (zero is 3 sigma
 #: away here).
 MOST_RELATIVE_NOISE = 1.0 / 3.0
-#: Standard deviations of errors that the readings of a drive usually have in common: wheel speed
-#: over ground speed, effective radius and gear ratios, current to torque, mass and load transfer,
-#: the height at which the wheel touches the ground (m).
-USUAL_ERRORS = {
-    "slip_bias": 0.015,
-    "load_gain": 0.01,
-    "torque_gain": 0.03,
-    "sinkage_bias": 0.0005,
-    "drawbar_pull_bias": 0.0,
-    "model_error": 0.0,
-}
-#: Usual offset of a sensor of drawbar pull as a share of a typical load.
-PULL_OFFSET_SHARE = 0.01
+#: Standard deviations of errors that the readings of a drive usually have in common.
+USUAL_ERRORS = USUAL_SENSOR_ERRORS | {"drawbar_pull_bias": 0.0, "model_error": 0.0}
 #: Largest correction of the logarithm's bias, that of 20 % noise: its series in the noise holds
 #: there.
 MOST_LOG_CORRECTION = 0.02

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ def usual_answer(
     names: Sequence[Any],
     readings: Sequence[dict[str, Any]],
     first: Estimate,
+    box: Mapping[str, tuple[float, float]],
 ) -> tuple[dict[str, NDArray[Any]], list[str]]:
     """Columns (runs,) of estimates with the usual errors of the model, and notes on both answers.
 
@@ -43,13 +44,18 @@ def usual_answer(
         Inputs (rows,) of each run by name.
     first
         Estimates (runs,) with the model as it is.
+    box
+        Narrower priors of the case, by quantity.
     """
     declared = case is not None and bool(case.discrepancy)
     errors = {} if estimator.sets is None else estimator.sets.common_errors
     if declared or errors.get(MODEL_ERROR_INPUT) != 0.0:
         return {}, []
     usual = estimator.on(model_error=1.0)
-    second = Estimate.stack([usual.run(**inputs) for inputs in readings], (len(readings),))
+    second = Estimate.stack(
+        (usual.run(**inputs).within(**box) if box else usual.run(**inputs) for inputs in readings),
+        (len(readings),),
+    )
     return _columns(second), _notes(by, names, first, second)
 
 

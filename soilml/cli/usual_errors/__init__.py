@@ -1,0 +1,1 @@
+"""Second answers: with the errors that sensors and models usually have."""

@@ -1,0 +1,1 @@
+"""Errors that all rows of a set share: their sizes, and how they change the readings."""

@@ -1,0 +1,142 @@
+"""Estimates of a model file where a narrower prior is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from datagen.recipe import read_recipe
+from soilml import Estimator, Operating, Table, identify
+from soilml.cli import main
+from soilml.errors import InputError
+from soilml.numerics.prior import Prior
+from soilml.onboard.estimate import Reason
+from soilml.onboard.fusion.truncated_normal import truncated_normal
+from soilml.quantities import SHEAR
+
+EXACT = {"slip_bias": 0.0, "load_gain": 0.0, "torque_gain": 0.0}
+
+
+@pytest.fixture(scope="module")
+def rover():
+    return Estimator.load("exported/wheel.onnx").on(**EXACT)
+
+
+def readings(rng, truth, rows):
+    case = read_recipe("wheel").case
+    sound = case.with_values(dict(zip(SHEAR, truth, strict=True)))
+    slip, load = rng.uniform(0.05, 0.6, rows), rng.uniform(30.0, 120.0, rows)
+    torque = sound.model(sound.soil, Operating(slip=slip, load=load)).torque
+    return {"slip": slip, "load": load, "torque": torque * rng.normal(1.0, 0.02, rows)}
+
+
+def test_moments_are_those_of_draws():
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(3, 3))
+    mean, covariance = np.asarray([0.2, -0.3, 0.1]), root @ root.T
+    lower, upper = np.asarray([-0.5, -2.0, 0.0]), np.asarray([1.0, 0.4, 3.0])
+    found = truncated_normal(mean, covariance, lower, upper)
+    x = rng.multivariate_normal(mean, covariance, 400_000)
+    x = x[((x > lower) & (x < upper)).all(axis=1)]
+    assert found.mass == pytest.approx(len(x) / 400_000, abs=0.005)
+    assert found.mean == pytest.approx(x.mean(axis=0), abs=0.01)
+    assert found.std == pytest.approx(x.std(axis=0), rel=0.03)
+    assert found.covariance == pytest.approx(np.cov(x.T), abs=0.01)
+    low, high = np.quantile(x, [0.05, 0.95], axis=0)
+    assert found.low == pytest.approx(low, abs=0.02)
+    assert found.high == pytest.approx(high, abs=0.02)
+    whole = multivariate_normal(mean, covariance).cdf(upper, lower_limit=lower)
+    assert found.mass == pytest.approx(whole, abs=0.003)
+
+
+def test_the_file_s_own_prior_changes_nothing(rover):
+    wide = rover.run(**readings(np.random.default_rng(2), [900.0, 0.6, 0.015], 8))
+    prior = zip(wide.names, wide.prior.lower, wide.prior.upper, strict=True)
+    same = wide.within(**{name: (low, high) for name, low, high in prior})
+    for key in ("mean", "std", "low", "high"):
+        assert getattr(same, key) == pytest.approx(getattr(wide, key))
+    assert same.in_range == wide.in_range and same.reason == wide.reason
+
+
+def test_it_is_nearly_the_posterior_with_that_prior(rover):
+    """Errors beside those of the exact posterior, over random soils and boxes."""
+    rng, case = np.random.default_rng(3), read_recipe("wheel").case
+    scale = np.asarray([case.prior[name].std for name in SHEAR])
+    errors, exact, wide, held = [], [], [], []
+    for _ in range(20):
+        truth = np.asarray([case.prior[name].at(rng.random()) for name in SHEAR])
+        box = {}
+        for name, value in zip(SHEAR, truth, strict=True):
+            own = case.prior[name]
+            width = (own.upper - own.lower) * rng.uniform(0.1, 0.5)
+            low = float(np.clip(value - width * rng.random(), own.lower, own.upper - width))
+            box[name] = (low, low + width)
+        rows = readings(rng, truth, 16)
+        before = rover.run(**rows)
+        found = before.within(**box)
+        table = Table({"slip": rows["slip"], "load_N": rows["load"], "torque_Nm": rows["torque"]})
+        narrow = replace(case, prior={name: Prior(*ends) for name, ends in box.items()})
+        best = identify(narrow, table, SHEAR, "posterior")
+        errors.append((found.mean - truth) / scale)
+        exact.append((best.values - truth) / scale)
+        wide.append((before.mean - truth) / scale)
+        held.append((found.low <= truth) & (truth <= found.high))
+        assert (found.low >= found.prior.lower).all() and (found.high <= found.prior.upper).all()
+    rms = [np.sqrt(np.mean(np.square(e))) for e in (errors, exact, wide)]
+    assert rms[0] < 1.1 * rms[1]
+    assert rms[0] < rms[2]
+    assert 0.75 <= np.mean(held) <= 1.0
+
+
+def test_readings_that_contradict_it_are_flagged(rover):
+    wide = rover.run(**readings(np.random.default_rng(4), [2500.0, 0.75, 0.01], 24))
+    found = wide.within(friction_angle=(0.44, 0.46))
+    assert not found.in_range and found.reason == Reason.INCONSISTENT
+    assert found["friction_angle"][0] == pytest.approx(0.45)
+    assert found.abstains.all()
+
+
+def test_the_prior_becomes_the_narrower_one(rover):
+    found = rover.prior_estimate(2).within(cohesion=(0.0, 600.0))
+    assert found.mean[:, 0] == pytest.approx(300.0)
+    assert found.std[:, 0] == pytest.approx(600.0 / np.sqrt(12.0))
+    assert (found.reason == Reason.OUT_OF_RANGE).all()
+
+
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ({"kphi": (0.0, 1.0)}, "not estimated"),
+        ({"cohesion": (500.0, 100.0)}, "in order"),
+        ({"cohesion": (0.0, 1e6)}, "within the prior"),
+        ({"cohesion": (0.0, np.nan)}, "cohesion"),
+        ({"cohesion": 100.0}, "two values"),
+    ],
+)
+def test_a_bad_box_is_refused(rover, box, said):
+    with pytest.raises(InputError, match=said):
+        rover.prior_estimate().within(**box)
+
+
+def test_the_command_takes_a_narrower_prior_of_the_case(tmp_path, model_file, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    wheel = model_file.read_text()
+    (tmp_path / "narrow.toml").write_text(wheel.replace("3000.0", "700.0"))
+    rows = readings(np.random.default_rng(5), [600.0, 0.6, 0.015], 8)
+    lines = ["run,slip,load_N,torque_Nm"]
+    lines += [
+        f"a,{s},{w},{t}"
+        for s, w, t in zip(*(rows[k] for k in ("slip", "load", "torque")), strict=True)
+    ]
+    (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
+    std = {}
+    for case in ("model.toml", "narrow.toml"):
+        assert main(["estimate", "wheel", "runs.csv", "--case", case, "--by", "run"]) == 0
+        captured = capsys.readouterr()
+        head, line = captured.out.strip().splitlines()[:2]
+        std[case] = float(
+            dict(zip(head.split(","), line.split(","), strict=True))["cohesion_Pa_std"]
+        )
+        assert "is ignored" not in captured.err
+    assert std["narrow.toml"] < 0.9 * std["model.toml"]

@@ -1,0 +1,70 @@
+"""`soilml export-step`: one step of a stream as an ONNX file of fixed shapes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from soilml.cli.options import InputFile, whole_number
+from soilml.errors import InputError
+from soilml.io.atomic_files import output_files
+from soilml.optional_imports import need
+
+HELP = "write one step of a stream as an ONNX file of fixed shapes"
+DESCRIPTION = """\
+Write the set posterior of MODEL.onnx as OUT.onnx, in which every shape is a
+number: one row in, and a memory that is always as large as it can be. It is
+for compilers that need fixed shapes, such as those of accelerators.
+
+  soilml export-step exported/wheel.onnx wheel_step.onnx
+
+docs/onnx-interface.md says how its memory is fed from step to step. Python
+uses MODEL.onnx itself; soilml export-c writes C that needs no library.
+"""
+#: Rows that one step may take.
+MOST_ROWS = 4096
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
+    parser.add_argument("out", metavar="OUT.onnx", help="file to write")
+    parser.add_argument(
+        "--rows",
+        type=whole_number,
+        default=1,
+        metavar="N",
+        help="rows that each step takes (default 1)",
+    )
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return output_files(args.out, ".onnx")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the graph."""
+    need("onnx", "export-step")
+    import onnx
+
+    from soilml.onboard.model_file import ONE_STEP, open_model
+    from training.export.model_file import write_model
+    from training.export.one_step import one_step_graph
+
+    if not 1 <= args.rows <= MOST_ROWS:
+        raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
+    _, metadata = open_model(args.model)
+    graph = one_step_graph(onnx.load(str(args.model)), str(args.model), args.rows)
+    own = {key: value for key, value in metadata.items() if not key.endswith("_sha256")}
+    kept = {key: metadata[key] for key in ("recipe_sha256", "data_sha256") if key in metadata}
+    origin = {"soilml_kind": ONE_STEP, "step_of_graph_sha256": metadata["graph_sha256"]}
+    write_model(graph, own | kept | origin, args.out)
+    memory = next(v for v in graph.graph.input if v.name == "memory").type.tensor_type.shape.dim
+    print(
+        f"written: {args.out}; {args.rows} rows a step, memory {memory[0].dim_value} x "
+        f"{memory[1].dim_value}, {len(graph.graph.node)} nodes",
+        file=sys.stderr,
+    )
+    return 0
