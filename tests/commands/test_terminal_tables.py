@@ -47,7 +47,17 @@ WORDS = {
     "papers": ["comin2017-slip"],
 }
 #: Commands whose tables have tests of their own, or that print none.
-ELSEWHERE = {"init", "completion", "import", "generate", "train", "export-c", "compare", "climb"}
+ELSEWHERE = {
+    "init",
+    "completion",
+    "import",
+    "generate",
+    "train",
+    "export-c",
+    "export-step",
+    "compare",
+    "climb",
+}
 
 
 def test_every_command_is_looked_at():
