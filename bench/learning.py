@@ -31,7 +31,8 @@ def comparison() -> str:
     }
     results = benchmark(models)
     text = f"{format_goals(goals(results))}\n\n{format_tables(results)}"
-    return f"{LEGEND}\n\n```\n{text}\n```"
+    legend = " ".join(f"`{term}`: {meaning}" for term, meaning in LEGEND)
+    return f"{legend}\n\n```\n{text}\n```"
 
 
 def sets(folder: Path) -> str:

@@ -28,6 +28,7 @@ RUN = (
     "docs/advice.md",
     "docs/import.md",
     "docs/pull.md",
+    "docs/reports.md",
     "docs/papers/slip_models.md",
     "exported/README.md",
 )

@@ -10,9 +10,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from rig import write_logs
 
 from soilml.cli import main
-from soilml.gap.html.svg_image import report_style
 from soilml.log_import import import_log
-from soilml.log_import.report.figures import draw_run, draw_slip
+from soilml.log_import.report.figures import draw_run
+from soilml.log_import.rows_figure import draw_over_slip, panels_over_slip
+from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")
 #: What a look at the map changes: the gear ratio, which no log tells.
@@ -35,7 +36,10 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
         first, second, third = figure.subfigures(1, 3)
         draw_run(first, imported.series[0], imported)
         draw_run(second, imported.series[3], imported)
-        draw_slip(third, imported)
+        shown = panels_over_slip(imported.table, imported.radius)[:2]
+        for axes, panel in zip(third.subplots(2, 1, sharex=True), shown, strict=True):
+            draw_over_slip(axes, imported.table, panel)
+        third.subplots_adjust(hspace=0.35)
         first.axes[-1].set_xlabel("time, s; sand_1")
         second.axes[-1].set_xlabel("time, s; sand_4: somebody pulls on the carriage at the end")
         figure.savefig(target, dpi=80, facecolor="white")

@@ -91,11 +91,12 @@ def _common_error_note(sets: SetPosterior) -> list[str]:
         "slip_bias": "slip {:g}",
         "load_gain": "load {:.3g} %",
         "torque_gain": "torque {:.3g} %",
-        "sinkage_bias": "sinkage {:g} m",
+        "sinkage_bias": "sinkage {:g} mm",
         "drawbar_pull_bias": "drawbar pull {:g} N",
     }
+    factors = {"slip_bias": 1.0, "sinkage_bias": 1e3, "drawbar_pull_bias": 1.0}  # gains in %
     said = [
-        texts[name].format(100.0 * std if name.endswith("gain") else std)
+        texts[name].format(factors.get(name, 100.0) * std)
         for name, std in sets.common_errors.items()
         if std > 0.0 and name in texts
     ]

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.options import InputFile
+from soilml.cli.options import input_files
 from soilml.cli.process import (
     StopSignals,
     Terminated,
@@ -48,6 +48,7 @@ COMMANDS = {
     "init": "soilml.cli.commands.setup.init",
     "models": "soilml.cli.commands.setup.models",
     "doctor": "soilml.cli.commands.setup.doctor",
+    "completion": "soilml.cli.commands.setup.completion",
     "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",
@@ -157,7 +158,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
         args = parser(words[0] if words else "").parse_args(words)
-        check_outputs(args.outputs(args), _input_files(args))
+        args.command_line, args.make_parser = words, parser
+        check_outputs(args.outputs(args), input_files(args))
         status = int(args.run(args) or 0)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -183,12 +185,6 @@ def _run(arguments: Sequence[str] | None) -> int:
         return fail(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
     except MemoryError:
         return fail("this machine has too little memory for the command: ask for fewer rows", 2)
-
-
-def _input_files(args: argparse.Namespace) -> list[str]:
-    """Every file that the command reads: the arguments that are declared as `InputFile`."""
-    lists = (v if isinstance(v, list) else [v] for v in vars(args).values())
-    return [value for values in lists for value in values if isinstance(value, InputFile)]
 
 
 def _join_negative_values(words: list[str]) -> list[str]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.io.number_text import read_number, read_whole_number
-from soilml.io.read_table import FILLED, read_table
-from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 
 #: Rows beyond which a table would not fit into the memory of a small machine.
@@ -27,19 +24,6 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
     from soilml.physics.effects.user_effects import load_effects
 
     return {**EFFECTS, **load_effects(args.effects)}
-
-
-def read_rows(
-    args: argparse.Namespace, need: Sequence[str], filled: Sequence[str] = FILLED
-) -> Table:
-    """The rows of the table `args.runs` that `--where` selects; see `read_table`."""
-    table = read_table(args.runs, need, filled=filled, ignore_extra=args.ignore_extra)
-    if args.where is None:
-        return table
-    name, equals, value = args.where.partition("=")
-    if not equals:
-        raise InputError(f"--where is {args.where!r}; needed is COLUMN=VALUE, such as run=sand_3")
-    return table.where(name, value)
 
 
 def check_seed(args: argparse.Namespace) -> None:

@@ -7,7 +7,11 @@ errors of usage answer at once.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from pathlib import Path
 
+from soilml.cli.output_names import REPORT_FILES
+from soilml.errors import InputError
 from soilml.io.number_text import read_number, read_whole_number
 
 
@@ -31,6 +35,38 @@ def add_effects_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_report_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--report`, whose files `report_outputs` names."""
+    parser.add_argument(
+        "--report",
+        metavar="FOLDER",
+        help="folder for report.html, a page with picture, table and warnings, and report.json",
+    )
+
+
+def report_outputs(args: argparse.Namespace) -> list[Path]:
+    """The files of `--report`, where the folder exists already."""
+    return folder_outputs("--report", args.report, REPORT_FILES)
+
+
+def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[Path]:
+    """The files of an output folder, where it exists; `InputError` where it is no folder."""
+    if path is None:
+        return []
+    if not path:
+        raise InputError(f"{option} is empty; needed is a folder")
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{option} {path} is a file; needed is a folder")
+    return [folder / name for name in names] if folder.is_dir() else []
+
+
+def input_files(args: argparse.Namespace) -> list[str]:
+    """Every file that a command reads: the arguments that are declared as `InputFile`."""
+    lists = (v if isinstance(v, list) else [v] for v in vars(args).values())
+    return [value for values in lists for value in values if isinstance(value, InputFile)]
+
+
 def add_gear_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--gear`."""
     parser.add_argument(
@@ -46,7 +82,7 @@ def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--where` and `--ignore-extra`, which `option_values.read_rows` follows."""
+    """Declare `--where` and `--ignore-extra`, which `table_reading.read_rows` follows."""
     parser.add_argument("--where", metavar="COLUMN=VALUE", help="use only the rows with this value")
     add_ignore_extra_option(parser)
 

@@ -4,27 +4,47 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
-from soilml.io.text_tables import csv_blocks, format_table
+from soilml.io.text_tables import WIDTH, csv_blocks, format_table
+from soilml.report.terminal import rounded, shown_column
+
+_ENDING = re.compile(r"_(std|p05|p95)$")
+#: Most characters of a text cell on a terminal.
+_MOST_TEXT = 44
 
 
 def write_columns(columns: Mapping[str, Any], out: str | None) -> None:
     """Write the columns to the CSV file `out`; without one, print them."""
     if out is not None:
-        with atomic_output(out) as part, part.open("w", encoding="utf-8") as opened:
-            opened.writelines(csv_blocks(columns))
+        with atomic_output(out) as part:
+            save_columns(columns, part)
+    tell_columns(columns, out)
+
+
+def save_columns(columns: Mapping[str, Any], path: Path) -> None:
+    """Write a CSV file, in blocks of rows."""
+    with path.open("w", encoding="utf-8") as opened:
+        opened.writelines(csv_blocks(columns))
+
+
+def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
+    """Say how many rows were written to `out`; without one, print them as table or CSV."""
+    if out is not None:
         count = len(next(iter(columns.values())))
         print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
-    else:
-        for text in [f"{format_columns(columns)}\n"] if is_terminal() else csv_blocks(columns):
-            write_stdout(text)
+        return
+    for text in [f"{format_columns(columns)}\n"] if is_terminal() else csv_blocks(columns):
+        write_stdout(text)
 
 
 def is_terminal() -> bool:
@@ -54,17 +74,62 @@ def _with_null(value: Any) -> Any:
     return value
 
 
-def format_columns(columns: Mapping[str, Any]) -> str:
-    """The columns as an aligned table with four significant digits, text columns first."""
+def format_columns(columns: Mapping[str, Any], width: int = WIDTH) -> str:
+    """The columns as an aligned table, text first, in usual units and as many digits as are known.
+
+    A standard deviation stands beside its value. Columns that do not fit into `width` characters
+    are left out, and a line names them: ends of intervals first, then the last ones.
+    """
     text = [name for name, values in columns.items() if np.asarray(values).dtype.kind in "US"]
-    order = [*text, *[name for name in columns if name not in text]]
-    rows = zip(*[[_short(v) for v in columns[name]] for name in order], strict=True)
-    return format_table(order, list(rows), text_columns=len(text))
+    shown = {name: _cut_cells(columns[name]) for name in text}
+    for name in columns:
+        if name in text or (name.endswith("_std") and name.removesuffix("_std") in columns):
+            continue
+        cells = _cells(columns, name)
+        if f"{name}_std" in columns:
+            pairs = zip(cells, _cells(columns, f"{name}_std"), strict=True)
+            cells = [f"{value} +- {std}" if value and std else value for value, std in pairs]
+        shown[shown_column(name)[1]] = cells
+    left_out = _left_out(shown, width)
+    kept = [name for name in shown if name not in left_out]
+    rows = list(zip(*(shown[name] for name in kept), strict=True))
+    table = format_table(kept, rows, text_columns=len(text))
+    if not left_out:
+        return table
+    names = textwrap.fill(f"not shown here, but with --out: {', '.join(left_out)}", width)
+    return f"{table}\n{names}"
 
 
-def _short(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, bool | np.bool_):
-        return "yes" if value else "no"
-    return "" if np.isnan(value) else f"{value:.4g}"
+def _cells(columns: Mapping[str, Any], name: str) -> list[str]:
+    """Cells of a column of numbers, rounded by its standard deviation or by its interval."""
+    factor, _ = shown_column(name)
+    values = np.asarray(columns[name])
+    if values.dtype.kind in "b":
+        return ["yes" if value else "no" for value in values]
+    base = _ENDING.sub("", name)
+    spread = np.zeros(values.size)
+    if f"{base}_std" in columns:
+        spread = np.asarray(columns[f"{base}_std"], dtype=float)
+    elif f"{base}_p05" in columns and f"{base}_p95" in columns:
+        spread = (np.asarray(columns[f"{base}_p95"]) - np.asarray(columns[f"{base}_p05"])) / 3.3
+    pairs = zip(factor * values.astype(float), factor * np.nan_to_num(spread), strict=True)
+    return [rounded(float(value), float(std)) for value, std in pairs]
+
+
+def _cut_cells(values: Sequence[Any]) -> list[str]:
+    return [t if len(t) <= _MOST_TEXT else f"{t[: _MOST_TEXT - 3]}..." for t in map(str, values)]
+
+
+def _left_out(shown: Mapping[str, Sequence[str]], width: int) -> list[str]:
+    """Names of the columns that do not fit, in their order."""
+    widths = {name: max(map(len, (name, *cells))) + 2 for name, cells in shown.items()}
+    order = [*reversed(list(shown))]
+    first = [n for n in order if n.endswith(("_p05", "_p95"))]
+    out: list[str] = []
+    for name in dict.fromkeys([*first, *order]):
+        if sum(widths[n] for n in shown if n not in out) - 2 <= width:
+            break
+        if name in ("in_range", "run") or len(out) == len(shown) - 1:
+            continue
+        out.append(name)
+    return [name for name in shown if name in out]

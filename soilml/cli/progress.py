@@ -1,17 +1,26 @@
-"""Progress on standard error, for everything that takes more than about two seconds."""
+"""Progress on standard error, for everything that takes more than about two seconds.
+
+A terminal shows bars. Elsewhere, as in the log of a job, there are a few lines: the first after
+`FIRST_LINE` seconds, so that quick commands are silent, and then one in `BETWEEN_LINES` seconds.
+"""
 
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+#: Seconds before the first line, and between two lines, where standard error is no terminal.
+FIRST_LINE, BETWEEN_LINES = 2.0, 20.0
 
 
 @contextmanager
 def progress_bar(text: str, total: int | None) -> Iterator[Callable[[int], None]]:
-    """A function of the number of items done, which draws a bar where stderr is a terminal."""
+    """A function of the number of items done, which draws a bar, or prints a line at times."""
     if not sys.stderr.isatty():
-        yield lambda done: None
+        yield _lines(text, total)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -31,21 +40,31 @@ def progress_bar(text: str, total: int | None) -> Iterator[Callable[[int], None]
 
 @contextmanager
 def working(text: str) -> Iterator[None]:
-    """A bar that moves, with the time, for work whose share done is not known."""
-    with progress_bar(text, None):
+    """A bar that moves, with the time, for work whose share done is not known; or one line."""
+    if sys.stderr.isatty():
+        with progress_bar(text, None):
+            yield
+        return
+    line = threading.Timer(FIRST_LINE, _say, [f"{text} ..."])
+    line.daemon = True
+    line.start()
+    try:
         yield
+    finally:
+        line.cancel()
 
 
 @contextmanager
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
-    """A function (stage, done, total): a bar for each stage on a terminal, otherwise a line."""
+    """A function (stage, done, total): a bar for each stage on a terminal, otherwise lines."""
     if not sys.stderr.isatty():
-        started: set[str] = set()
+        stages: dict[str, Callable[[int], None]] = {}
 
         def announce(text: str, done: int, total: int) -> None:
-            if text not in started:
-                started.add(text)
-                print(f"{text} ...", file=sys.stderr, flush=True)
+            if text not in stages:
+                stages[text] = _lines(text, total, BETWEEN_LINES)
+                _say(f"{text} ...")
+            stages[text](done)
 
         yield announce
         return
@@ -67,3 +86,21 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
             progress.update(tasks[text], completed=done, total=total)  # type: ignore[arg-type]
 
         yield update
+
+
+def _lines(text: str, total: int | None, first: float | None = None) -> Callable[[int], None]:
+    """A function of the number of items done that prints a line where it is time for one."""
+    due = time.monotonic() + (FIRST_LINE if first is None else first)
+
+    def tell(done: int) -> None:
+        nonlocal due
+        if time.monotonic() < due or (total is not None and done >= total):
+            return
+        due = time.monotonic() + BETWEEN_LINES
+        _say(f"{text}: {100 * done // total} %" if total else f"{text} ...")
+
+    return tell
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

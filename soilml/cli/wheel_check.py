@@ -27,6 +27,7 @@ from soilml.identification.trained_estimator import (
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import QUANTITIES
+from soilml.report.terminal import shown_unit, significant
 
 _HINT = "select rows with --where, or train a model for this wheel"
 
@@ -45,7 +46,7 @@ def describe_file(estimator: Estimator) -> str:
     effects = [e["name"] for e in json.loads(estimator.metadata["recipe"]).get("effect", [])]
     with_effects = f"with {', '.join(effects)}" if effects else "without effects"
     priors = [
-        f"{entry['name'].replace('_', ' ')} {ends[0]:.4g} to {ends[1]:.4g} {entry['unit']}"
+        f"{entry['name'].replace('_', ' ')} {_prior_text(ends[0], ends[1], entry['unit'])}"
         if (scale := entry.get("scale")) is None or scale in fixed
         else f"{entry['name'].replace('_', ' ')} {entry['lower']:.3g} to 1 {scale}"
         for entry, *ends in zip(
@@ -60,6 +61,12 @@ def describe_file(estimator: Estimator) -> str:
         f"{' of ' if sizes else ''}{', '.join(sizes)}, {with_effects}; reads "
         f"{', '.join(estimator.inputs)}; estimates {', '.join(priors)}"
     )
+
+
+def _prior_text(low: float, high: float, unit: str) -> str:
+    """A range in the unit in which a terminal shows it."""
+    factor, shown = shown_unit(unit, high)
+    return f"{significant(factor * low)} to {significant(factor * high)} {shown}".rstrip()
 
 
 def apply_case_option(

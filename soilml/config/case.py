@@ -260,7 +260,9 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
     discrepancy = take_discrepancy(settings.table("discrepancy"))
-    rover = take_rover(settings.table("rover"), gears) if "rover" in settings else None
+    rover = (
+        take_rover(settings.table("rover"), gears or {"": model}) if "rover" in settings else None
+    )
     return Case(model, own_soil, prior, noise, discrepancy, gears, rover=rover)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.parameters import Parameter
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.model import Model
 
 Floats = NDArray[np.float64]
@@ -140,8 +141,10 @@ _GRAVITY = Parameter("m/s^2", 0.01, 30.0, "gravity")
 def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
     """Read `[rover]`: mass, centre_of_mass, gravity and [rover.wheels].
 
-    Raises `InputError` for a missing or misspelt key, a value out of bounds, an unknown gear, or
-    fewer than two wheels.
+    `gears` are the models of the file by name; a single one has the name "".
+
+    Raises `InputError` for a missing or misspelt key, a value out of bounds, an unknown gear, a
+    gear that is no rigid wheel, or fewer than two wheels.
     """
     if "wheels" not in settings and "radius" in settings:
         settings.fail(
@@ -162,8 +165,14 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
         forward, left = _place(own, "position", 2, "[forward, left] in m")
         gear = own.text("gear", "") or None
         if gear is not None and gear not in gears:
-            known = ", ".join(gears) or "none; write [gears.NAME] in place of [gear]"
+            known = ", ".join(filter(None, gears)) or "none; write [gears.NAME] in place of [gear]"
             own.fail(f"gear is {gear!r}; gears of this file: {known}")
+        kind = gears[gear or next(iter(gears))].gear
+        if not isinstance(kind, RigidWheel):
+            own.fail(
+                f"its gear is a {kind.name}, but [rover] shares the load among wheels that touch "
+                "the ground at one place each; leave [rover] out, and ask for one gear with --load"
+            )
         own.finish()
         wheels[name] = RoverWheel(forward, left, gear)
     if len(wheels) < 2:

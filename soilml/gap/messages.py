@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy, decimal
+from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy
 from soilml.gap.results import GapReport
 from soilml.gap.verdict.decision import NOT_DECISIVE
+from soilml.report.numbers import decimal
 
 #: Suspects that the sentence lists.
 LISTED_SUSPECTS = 3

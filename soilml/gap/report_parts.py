@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -176,11 +175,3 @@ class ReadingsAndPredictions:
     after: Floats
     after_std: Floats
     held_out: NDArray[np.bool_]
-
-
-def decimal(value: float, digits: int = 3) -> str:
-    """A number with this many significant digits, never with a power of ten."""
-    if not math.isfinite(value):
-        return f"{value:g}"
-    exponent = 0 if value == 0.0 else math.floor(math.log10(abs(value)))
-    return f"{value:.{max(0, digits - 1 - exponent)}f}"

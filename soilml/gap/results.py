@@ -117,6 +117,29 @@ class GapReport:
     seed: int = 0
     curves: ReadingsAndPredictions | None = None
 
+    def plot(self, ax: Any = None, part: str = "train") -> Any:
+        """Draw the mean squared residuals of all readings and of each channel, before and after.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib; a new figure where None.
+        part
+            A key of `gap`: the fitted rows (`train`), or a held-out part.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        InputError
+            For a part that the report does not have, or several axes.
+        """
+        from soilml.gap.gap_figure import plot_gap
+
+        return plot_gap(self.gap, ax, part)
+
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__

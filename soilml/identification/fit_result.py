@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.prior import Prior
 from soilml.quantities import Z_90
+
+if TYPE_CHECKING:
+    from soilml.report.parameter_figure import ParameterIntervals
 
 Floats = NDArray[np.float64]
 
@@ -80,6 +85,43 @@ class Fit:
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
 
+    def intervals(
+        self, prior: Mapping[str, Prior] | None = None, label: str = ""
+    ) -> ParameterIntervals:
+        """Values and 90 % intervals for a figure, with the ranges of their priors where given."""
+        from soilml.report.parameter_figure import ParameterIntervals
+
+        ends = [
+            (np.nan, np.nan) if prior is None or name not in prior else _ends(prior[name])
+            for name in self.names
+        ]
+        low, high = np.asarray(ends, dtype=np.float64).reshape(-1, 2).T
+        values, own = self.values[None], self.interval
+        return ParameterIntervals(
+            self.names, self.units, (label,), values, own[0][None], own[1][None], low, high
+        )
+
+    def plot(self, ax: Any = None, prior: Mapping[str, Prior] | None = None) -> NDArray[Any]:
+        """Draw each parameter with its 90 % interval, in usual units (kPa, degrees, mm).
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, one for each parameter; a new figure where None.
+        prior
+            Priors by parameter, such as those of the case, whose ranges are shaded.
+
+        Returns
+        -------
+        ndarray of Axes, shape (p,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        return self.intervals(prior).plot(ax)
+
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
         rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
@@ -101,3 +143,11 @@ class Fit:
             "channels_used": list(self.channels),
             "misfit": None if np.isnan(self.misfit) else float(self.misfit),
         }
+
+
+def _ends(prior: Prior) -> tuple[float, float]:
+    """Ends of the central 99 % of a normal prior; those of any other."""
+    if prior.normal_std is None:
+        return prior.lower, prior.upper
+    low, high = prior.at(np.asarray([0.005, 0.995]))
+    return float(low), float(high)

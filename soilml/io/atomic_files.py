@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -110,6 +110,33 @@ def save_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file atomically."""
     with atomic_output(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def write_files(
+    contents: Mapping[Path, str | Callable[[Path], object]],
+    *,
+    folders: Iterable[str | os.PathLike[str] | None] = (),
+    remove: Sequence[str | os.PathLike[str]] = (),
+) -> None:
+    """Write files as one set, all or none, as `atomic_outputs` does.
+
+    Parameters
+    ----------
+    contents
+        The text of each file, or a function that writes it to the path that it is given.
+    folders
+        Folders that are created where they are missing.
+    """
+    with ExitStack() as created:
+        for folder in folders:
+            if folder is not None:
+                created.enter_context(create_folder(folder))
+        with atomic_outputs(list(contents), remove=remove) as parts:
+            for part, content in zip(parts, contents.values(), strict=True):
+                if isinstance(content, str):
+                    part.write_text(content, encoding="utf-8")
+                else:
+                    content(part)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, TextIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,10 @@ _LINE = 1_000_000
 
 
 def read_csv(
-    file: Path, columns: Callable[[list[str]], Sequence[str]], header_hint: str
+    file: Path,
+    columns: Callable[[list[str]], Sequence[str]],
+    header_hint: str,
+    progress: Callable[[int], None] | None = None,
 ) -> tuple[dict[str, Column], NDArray[np.int64]]:
     """The columns of a CSV file by name, and the line of each row.
 
@@ -34,6 +37,8 @@ def read_csv(
         The columns to keep, of those in the header; it raises where one of these is not possible.
     header_hint
         What the header should be, for the message about an empty file.
+    progress
+        Called with the number of bytes read, after each block of rows.
 
     Raises
     ------
@@ -44,7 +49,7 @@ def read_csv(
         and a cell that is not what its column holds.
     """
     with file.open(encoding="utf-8-sig") as opened:
-        reader = csv.reader(_lines(file, opened))
+        reader, buffer = csv.reader(_lines(file, opened)), cast(Any, opened.buffer)
         try:
             header = [name.strip() for name in next(reader, [])]
             if not header:
@@ -58,6 +63,8 @@ def read_csv(
                 for name, place, filled in zip(kept, places, blocks, strict=True):
                     cells = [row[place].strip() for row in rows]
                     filled.append(_column(file, name, cells, numbers))
+                if progress is not None:
+                    progress(buffer.tell())
         except UnicodeDecodeError as error:
             raise TableError(f"{file} cannot be read as text: {error}") from None
         except csv.Error as error:

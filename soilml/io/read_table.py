@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +59,7 @@ def read_table(
     filled: Sequence[str] = FILLED,
     ignore_extra: bool = False,
     limits: Mapping[str, Limits] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> Table:
     """Read a table of measured rows from a CSV or Parquet file, or from a data frame.
 
@@ -79,6 +80,8 @@ def read_table(
         would otherwise be ignored without notice.
     limits
         Lower and upper bound of columns, and what is needed, in place of those of measured runs.
+    progress
+        Called with the number of bytes of a CSV file that are read.
 
     Returns
     -------
@@ -111,9 +114,11 @@ def read_table(
         table = Table({name: plain_column(file, name, columns[name]) for name in kept}, str(file))
         return _checked(table, file, need, filled, limits)
     file = Path(path)
-    read = _read_parquet if file.suffix == ".parquet" or file.is_dir() else _read_csv
     try:
-        table = read(file, ignore_extra)
+        if file.suffix == ".parquet" or file.is_dir():
+            table = _read_parquet(file, ignore_extra)
+        else:
+            table = _read_csv(file, ignore_extra, progress)
     except FileNotFoundError:
         raise TableError(f"{file}: there is no such file") from None
     except OSError as error:
@@ -138,9 +143,13 @@ def _checked(
     return table
 
 
-def _read_csv(file: Path, ignore_extra: bool) -> Table:
+def _read_csv(
+    file: Path, ignore_extra: bool, progress: Callable[[int], None] | None = None
+) -> Table:
     hint = f"{', '.join(RUNS)}, ..."
-    columns, lines = read_csv(file, lambda header: _known_columns(file, header, ignore_extra), hint)
+    columns, lines = read_csv(
+        file, lambda header: _known_columns(file, header, ignore_extra), hint, progress
+    )
     return Table(columns, str(file), lines)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -15,6 +16,10 @@ Columns = Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]
 
 #: Rows that are formatted at a time.
 BLOCK = 8192
+#: Characters of a line of an aligned table.
+WIDTH = 100
+#: Fewest characters to which a column is wrapped.
+_LEAST_WRAPPED = 16
 
 
 def csv_text(columns: Columns) -> str:
@@ -54,17 +59,26 @@ def format_table(
     rows: Sequence[Sequence[str]],
     text_columns: int = 1,
     last_left: bool = False,
+    width: int = WIDTH,
 ) -> str:
-    """An aligned table: text (the first columns, or the last) to the left, numbers to the right."""
+    """An aligned table: text (the first columns, or the last) to the left, numbers to the right.
+
+    A last column of text is wrapped, so that the lines have at most `width` characters.
+    """
     table = [list(header), *[list(row) for row in rows]]
     widths = [max(len(row[i]) for row in table) for i in range(len(header))]
     left = {*range(text_columns), *([len(header) - 1] if last_left else [])}
+    before = sum(widths[:-1]) + 2 * (len(widths) - 1)
+    if len(header) - 1 in left and before + widths[-1] > width:
+        widths[-1] = min(widths[-1], max(width - before, _LEAST_WRAPPED))
     lines = []
     for row in table:
+        first, *more = textwrap.wrap(row[-1], widths[-1]) or [""]
         cells = [
             cell.ljust(width) if i in left else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+            for i, (cell, width) in enumerate(zip([*row[:-1], first], widths, strict=True))
         ]
         lines.append("  ".join(cells).rstrip())
+        lines += [" " * before + text for text in more]
     lines.insert(1, "  ".join("-" * width for width in widths))
     return "\n".join(lines)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
@@ -106,6 +107,28 @@ class ImportedLog:
         }
         options = [f"--checked {name}={std:.3g}" for name, std in sizes.items() if std]
         return ["", f"# soilml gap refuses [bias]; for it: {' '.join(options)}"] if options else []
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw the rows over slip with 90 % intervals, a panel for each measured channel.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, one for each of torque, drawbar pull and sinkage that was measured;
+            a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (channels,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.log_import.rows_figure import plot_rows
+
+        return plot_rows(self.table, self.radius, ax)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the JSON file beside the report."""

@@ -233,6 +233,31 @@ class Estimate:
         """Standard deviation of the prior, (q,)."""
         return self.prior.std
 
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw each quantity with its 90 % interval and the range of its prior, in usual units.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, one for each quantity; a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (q,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.report.parameter_figure import ParameterIntervals
+
+        q = len(self.names)
+        mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
+        labels = [str(i) for i in range(1, len(mean) + 1)]
+        ends = self.prior.lower, self.prior.upper
+        return ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends).plot(ax)
+
     def within(self, **box: tuple[float, float]) -> Estimate:
         """The estimate where the soil is known to lie in a box within the prior.
 

@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import SAME_LOAD
-from soilml.traction.report import PullReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from soilml.traction.report import PullReport
 
 Floats = NDArray[np.float64]
 
 PRIOR, POSTERIOR, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
 
 
-def save_figure(report: PullReport, path: Path) -> None:
-    """Write a PNG file: a column for each load, pull (N) above and slope (degrees) below."""
-    from matplotlib.figure import Figure
+def figure_size(report: PullReport) -> tuple[float, float]:
+    """Width and height of the figure, inches."""
+    return 1.6 + 3.6 * len(report.by_load), 6.4
 
+
+def plot_pull(report: PullReport, ax: Any = None) -> NDArray[Any]:
+    """Draw a column for each load: pull (N) above and slope (degrees) below; see `take_axes`."""
     count = len(report.by_load)
-    figure = Figure(figsize=(1.6 + 3.6 * count, 6.0), layout="constrained")
-    panels = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
+    panels = take_axes(ax, 2, count, figure_size(report))
     slips, loads, pulls = report.measured_pull
     for i, prediction in enumerate(report.by_load):
         posterior, prior = prediction.posterior, prediction.prior
@@ -48,19 +51,17 @@ def save_figure(report: PullReport, path: Path) -> None:
         low.set_xlabel("slip")
     panels[0, 0].set_ylabel("drawbar pull, N")
     panels[1, 0].set_ylabel("slope climbed, degrees")
-    parts: dict[str, Any] = {}
     for axes in panels.flat:
         axes.plot(
             report.measured_range.slip, [0.0, 0.0], color=MEASURED, lw=5, alpha=0.6,
             label="measured slips", transform=axes.get_xaxis_transform(), solid_capstyle="butt",
         )  # fmt: skip
-        handles, labels = axes.get_legend_handles_labels()
-        parts |= dict(zip(labels, handles, strict=True))
-    figure.legend(
-        parts.values(), parts.keys(), loc="outside lower center", ncols=4 if count > 1 else 2,
-        fontsize=9, frameon=False,
-    )  # fmt: skip
-    figure.savefig(path, format="png", dpi=130)
+    for row in panels:
+        ends = [end for axes in row for end in axes.get_ylim()]
+        for axes in row:
+            axes.set_ylim(min(ends), max(ends))
+    panels[0, 0].legend(fontsize=9, frameon=False, loc="upper left")
+    return panels
 
 
 def _bands(axes: Axes, slip: Floats, prior: QuantileBand, posterior: QuantileBand) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,27 @@ class PullReport:
     by_load: list[LoadPrediction]
     measured_pull: tuple[Floats, Floats, Floats]
     warnings: tuple[str, ...]
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw pull (N) and slope (degrees) against slip with 90 % bands, a column for each load.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, two for each load: pull first, then slopes; a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (2, loads)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.traction.plot import plot_pull
+
+        return plot_pull(self, ax)
 
 
 def pull_report(

@@ -37,7 +37,7 @@ def test_a_file_alone_is_described_in_one_line(folder, capsys):
         assert main(["estimate", file]) == 0
         said = one_line(capsys.readouterr().out)
         assert f"{file}: for a wheel of {size}" in said and "without effects" in said
-    assert "cohesion 0 to 3000 Pa, friction angle 0.3 to 0.9 rad" in said
+    assert "cohesion 0 to 3 kPa, friction angle 17.19 to 51.57 deg" in said
     assert main(["estimate", ANY_WHEEL]) == 0
     said = one_line(capsys.readouterr().out)
     assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
@@ -49,7 +49,7 @@ def test_the_description_precedes_the_other_notes(folder, capsys):
     assert first.startswith(f"{WHEEL}: for a wheel of radius 0.15 m")
     assert main(["estimate", ANY_WHEEL, "runs.csv", "--case", "small.toml"]) == 0
     first = capsys.readouterr().err.splitlines()[0]
-    assert "radius 0.12 m" in first and "cohesion 0 to 3000 Pa" in first
+    assert "radius 0.12 m" in first and "cohesion 0 to 3 kPa" in first
 
 
 @pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])

@@ -74,7 +74,7 @@ def test_models_lists_them(capsys):
     assert main(["models"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 3 + len(released_models())
-    assert any(line.startswith("wheel ") and "r 0.15 m, w 0.12 m" in line for line in lines)
+    assert any(line.startswith("wheel ") and "r 0.15, w 0.12" in line for line in lines)
     assert max(map(len, lines)) <= 110
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
-from soilml.io.atomic_files import atomic_output
+from numpy.typing import NDArray
+
+from soilml.report.figure_style import take_axes
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import PairedResult
@@ -16,15 +17,20 @@ from training.benchmark.table_format import SHEAR_UNITS
 TITLES = ("cohesion c", "friction angle phi", "shear modulus K")
 
 
-def plot_benchmark(results: Sequence[PairedResult], path: str | os.PathLike[str]) -> None:
-    """RMSE at one load and at three, and the coverage of 90 % intervals, as PNG."""
-    from matplotlib.figure import Figure
+#: Width and height of the figure, inches.
+SIZE = (12.5, 12.0)
+
+
+def plot_benchmark(results: Sequence[PairedResult], ax: Any = None) -> NDArray[Any]:
+    """Draw the RMSE at one load and at three, and the coverage of 90 % intervals.
+
+    `ax` takes 12 axes, in 4 rows of 3; a new figure where None. Returns them, (4, 3).
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     modelled = [r for r in results if not r.effect]
     kinds = {r.method: r.kind for r in modelled}
-    figure = Figure(figsize=(12.5, 12.0), layout="constrained")
-    axes = figure.subplots(4, 3, sharex=True, height_ratios=[1.3, 1.3, 0.8, 0.8])
+    axes = take_axes(ax, 4, 3, SIZE)
     sizes = sorted({r.design.rows for r in modelled})
     styles = _styles(kinds)
     for k, (factor, unit) in enumerate(SHEAR_UNITS):
@@ -59,10 +65,12 @@ def plot_benchmark(results: Sequence[PairedResult], path: str | os.PathLike[str]
     for a in axes[3]:
         a.set_xticks(range(len(sizes)), [str(size) for size in sizes])
         a.set_xlabel("rows per set (18: 6 slips x 3 loads)")
+    for a in axes[:3].flat:
+        a.set_xticks(range(len(sizes)), [""] * len(sizes))
     handles, labels = axes[0][0].get_legend_handles_labels()
+    figure = axes[0][0].figure
     figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
-    with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=100, metadata={"Software": "soilml"})
+    return axes
 
 
 def _styles(kinds: dict[str, MethodKind]) -> dict[str, dict[str, Any]]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES, SHEAR
+from soilml.report.figure_style import picture
+from soilml.report.page import Report, ReportPicture, ReportTable
 from training.benchmark.acceptance import COHESION_RANGE, LARGEST_SET, Goal, goals
 from training.benchmark.paired_results import PairedResult
+from training.benchmark.plot import SIZE, plot_benchmark
 from training.benchmark.table_format import (
     SHEAR_SYMBOLS,
     SHEAR_UNITS,
@@ -75,14 +79,44 @@ def _table_of_cohesion_range(same: Sequence[PairedResult]) -> str:
     return f"{title}\n\n{_full_table([r.subset(inside) for r in same])}"
 
 
-def format_goals(found: Sequence[Goal]) -> str:
-    """The acceptance goals, each with the figure that was measured."""
-    header = ["goal", "method", "measured", "std error", "Bayes limit", "result"]
-    rows = [
+_GOAL_HEADER = ("goal", "method", "measured", "std error", "Bayes limit", "result")
+
+
+def _goal_rows(found: Sequence[Goal]) -> list[list[str]]:
+    return [
         [g.criterion, g.method, g.measured, g.standard_error, g.limit, "met" if g.met else "MISSED"]
         for g in found
     ]
-    return format_table(header, rows, text_columns=len(header))
+
+
+def format_goals(found: Sequence[Goal]) -> str:
+    """The acceptance goals, each with the figure that was measured."""
+    return format_table(_GOAL_HEADER, _goal_rows(found), text_columns=len(_GOAL_HEADER))
+
+
+def short_goals(found: Sequence[Goal]) -> str:
+    """The same for a terminal."""
+    rows = [
+        ["met" if g.met else "MISSED", g.method, g.measured.split(" (")[0], g.criterion]
+        for g in found
+    ]
+    return format_table(("result", "method", "measured", "goal"), rows, text_columns=4)
+
+
+def short_tables(results: Sequence[PairedResult]) -> str:
+    """The tables of a terminal: errors, ratios to the limit, and coverage."""
+    blocks = []
+    for same in _by_design(results):
+        title = f"{same[0].design.description} ({same[0].sets} sets)"
+        if same[0].effect:
+            title += f"\nsimulated with {same[0].effect}, which no method models"
+            blocks.append(f"{title}\n\n{_short_table(same)}")
+            continue
+        header, rows = _full_rows(same)
+        kept = [0, *(1 + 6 * k + i for k in range(len(SHEAR)) for i in (0, 2, 5)), len(header) - 1]
+        cells = [[row[i] for i in kept] for row in rows]
+        blocks.append(f"{title}\n\n{format_table([header[i] for i in kept], cells)}")
+    return "\n\n".join(blocks)
 
 
 def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
@@ -93,6 +127,14 @@ def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
 
 
 def _full_table(same: Sequence[PairedResult]) -> str:
+    return format_table(*_full_rows(same))
+
+
+def _short_table(same: Sequence[PairedResult]) -> str:
+    return format_table(*_short_rows(same))
+
+
+def _full_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]]:
     header = ["method"]
     for symbol, (_, unit) in zip(SHEAR_SYMBOLS, SHEAR_UNITS, strict=True):
         header += [f"{symbol} {unit}", "/prior", "/limit", "s.e.", "50 %", "90 %"]
@@ -112,10 +154,10 @@ def _full_table(same: Sequence[PairedResult]) -> str:
         row += [format_number(r.joint_coverage90, ".0%"), format_number(r.log_score, ".3g")]
         row += [str(r.failed or ""), f"{r.flagged_fraction:.1%}" if r.flagged_fraction else ""]
         rows.append([*row, format_number(1e3 * r.estimates.seconds, ".2g")])
-    return format_table(header, rows)
+    return header, rows
 
 
-def _short_table(same: Sequence[PairedResult]) -> str:
+def _short_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]]:
     header = ["method"]
     for symbol, (_, unit) in zip(SHEAR_SYMBOLS, SHEAR_UNITS, strict=True):
         header += [f"{symbol} {unit}", "90 %"]
@@ -129,32 +171,84 @@ def _short_table(same: Sequence[PairedResult]) -> str:
             ]
         row += [format_number(r.joint_coverage90, ".0%"), str(r.failed or "")]
         rows.append([*row, f"{r.flagged_fraction:.0%}"])
-    return format_table([*header, "joint", "failed", "flagged"], rows)
+    return [*header, "joint", "failed", "flagged"], rows
 
 
-LEGEND = """\
-`c kPa`, `phi deg`, `K mm`: RMSE of cohesion, friction angle and shear modulus over all sets; a
-failed estimate counts as the prior's median, and estimates outside the prior are clipped to it.
-`/prior`: RMSE over the prior's standard deviation. `/limit`: RMSE over that of the exact posterior
-mean on the same sets, and `s.e.` its standard error (paired jackknife over sets). `50 %`, `90 %`:
-coverage of the method's own 50 and 90 % intervals, of the sets answered. `joint`: coverage of the
-90 % ellipsoid of its mean and covariance. `log p`: mean log posterior density at the truth (nat;
-parameters as fractions of their priors, so that the prior has 0; in expectation no method exceeds
-the limit). `failed`: number of sets without an estimate. `flagged`: sets whose estimate the method
-itself reports as unreliable (readings out of range, or residuals larger than the noise explains).
-`ms`: wall time of one estimate. `linear` fixes K and `newton` fixes c at the value of the recipe's
-nominal soil, not at the truth; both read sinkage as well."""
+#: Columns of the tables, explained.
+LEGEND = (
+    (
+        "c, phi, K",
+        "RMSE of cohesion, friction angle and shear modulus over all sets; a failed estimate "
+        "counts as the prior's median, and estimates outside the prior are clipped to it.",
+    ),
+    ("/prior", "RMSE over the prior's standard deviation."),
+    (
+        "/limit, s.e.",
+        "RMSE over that of the exact posterior mean on the same sets, and its standard error "
+        "(paired jackknife over sets).",
+    ),
+    ("50 %, 90 %", "coverage of the method's own 50 and 90 % intervals, of the sets answered."),
+    ("joint", "coverage of the 90 % ellipsoid of its mean and covariance."),
+    (
+        "log p",
+        "mean log posterior density at the truth (nat; parameters as fractions of their priors, so "
+        "that the prior has 0; in expectation no method exceeds the limit).",
+    ),
+    ("failed", "number of sets without an estimate."),
+    (
+        "flagged",
+        "sets whose estimate the method itself reports as unreliable (readings out of range, or "
+        "residuals larger than the noise explains).",
+    ),
+    ("ms", "wall time of one estimate."),
+    (
+        "linear, newton",
+        "linear fixes K and newton fixes c at the value of the recipe's nominal soil, not at the "
+        "truth; both read sinkage as well.",
+    ),
+)
 
 
-def benchmark_page(results: Sequence[PairedResult]) -> str:
-    """The Markdown page that accompanies table and figure."""
-    caption = (
-        "Figure: RMSE (upper rows, logarithmic) and coverage of 90 % intervals (lower rows; green: "
-        "88 to 92 %) against the number of rows per set, at one load and at three. Black: the "
-        "Bayes limit. Dotted: the prior. Dashed: analytic methods."
+def benchmark_report(results: Sequence[PairedResult]) -> Report:
+    """The page of the benchmark."""
+    found = goals(results)
+    met = sum(goal.met for goal in found)
+    methods = {r.method for r in results if not r.effect}
+    answer = [f"{met} of {len(found)} acceptance goals are met."]
+    answer += [
+        f"Missed: {g.method}: {g.criterion} (measured {g.measured})." for g in found if not g.met
+    ]
+    figure = ReportPicture(
+        "Errors and coverage",
+        picture(partial(plot_benchmark, results), 4, 3, SIZE, answer[0]),
+        "RMSE (upper rows, logarithmic) and coverage of 90 % intervals (lower rows; green: 88 to "
+        "92 %) against the number of rows per set, at one load and at three. Black: the Bayes "
+        "limit. Dotted: the prior. Dashed: analytic methods.",
     )
-    return (
-        f"# Benchmark\n\n{LEGEND}\n\n![RMSE and coverage](benchmark.png)\n\n{caption}\n\n"
-        f"## Acceptance goals\n\n```\n{format_goals(goals(results))}\n```\n\n## Tables\n\n"
-        f"```\n{format_tables(results)}\n```\n"
+    tables = [ReportTable("Acceptance goals", _GOAL_HEADER, _goal_rows(found), len(_GOAL_HEADER))]
+    for same in _by_design(results):
+        title = f"{same[0].design.description} ({same[0].sets} sets)"
+        if same[0].effect:
+            title += f", simulated with {same[0].effect}, which no method models"
+            tables.append(ReportTable(title, *_short_rows(same)))
+        else:
+            tables.append(ReportTable(title, *_full_rows(same)))
+    return Report(
+        kind="compare",
+        title="Benchmark of methods relative to the Bayes limit",
+        badge=f"{met} of {len(found)} goals",
+        meaning=f"{len(methods)} methods on fixed sets of simulated readings",
+        answer=answer[:MOST_SENTENCES],
+        tone="no-gap" if met == len(found) else "suspected",
+        pictures=[figure],
+        tables=tables,
+        warnings=[
+            "The sets are simulated by the model: no error of the model is in these figures."
+        ],
+        next_steps=["soilml compare MODEL.toml TEST.parquet MODEL.onnx for data of your own."],
+        notation=LEGEND,
     )
+
+
+#: Most sentences of the page; the table of goals has all.
+MOST_SENTENCES = 6

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,13 +59,42 @@ class MethodScore:
     seconds: float
 
 
+class Comparison(list[MethodScore]):
+    """Scores by size of set, then by method, of the parameters `names`."""
+
+    def __init__(self, scores: Iterable[MethodScore], names: Sequence[str]) -> None:
+        super().__init__(scores)
+        self.names = tuple(names)
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, two for each of q parameters; a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (2, q)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from training.benchmark.user_report import plot_comparison
+
+        return plot_comparison(self, self.names, ax)
+
+
 def compare(
     case: Case,
     table: Table,
     estimators: Mapping[str, Estimator],
     progress: Progress = lambda text, done, total: None,
     analytic_sets: int = ANALYTIC_SETS,
-) -> list[MethodScore]:
+) -> Comparison:
     """Score the prior, model files and analytic methods on single readings and on whole runs.
 
     Every method sees the same readings: slip, torque and load; a method that reads more channels
@@ -86,8 +116,8 @@ def compare(
 
     Returns
     -------
-    list of MethodScore
-        By size of set, then by method.
+    Comparison
+        A list of `MethodScore`, by size of set, then by method; its `plot` draws it.
 
     Raises
     ------
@@ -117,7 +147,7 @@ def compare(
                 report = partial(progress, f"{method.label}, {size} rows")
                 estimates = method.estimate_sets(fewer, len(names), report)
                 scores.append(_score(size, method, truth, estimates, prior))
-    return scores
+    return Comparison(scores, names)
 
 
 def _check_parameters(estimators: Mapping[str, Estimator]) -> None:

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from soilml.io.atomic_files import atomic_output
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
+from soilml.report.figure_style import picture, take_axes
+from soilml.report.page import Report, ReportPicture, ReportTable
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
 from training.benchmark.table_format import columns_of_rows, display_unit, format_number
 from training.benchmark.user_comparison import MethodScore
+
+#: Most characters of the name of a method on a terminal.
+_MOST_NAME = 24
 
 
 def csv_columns(scores: Sequence[MethodScore], names: Sequence[str]) -> dict[str, list[Any]]:
@@ -39,18 +44,35 @@ def csv_columns(scores: Sequence[MethodScore], names: Sequence[str]) -> dict[str
 
 
 def format_tables(scores: Sequence[MethodScore], names: Sequence[str]) -> str:
-    """A text table for each size of set."""
+    """A text table for each size of set, without the columns that are in the file alone."""
+    header, blocks = _blocks(scores, names)
+    kept = [i for i, name in enumerate(header) if name not in ("inputs", "ms")]
+    texts = []
+    for title, rows in blocks:
+        cells = [[_short(row[i]) if i == 0 else row[i] for i in kept] for row in rows]
+        texts.append(f"{title}\n\n{format_table([header[i] for i in kept], cells)}")
+    return "\n\n".join(texts)
+
+
+def _short(method: str) -> str:
+    return method if len(method) <= _MOST_NAME else f"{method[: _MOST_NAME - 3]}..."
+
+
+def _blocks(
+    scores: Sequence[MethodScore], names: Sequence[str]
+) -> tuple[list[str], list[tuple[str, list[list[str]]]]]:
+    """Header, and title and rows for each size of set."""
     header = ["method", "inputs"]
     for name in names:
         unit, symbol = display_unit(name)[1], QUANTITIES[name].symbol
-        header += [f"{symbol} RMSE {unit}", "/prior", "90 %"]
+        header += [f"{symbol} {unit}".rstrip(), "/prior", "90 %"]
     header += ["failed", "ms"]
     blocks = []
     for size in sorted({score.rows for score in scores}):
         rows = [_cells(score, names) for score in scores if score.rows == size]
         title = "single readings" if size == 1 else f"{size} readings of one soil"
-        blocks.append(f"{title}\n\n{format_table(header, rows, text_columns=2)}")
-    return "\n\n".join(blocks)
+        blocks.append((title, rows))
+    return header, blocks
 
 
 def _cells(score: MethodScore, names: Sequence[str]) -> list[str]:
@@ -66,16 +88,16 @@ def _cells(score: MethodScore, names: Sequence[str]) -> list[str]:
 
 
 def plot_comparison(
-    scores: Sequence[MethodScore], names: Sequence[str], path: str | os.PathLike[str]
-) -> None:
-    """RMSE over the prior's standard deviation, and coverage of 90 % intervals, as PNG."""
-    from matplotlib.figure import Figure
+    scores: Sequence[MethodScore], names: Sequence[str], ax: Any = None
+) -> NDArray[Any]:
+    """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
 
+    `ax` takes two axes for each of q parameters; a new figure where None. Returns them, (2, q).
+    """
     sizes = sorted({score.rows for score in scores})
     kinds = {score.method: score.kind for score in scores}
     methods = [m for m, kind in kinds.items() if kind is not MethodKind.PRIOR]
-    figure = Figure(figsize=(3.9 * len(names), 6.4), layout="constrained")
-    axes = figure.subplots(2, len(names), squeeze=False, sharex=True)
+    axes = take_axes(ax, 2, len(names), figure_size(names))
     for k, name in enumerate(names):
         error, coverage = axes[0][k], axes[1][k]
         error.axhline(1.0, color="0.4", lw=1, ls="--", label="prior")
@@ -92,19 +114,24 @@ def plot_comparison(
         coverage.axhspan(*COVERAGE_RANGE, color="C2", alpha=0.2, lw=0)
         lowest = [s.coverage90[k] for s in scores if np.isfinite(s.coverage90[k])]
         coverage.set_ylim(min([0.5, *lowest]) - 0.02, 1.02)
-        coverage.set_xticks(range(len(sizes)), [str(size) for size in sizes])
+        for panel in (error, coverage):
+            panel.set_xticks(range(len(sizes)), [str(size) for size in sizes])
         coverage.set_xlabel("readings per set")
         for panel in (error, coverage):
             panel.grid(alpha=0.3)
     axes[0][0].set_ylabel("RMSE / prior standard deviation")
     axes[1][0].set_ylabel("coverage of 90 % interval")
     axes[0][-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
+    return axes
 
 
-def comparison_page(scores: Sequence[MethodScore], names: Sequence[str], test: str) -> str:
-    """The Markdown page that accompanies table and figure."""
+def figure_size(names: Sequence[str]) -> tuple[float, float]:
+    """Width and height of the figure, inches."""
+    return 3.9 * len(names), 6.4
+
+
+def comparison_report(scores: Sequence[MethodScore], names: Sequence[str], test: str) -> Report:
+    """The page of a comparison on test data of this name."""
     single = [
         score
         for score in scores
@@ -114,20 +141,54 @@ def comparison_page(scores: Sequence[MethodScore], names: Sequence[str], test: s
     ]
     best = min(single, key=lambda score: float(score.rmse_over_prior.mean()))
     ratios = zip(names, best.rmse_over_prior, strict=True)
-    shares = ", ".join(f"{name.replace('_', ' ')} {ratio:.0%}" for name, ratio in ratios)
-    return (
-        f"# Comparison on {test}\n\n"
+    shares = ", ".join(f"{name.replace('_', ' ')} {100 * ratio:.0f} %" for name, ratio in ratios)
+    largest = max(score.rows for score in scores)
+    answer = [
         f"From a single reading, the best method ({best.method}) has an RMSE, relative to the "
-        f"prior's standard deviation, of: {shares}. One equation does not determine three "
-        "unknowns: the prior supplies the missing information, and intervals must be "
-        "correspondingly wide.\n\n"
-        "`RMSE` is over all sets; a failed fit counts as the prior's median, and estimates outside "
-        "the prior are clipped to it. `/prior`: RMSE over the prior's standard deviation. `90 %`: "
-        "coverage of the 90 % interval, of the sets answered. `failed`: sets without an estimate, "
-        "of all. `ms`: wall time of one estimate. Methods marked `K fixed` or `c fixed` take that "
-        "parameter from the model file.\n\n"
-        "![comparison](compare.png)\n\nFigure: RMSE over the prior's standard deviation (top; "
-        "dashed: the prior) and coverage of 90 % intervals (bottom; green: 88 to 92 %) against the "
-        "number of readings per set. Squares: analytic methods.\n\n"
-        f"```\n{format_tables(scores, names)}\n```\n"
-    )
+        f"prior's standard deviation, of: {shares}."
+    ]
+    if largest > 1:
+        many = [s for s in scores if s.rows == largest and np.isfinite(s.rmse_over_prior).all()]
+        first = min(many, key=lambda score: float(score.rmse_over_prior.mean()))
+        pairs = zip(names, first.rmse_over_prior, strict=True)
+        found = ", ".join(f"{name.replace('_', ' ')} {100 * x:.0f} %" for name, x in pairs)
+        answer.append(f"From {largest} readings of one soil, the best is {first.method}: {found}.")
+    header, blocks = _blocks(scores, names)
+    return Report(
+        kind="compare",
+        title=f"Comparison of methods on {test}",
+        badge=f"{len({s.method for s in scores})} methods",
+        meaning=f"on sets of {', '.join(str(n) for n in sorted({s.rows for s in scores}))} "
+        "readings whose soil is known",
+        answer=answer,
+        pictures=[
+            ReportPicture(
+                "Errors and coverage",
+                picture(
+                    partial(plot_comparison, scores, names), 2, len(names), figure_size(names),
+                    answer[0],
+                ),
+                "RMSE over the prior's standard deviation (top; dashed: the prior) and coverage of "
+                "90 % intervals (bottom; green: 88 to 92 %) against the number of readings per "
+                "set. Squares: analytic methods.",
+            )
+        ],
+        tables=[ReportTable(title, header, rows, 2) for title, rows in blocks],
+        warnings=[
+            "One equation does not determine three unknowns: for single readings the prior "
+            "supplies the missing information, and intervals must be correspondingly wide."
+        ],
+        next_steps=["soilml estimate MODEL.onnx RUNS.csv with the method that suits your rows."],
+        notation=[
+            (
+                "RMSE",
+                "over all sets; a failed fit counts as the prior's median, and estimates outside "
+                "the prior are clipped to it.",
+            ),
+            ("/prior", "RMSE over the prior's standard deviation."),
+            ("90 %", "coverage of the 90 % interval, of the sets answered."),
+            ("failed", "sets without an estimate, of all."),
+            ("ms", "wall time of one estimate."),
+            ("fixed", "a parameter that a method takes from the model file."),
+        ],
+    )  # fmt: skip

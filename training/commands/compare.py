@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import InputFile, add_workers_option, positive_number
 from soilml.errors import InputError
-from soilml.io.atomic_files import atomic_outputs, create_folder, output_files
+from soilml.io.atomic_files import create_folder, output_files
 from soilml.optional_imports import need
 
+if TYPE_CHECKING:
+    from soilml.report.page import Report
+
 #: Outputs of a comparison on the user's test data, and of the benchmark.
-FILES = ("compare.csv", "compare.png", "compare.md")
-BENCHMARK = ("benchmark.csv", "benchmark.png", "benchmark.md")
+FILES = ("report.html", "compare.json", "compare.csv", "compare.png")
+BENCHMARK = ("report.html", "benchmark.json", "benchmark.csv", "benchmark.png")
 #: Output folder of the benchmark without --out, and its model files without arguments.
 FOLDER = "demo/benchmark"
 RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
@@ -34,7 +39,8 @@ time per estimate.
    packaged recipe `benchmark`. RMSE is also given relative to the Bayes limit:
    the exact posterior mean of the same sets, which no estimator can beat on
    average. Without a model file, the released files are scored (in a clone of
-   the repository). Writes benchmark.md, benchmark.csv and benchmark.png.
+   the repository). Writes report.html (start here), benchmark.json,
+   benchmark.csv and benchmark.png.
 
 2. On test data of your own
 
@@ -43,7 +49,8 @@ time per estimate.
    TEST.parquet comes from `soilml generate`, with a seed that was not used in
    training. Its runs are the sets; single rows are scored too. MODEL.toml
    gives the analytic methods their wheel, soil, priors and noise, which must
-   equal those of the test data. Writes compare.md, compare.csv, compare.png.
+   equal those of the test data. Writes report.html (start here),
+   compare.json, compare.csv and compare.png.
 
 3. To recompute the Bayes limit of the benchmark (minutes, on all cores)
 
@@ -118,12 +125,12 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.io.table import Table
-    from soilml.io.text_tables import csv_text
     from soilml.onboard.estimator import Estimator
     from soilml.quantities import SHEAR
+    from soilml.report.figure_style import save_png
     from training.benchmark import report
     from training.benchmark.acceptance import goals
-    from training.benchmark.plot import plot_benchmark
+    from training.benchmark.plot import SIZE, plot_benchmark
     from training.benchmark.provenance import check_same_provenance
     from training.benchmark.suite import RECIPE, benchmark
 
@@ -133,16 +140,48 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     _check_labels(estimators, files)
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         print(note, file=sys.stderr)
-    with create_folder(args.out or FOLDER) as folder:
-        with stage_progress() as progress:
-            results = benchmark(estimators, None, args.sets, args.against, progress)
-        with atomic_outputs([folder / name for name in BENCHMARK]) as (rows, picture, page):
-            rows.write_text(csv_text(report.csv_columns(results)), encoding="utf-8")
-            plot_benchmark(results, picture)
-            page.write_text(report.benchmark_page(results), encoding="utf-8")
-    print(f"{report.format_tables(results)}\n\n{report.format_goals(goals(results))}")
-    print(f"\nwritten: {folder}/{', '.join(BENCHMARK)}", file=sys.stderr)
+    with create_folder(args.out or FOLDER) as folder, stage_progress() as progress:
+        results = benchmark(estimators, None, args.sets, args.against, progress)
+        progress("drawing the report", 0, 1)
+        columns = report.csv_columns(results)
+        found = goals(results)
+        content = {
+            "columns": columns,
+            "goals": [vars(goal) for goal in found],
+        }
+        draw = partial(save_png, partial(plot_benchmark, results), 4, 3, SIZE)
+        page = report.benchmark_report(results)
+        _write(args, folder, BENCHMARK, page, content, draw, files)
+    print(f"{report.short_tables(results)}\n\n{report.short_goals(found)}")
+    _say_where(folder, BENCHMARK)
     return 0
+
+
+def _write(
+    args: argparse.Namespace,
+    folder: Path,
+    names: Sequence[str],
+    page: Report,
+    content: Mapping[str, Any],
+    draw: Callable[[Path], object],
+    read: Sequence[Path],
+) -> None:
+    """Write page, JSON, CSV and picture as one set; `read` are the model files."""
+    from soilml.cli.reports.report_files import origin_of, report_texts
+    from soilml.io.atomic_files import write_files
+    from soilml.io.text_tables import csv_text
+
+    origin = origin_of(args, [str(path) for path in read])
+    files = report_texts(page, origin, content, (names[0], names[1]), folder)
+    files |= {folder / names[2]: csv_text(content["columns"]), folder / names[3]: draw}
+    write_files(files)
+
+
+def _say_where(folder: Path, names: Sequence[str]) -> None:
+    print(
+        f"\nmore columns are in {names[0]} and {names[2]}; written: {folder}/{', '.join(names)}",
+        file=sys.stderr,
+    )
 
 
 def _released_files() -> list[Path]:
@@ -184,11 +223,11 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
+    from soilml.cli.table_reading import read_long_table
     from soilml.config.case import read_case_of_one_gear
     from soilml.identification.trained_estimator import for_simulated_case
-    from soilml.io.read_table import read_table
-    from soilml.io.text_tables import csv_text
     from soilml.onboard.estimator import Estimator
+    from soilml.report.figure_style import save_png
     from training.benchmark import user_report as report
     from training.benchmark.provenance import check_same_provenance
     from training.benchmark.user_comparison import compare
@@ -197,20 +236,19 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
         raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")
     model, test, *files = args.files
     case = read_case_of_one_gear(model)
-    table = read_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
+    table = read_long_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
     estimators = {Path(file).stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names
     for note in check_same_provenance(case, table, estimators, names):
         print(note, file=sys.stderr)
-    with create_folder(args.out) as folder:
-        with stage_progress() as progress:
-            scores = compare(case, table, estimators, progress, args.analytic_sets)
-        with atomic_outputs([folder / name for name in FILES]) as (rows, picture, page):
-            rows.write_text(csv_text(report.csv_columns(scores, names)), encoding="utf-8")
-            report.plot_comparison(scores, names, picture)
-            text = report.comparison_page(scores, names, Path(test).name)
-            page.write_text(text, encoding="utf-8")
+    with create_folder(args.out) as folder, stage_progress() as progress:
+        scores = compare(case, table, estimators, progress, args.analytic_sets)
+        progress("drawing the report", 0, 1)
+        content = {"columns": report.csv_columns(scores, names)}
+        draw = partial(save_png, scores.plot, 2, len(names), report.figure_size(names))
+        page = report.comparison_report(scores, names, Path(test).name)
+        _write(args, folder, FILES, page, content, draw, [])
     print(report.format_tables(scores, names))
-    print(f"\nwritten: {folder}/{', '.join(FILES)}", file=sys.stderr)
+    _say_where(folder, FILES)
     return 0

@@ -114,6 +114,7 @@ def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
     from soilml.cli.progress import stage_progress
     from soilml.io.text_tables import format_table
+    from soilml.quantities import QUANTITIES
     from training.data.dataset import read_dataset
     from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card
@@ -137,7 +138,7 @@ def _from_data(args: argparse.Namespace) -> int:
         (name, *[f"{v:.3f}" for v in s.relative], *[f"{v:.1%}" for v in s.cover90])
         for name, s in trained.scores.items()
     ]
-    labels = [name.replace("_", " ") for name in spec.targets]
+    labels = [QUANTITIES[name].symbol if name in QUANTITIES else name for name in spec.targets]
     head = ("", *[f"RMSE/prior {n}" for n in labels], *[f"cover90 {n}" for n in labels])
     print(
         f"On {trained.scores['estimator'].rows} held-out rows: RMSE over the prior's standard "

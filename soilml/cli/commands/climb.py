@@ -42,7 +42,8 @@ angle_rad, normal_Pa, and slip where the run is no climb (imposed slip on level
 ground).
 
 Each slope gives one equation, so three unknowns need three slopes. The bands
-are 90 % intervals. DIR receives climb.json, curve.csv and climbs.csv.
+are 90 % intervals. DIR receives report.html (start here), climb.json,
+curve.csv and climbs.csv.
 """
 
 
@@ -65,7 +66,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_seed_option(parser)
     add_ignore_extra_option(parser)
-    parser.add_argument("--out", metavar="DIR", help="folder for three files, or FILE.json alone")
+    parser.add_argument("--out", metavar="DIR", help="folder for four files, or FILE.json alone")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_row_options
+from soilml.cli.options import InputFile, add_report_option, add_row_options, report_outputs
 from soilml.io.atomic_files import output_files
 
 #: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
@@ -53,7 +53,8 @@ others as if their errors were independent; files that read the same sensors
 are then refused. A file takes no part in a row where its reading is blank or
 out of range; the column `files` counts those that do. Standard error reports
 which parameters are not determined, and the next measurement that would help.
-Only numpy and onnxruntime are needed.
+Only numpy and onnxruntime are needed, but for --report, a page to read and
+print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 """
 
 
@@ -90,11 +91,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="write the estimates to this file")
+    add_report_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return output_files(args.out, ".csv")
+    return [*output_files(args.out, ".csv"), *report_outputs(args)]
 
 
 def run(args: argparse.Namespace) -> int:

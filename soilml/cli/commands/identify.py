@@ -8,7 +8,9 @@ from pathlib import Path
 from soilml.cli.options import (
     InputFile,
     add_effects_option,
+    add_report_option,
     add_row_options,
+    report_outputs,
 )
 from soilml.io.atomic_files import output_files
 
@@ -38,10 +40,11 @@ Methods:
              under the priors and the noise; reports which parameters the rows
              do not determine, and the next measurement that would help most
 
-The result is JSON, in the file of --out or in a pipe; a terminal shows a
-table. `posterior/prior` (left_of_prior in the file) is the width of the
-estimate divided by that of the prior. std is the expected error; it is large
-where least squares leaves a wide range open. Read the warnings.
+The result is JSON in SI units, in the file of --out or in a pipe; a terminal
+shows a table. --report writes a page to read and print. `posterior/prior`
+(left_of_prior in the file) is the width of the estimate divided by that of the
+prior. std is the expected error; it is large where least squares leaves a wide
+range open. Read the warnings.
 """
 
 
@@ -65,11 +68,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.json", help="write the result to this file")
+    add_report_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return output_files(args.out, ".json")
+    return [*output_files(args.out, ".json"), *report_outputs(args)]
 
 
 def run(args: argparse.Namespace) -> int:

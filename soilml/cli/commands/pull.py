@@ -9,8 +9,10 @@ from soilml.cli.options import (
     InputFile,
     add_effects_option,
     add_gear_option,
+    add_report_option,
     add_row_options,
     number,
+    report_outputs,
 )
 from soilml.io.atomic_files import output_files
 
@@ -46,6 +48,7 @@ each wheel on the slope. --gravity moves it to another planet.
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. A value with a warning that it is not known is no more accurate
 than the prior. The CSV file has a row for each load and slip, in SI units.
+--report writes a page to read and print.
 """
 
 
@@ -81,11 +84,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.csv", help="write the curves to this file")
     parser.add_argument("--picture", metavar="FILE.png", help="draw the curves and bands")
+    add_report_option(parser)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
-    return [*output_files(args.out, ".csv"), *output_files(args.picture, ".png")]
+    return [
+        *output_files(args.out, ".csv"),
+        *output_files(args.picture, ".png"),
+        *report_outputs(args),
+    ]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from soilml.cli.advice_text import mean_covariates
-from soilml.cli.option_values import available_effects, parse_names, parse_numbers, read_rows
+from soilml.cli.option_values import available_effects, parse_names, parse_numbers
 from soilml.cli.output import write_columns
+from soilml.cli.progress import working
+from soilml.cli.table_reading import read_rows
+from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case_of_one_gear
 from soilml.errors import InputError
 from soilml.experiment_design import (
@@ -50,16 +53,19 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is None:
         ranges, at = candidate_grid(slips, loads), None
     else:
-        data = read_observations(case, read_rows(args, RUNS))
+        table = read_rows(args, RUNS)
+        print_table_hints(table, case)
+        data = read_observations(case, table)
         ranges, at = candidate_grid(slips, loads, data.load), data.at
     if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(
             f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
             f"at most {MAX_POINTS} operating points are possible"
         )
-    samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
-    known = {} if at is None else mean_covariates(at)
-    advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
+    with working("rating the rows that could be next"):
+        samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
+        known = {} if at is None else mean_covariates(at)
+        advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:
         from soilml.experiment_design.plot import save_maps
 

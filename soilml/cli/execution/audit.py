@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import available_effects, parse_costs, parse_names
 from soilml.cli.output import json_text
+from soilml.cli.progress import working
+from soilml.cli.table_reading import read_long_table
 from soilml.config.case import read_case
 from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import save_text
-from soilml.io.read_table import read_table
 from soilml.io.text_tables import format_table
+from soilml.report.terminal import shown_unit, significant
 
 if TYPE_CHECKING:
     from soilml.gap import Audit
@@ -25,10 +27,11 @@ def run(args: argparse.Namespace) -> int:
 
     effects = available_effects(args)
     case = read_case(args.model, effects)
-    design = read_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
-    found = audit(
-        case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
-    )
+    design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
+    with working(f"auditing {len(design)} rows"):
+        found = audit(
+            case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
+        )
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     print(_text(found))
@@ -42,16 +45,19 @@ def _text(found: Audit) -> str:
         (
             e.name,
             "yes" if e.separating_snr >= 3.0 else "no",
-            f"{e.size:g} {e.unit}".removesuffix(" 1"),
-            f"{e.residual_signal:.3g}",
-            f"{e.separating_snr:.3g}",
-            "never" if math.isinf(e.detectable_size) else f"{e.detectable_size:.2g}",
+            f"{significant(factor * e.size)} {unit}".rstrip(),
+            significant(e.residual_signal, 3),
+            significant(e.separating_snr, 3),
+            "never"
+            if math.isinf(e.detectable_size)
+            else significant(factor * e.detectable_size, 2),
             f"{e.absorbed:.0%}",
-            ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:2]),
+            ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:1]),
         )
         for e in found.effects
+        for factor, unit in [shown_unit(e.unit)]
     ]
-    header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rivals")
+    header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rival")
     parts = [format_table(header, rows, text_columns=2, last_left=True)]
     if found.classes:
         parts.append(

@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.cli.option_values import available_effects
 from soilml.cli.output import json_text
+from soilml.cli.progress import working
 from soilml.config.case import read_case
 from soilml.errors import InputError, TableError
 from soilml.identification.bevameter import BevameterResult, bevameter
@@ -18,6 +19,7 @@ from soilml.io.read_table import Limits, read_table
 from soilml.io.table import Table
 from soilml.io.text_tables import format_table
 from soilml.optional_imports import need
+from soilml.report.terminal import shown_unit, significant
 
 #: Bounds of columns that differ from those of measured runs: a plate starts without load.
 LIMITS: dict[str, Limits] = {
@@ -35,7 +37,8 @@ def run(args: argparse.Namespace) -> int:
         need("matplotlib", "bevameter --picture")
     case = None if args.model is None else read_case(args.model, available_effects(args))
     plates, shear = _tables(args)
-    result = bevameter(plates, shear, case)
+    with working("fitting the tests"):
+        result = bevameter(plates, shear, case)
     if args.picture is not None:
         from soilml.identification.bevameter.plot import save_picture
 
@@ -78,12 +81,19 @@ def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None]:
 
 def _text(result: BevameterResult) -> str:
     rows = [
-        (name, f"{e.value:.4g}", _range(e.mean_range), _range(e.place_range), e.unit)
+        (
+            name,
+            significant(factor * e.value),
+            _range(e.mean_range, factor),
+            _range(e.place_range, factor),
+            unit,
+        )
         for name, e in result.estimates().items()
+        for factor, unit in [shown_unit(e.unit, e.value)]
     ]
     head = ("parameter", "value", "95 % of the mean", "95 % at another place", "unit")
     return "\n".join([format_table(head, rows), *(f"! {text}" for text in result.remarks)])
 
 
-def _range(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.4g} .. {ends[1]:.4g}"
+def _range(ends: tuple[float, float], factor: float) -> str:
+    return f"{significant(factor * ends[0], 3)} .. {significant(factor * ends[1], 3)}"

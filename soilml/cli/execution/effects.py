@@ -10,6 +10,7 @@ from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.effects.base import STAGES
 from soilml.physics.operating_point import COVARIATES
+from soilml.report.terminal import shown_unit, significant
 
 
 def run(args: argparse.Namespace) -> int:
@@ -30,8 +31,15 @@ def run(args: argparse.Namespace) -> int:
     acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if cls.overrides(stage))
     neutral = cls()
     rows = [
-        (name, p.text, f"{getattr(neutral, name):g}", f"{p.lower:g} .. {p.upper:g}", p.unit)
+        (
+            name,
+            p.text,
+            significant(factor * getattr(neutral, name)),
+            f"{significant(factor * p.lower)} .. {significant(factor * p.upper)}",
+            unit,
+        )
         for name, p in declared(cls).items()
+        for factor, unit in [shown_unit(p.unit)]
     ]
     about = cls.about
     print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
@@ -43,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"
     )
     for name, value in cls.about.reference.items():
-        print(f"{name} = {value:g}")
+        print(f"{name} = {value:g}")  # in SI units, as a model file has it
     return 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator
+from functools import partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +20,11 @@ from soilml.cli.joint_readings import (
     row_readings,
     unused_std_note,
 )
-from soilml.cli.option_values import read_rows
-from soilml.cli.output import write_columns
+from soilml.cli.output import save_columns, tell_columns
 from soilml.cli.progress import progress_bar
+from soilml.cli.reports.estimate import check_size, estimate_report
+from soilml.cli.reports.report_files import write_with_report
+from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_errors.usual_model_error import usual_answer
 from soilml.cli.wheel_check import (
@@ -42,6 +45,7 @@ from soilml.onboard.multi_sensor import CORRELATED, fuse_estimates
 from soilml.onboard.row_estimates import ROWS_PER_CALL
 from soilml.optional_imports import need
 from soilml.quantities import column
+from soilml.report.page import Report
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
@@ -50,6 +54,9 @@ if TYPE_CHECKING:
 def run(args: argparse.Namespace) -> int:
     """Estimate and write the table."""
     need("onnxruntime", "estimate")
+    if args.report is not None:
+        for library in ("jinja2", "matplotlib"):
+            need(library, "estimate --report")
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
     if args.runs is None and args.case is None:
@@ -76,12 +83,25 @@ def run(args: argparse.Namespace) -> int:
         columns, notes = _row_estimates(estimators, table, usable, args.rule, case)
     else:
         columns, notes = _group_estimates(estimators[0], table, usable[0], args.by, case)
-    write_columns(columns, args.out)
     notes = case_notes + notes
     if args.by is None or estimators[0].sets is None:
         notes += unused_std_note(estimators[0], table)
     notes += _excluded(table, ~complete, "lack a reading")
     notes += _excluded(table, complete & ~table.answered, "have a status that is not ok")
+    count = len(columns["in_range"])
+    if args.report is not None:
+        check_size(count)
+
+    def build() -> tuple[Report, dict[str, Any]]:
+        content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
+        files = args.model, args.runs
+        page = estimate_report(columns, notes, estimators[0], args.by, files)
+        return page, {**content, "notes": notes}
+
+    write_with_report(
+        args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
+    )
+    tell_columns(columns, args.out)
     print("\n".join(notes), file=sys.stderr)
     return 0
 
@@ -97,8 +117,8 @@ def _excluded(table: Table, rows: NDArray[np.bool_], why: str) -> list[str]:
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
-    if args.runs is None and (args.by, args.where, args.out) != (None, None, None):
-        raise InputError("RUNS.csv is missing: --by, --where and --out are for its rows")
+    if args.runs is None and any((args.by, args.where, args.out, args.report)):
+        raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
     if args.rule is not None and not args.others:
         raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import Any
 
 from soilml.cli.option_values import available_effects, check_seed, parse_costs, parse_names
 from soilml.cli.output import json_text
 from soilml.cli.output_names import GAP_SUSPECTED
 from soilml.cli.progress import progress_bar
+from soilml.cli.reports.report_files import origin_of
+from soilml.cli.table_reading import read_long_table
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
 from soilml.errors import InputError
-from soilml.io.atomic_files import atomic_outputs, create_folder
+from soilml.io.atomic_files import write_files
 from soilml.io.number_text import read_number
-from soilml.io.read_table import RUNS, read_table
+from soilml.io.read_table import RUNS
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
+from soilml.report.terminal import rounded, shown_unit, significant
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     check_seed(args)
     effects = available_effects(args)
     case = read_case(args.model, effects)
-    table = read_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
@@ -45,11 +49,14 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
         )
-    from soilml.gap.html.page import page
+    from soilml.gap.html.page import page, summary
 
+    names = str(args.model), str(args.runs)
+    origin = origin_of(args)
+    entry = {"report": summary(report, *names).as_json(origin)}
     texts = {
-        "report.html": page(report, str(args.model), str(args.runs)),
-        "gap.json": json_text(report.as_json()),
+        "report.html": page(report, *names, origin),
+        "gap.json": json_text(report.as_json() | entry),
         "model.toml": case_as_toml(report.model, [report.sentence]),
         "next_runs.csv": csv_text(_next_runs(report)),
     }
@@ -57,15 +64,13 @@ def run(args: argparse.Namespace) -> int:
         first = " + ".join(report.best_unclaimed)
         heading = f"With {first}, which is suspected, not named. {report.sentence}"
         texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
-    with create_folder(args.out) as folder:
-        names = [folder / name for name in texts]
-        # a suspected model of an earlier analysis would contradict this one
-        earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
-        with atomic_outputs(names, remove=earlier) as parts:
-            for part, text in zip(parts, texts.values(), strict=True):
-                part.write_text(text, encoding="utf-8")
+    folder = Path(args.out)
+    # a suspected model of an earlier analysis would contradict this one
+    earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
+    files = {folder / name: text for name, text in texts.items()}
+    write_files(files, folders=[folder], remove=earlier)
     print(_text(report))
-    print(f"\n{', '.join(str(name) for name in names)}", file=sys.stderr)
+    print(f"\n{', '.join(str(name) for name in files)}", file=sys.stderr)
     return 0
 
 
@@ -123,7 +128,7 @@ def _text(report: Any) -> str:
 
 def _gap_table(report: Any) -> str:
     rows = [
-        (name.replace("_", " "), f"{s.before:.3g}", f"{s.after:.3g}", s.description)
+        (name.replace("_", " "), significant(s.before, 3), significant(s.after, 3), s.description)
         for name, s in report.gap.items()
     ]
     return format_table(("gap", "before", "after", "rows"), rows, last_left=True) if rows else ""
@@ -131,12 +136,23 @@ def _gap_table(report: Any) -> str:
 
 def _effect_table(report: Any) -> str:
     rows = [
-        (f"{e.name} {k}", f"{v.value:.4g}", f"{v.std:.2g}", v.unit, f"{e.probability:.3f}")
+        (f"{e.name} {k}", *_in_shown_unit(v.value, v.std, v.unit), f"{e.probability:.3f}")
         for e in report.effects
         for k, v in e.parameters.items()
     ]
     heading = ("effect", "value", "std", "unit", "probability")
     return format_table(heading, rows) if rows else ""
+
+
+def _in_shown_unit(value: float, std: float, unit: str) -> tuple[str, str, str]:
+    factor, shown = shown_unit(unit, value)
+    return rounded(factor * value, factor * std), rounded(factor * std, factor * std), shown
+
+
+def _both(d: Any) -> tuple[str, str, str]:
+    """A discrepancy before and after, and their unit."""
+    factor, shown = shown_unit(d.unit)
+    return significant(factor * d.before_value, 3), significant(factor * d.after_value, 3), shown
 
 
 def _suspect_table(report: Any) -> str:
@@ -149,7 +165,7 @@ def _suspect_table(report: Any) -> str:
 
 def _discrepancy_table(report: Any) -> str:
     rows = [
-        (name, f"{d.before_value:.3g}", f"{d.after_value:.3g}", d.unit, f"{d.after_sigma:.2g}")
+        (name.rpartition("_")[0], *_both(d), f"{d.after_sigma:.2g}")
         for name, d in report.discrepancy.items()
     ]
     if not any(d.after_sigma > 0.0 for d in report.discrepancy.values()):

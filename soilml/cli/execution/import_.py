@@ -8,7 +8,8 @@ import sys
 from soilml.cli.output import format_columns, is_terminal, json_text, write_stdout
 from soilml.cli.output_names import IMPORT_SUFFIXES
 from soilml.cli.progress import stage_progress
-from soilml.io.atomic_files import atomic_outputs, output_files, save_text
+from soilml.cli.reports.report_files import origin_of
+from soilml.io.atomic_files import output_files, save_text, write_files
 from soilml.io.text_tables import csv_text
 from soilml.log_import.guesses.map_text import init_map
 from soilml.log_import.result import ImportedLog
@@ -31,20 +32,25 @@ def run(args: argparse.Namespace) -> int:
             need(library, "import")
     with stage_progress() as tell:
         found = import_log(args.files, args.map, accept=args.accept, progress=tell)
-        html = ""
+        html, entry = "", {}
         if args.out is not None:
-            from soilml.log_import.report.page import page
+            from soilml.log_import.report.page import page, summary
 
-            html = page(found, tell)
+            origin = origin_of(args)
+            html = page(found, tell, origin)
+            entry = {"report": summary(found).as_json(origin)}
     _print_remarks(found)
     if args.out is None:
         _print_table(found)
         return 0
     files = output_files(args.out, *IMPORT_SUFFIXES)
-    texts = (csv_text(found.table.columns), html, json_text(found.as_json()), found.bias_toml())
-    with atomic_outputs(files) as parts:
-        for part, text in zip(parts, texts, strict=True):
-            part.write_text(text, encoding="utf-8")
+    texts = (
+        csv_text(found.table.columns),
+        html,
+        json_text(found.as_json() | entry),
+        found.bias_toml(),
+    )
+    write_files(dict(zip(files, texts, strict=True)))
     if is_terminal():
         _print_table(found)
     print(

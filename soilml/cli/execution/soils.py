@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 
 from soilml.errors import InputError, did_you_mean
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil, SoilEntry, soil_catalogue
+from soilml.report.terminal import shown_unit, significant
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,32 +29,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _value(entry: SoilEntry, field: str) -> str:
-    value = getattr(entry.soil, field)
-    return f"{value:.4g}{'*' if field in entry.assumed else ' '}"
-
-
 def _list(entries: list[SoilEntry]) -> str:
-    header = ("soil", "c Pa ", "phi deg ", "K mm ", "kc SI ", "kphi SI ", "n ", "what")
+    header = ("soil", "c kPa ", "phi deg ", "K mm ", "n ", "what")
     rows = []
     for entry in entries:
-        phi = math.degrees(entry.soil.friction_angle)
-        k = 1e3 * entry.soil.shear_modulus
-        marks = {f: "*" if f in entry.assumed else " " for f in declared(Soil)}
-        rows.append(
-            (
-                entry.name,
-                _value(entry, "cohesion"),
-                f"{phi:.1f}{marks['friction_angle']}",
-                f"{k:.3g}{marks['shear_modulus']}",
-                _value(entry, "kc"),
-                _value(entry, "kphi"),
-                _value(entry, "n"),
-                entry.text,
-            )
+        values = (
+            f"{_text(entry, field)}{'*' if field in entry.assumed else ' '}"
+            for field in ("cohesion", "friction_angle", "shear_modulus", "n")
         )
-    notes = "* not printed in the paper: assumed, see the entry.  SI: N/m^(n+1), N/m^(n+2)."
+        rows.append((entry.name, *values, entry.text))
+    notes = (
+        "* not printed in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
+        "--json all."
+    )
     return f"{format_table(header, rows, last_left=True)}\n{notes}"
+
+
+def _text(entry: SoilEntry, field: str) -> str:
+    """The value of a parameter in the unit of a terminal."""
+    value = float(getattr(entry.soil, field))
+    return significant(shown_unit(declared(Soil)[field].unit, value)[0] * value)
 
 
 def _one(entry: SoilEntry) -> str:
@@ -65,8 +59,8 @@ def _one(entry: SoilEntry) -> str:
             note = "default"
         if entry.published.get(name, 0.0) < 0.0 == getattr(entry.soil, name):
             note = f"published as {entry.published[name]:g}: models use 0"
-        value = getattr(entry.soil, name)
-        rows.append((name, parameter.text, note, f"{value:.6g}", parameter.unit))
+        unit = shown_unit(parameter.unit, float(getattr(entry.soil, name)))[1]
+        rows.append((name, parameter.text, note, _text(entry, name), unit))
     table = format_table(("field", "what", "from", "value", "unit"), rows, text_columns=3)
     return f"{entry.name}: {entry.text}\n{entry.source}\n\n{table}"
 

@@ -13,6 +13,7 @@ from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.fit_result import Fit
 from soilml.io.table import Table
 from soilml.io.text_tables import format_table
+from soilml.report.terminal import interval, rounded, shown_unit
 
 
 @dataclass(frozen=True)
@@ -31,16 +32,8 @@ class UsualFit:
         """Both intervals in a table, and which one to believe."""
         right, usual = self.right, self.usual
         rows = [
-            (name, f"{value:.5g}", f"{std:.3g}", f"{low:.4g} .. {high:.4g}", unit, f"{ratio:.1f}")
-            for name, value, std, low, high, unit, ratio in zip(
-                usual.names,
-                usual.values,
-                usual.std,
-                *usual.interval,
-                usual.units,
-                usual.std / right.std,
-                strict=True,
-            )
+            (*cells, f"{ratio:.1f}")
+            for cells, ratio in zip(fit_cells(usual), usual.std / right.std, strict=True)
         ]
         head = ("parameter", "value", "std", "90 % interval", "unit", "times std above")
         return (
@@ -68,6 +61,18 @@ class UsualFit:
     @staticmethod
     def _explained(fit: Fit) -> bool:
         return not any(EXCESS_RESIDUALS in text for text in fit.warnings)
+
+
+def fit_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:
+    """Name, value, std, 90 % interval and unit of each parameter, as a terminal shows them."""
+    rows = []
+    for name, value, std, low, high, unit in zip(
+        fit.names, fit.values, fit.std, *fit.interval, fit.units, strict=True
+    ):
+        factor, shown = shown_unit(unit, float(abs(value)))
+        value, std, low, high = (factor * float(v) for v in (value, std, low, high))
+        rows.append((name, rounded(value, std), rounded(std, std), interval(low, high, std), shown))
+    return rows
 
 
 def usual_fit(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from soilml.gap.html.formatting import channel_name, format_range
 from soilml.gap.results import GapReport
+from soilml.report.numbers import channel_name, format_range
 
 #: Scores of the lightest and of the darkest shade, and those shades (red, green, blue).
 _LOWEST, _HIGHEST = 1.0, 100.0

@@ -6,34 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from soilml.gap.html.formatting import channel_name, format_number
-from soilml.gap.html.svg_image import (
-    AFTER,
-    BEFORE,
-    UNCHANGED,
-    SvgImage,
-    new_figure,
-    report_style,
-    svg_image,
-)
+from soilml.gap.gap_figure import TITLES, Bar, draw_bars
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.results import GapReport
-
-#: Titles of the charts, by the names of the figures in gap.json.
-_TITLES = {
-    "train": "Fitted rows",
-    "held_out_runs": "Held-out runs",
-    "held_out_region": "Held-out region",
-}
-
-
-@dataclass(frozen=True)
-class Bar:
-    """A row of a bar chart; `after` is NaN where the figures did not change."""
-
-    label: str
-    before: float
-    after: float
+from soilml.report.figure_style import SvgImage, new_figure, report_style, svg_image
+from soilml.report.numbers import channel_name, format_number
 
 
 @dataclass(frozen=True)
@@ -58,49 +35,19 @@ def gap_bars(report: GapReport, changed: bool) -> list[GapBars]:
     charts = []
     for key, pairs in tables.items():
         rows = [Bar(k, b, a if changed else math.nan) for k, (b, a) in pairs.items()]
-        title = _TITLES.get(key, key.replace("_", " "))
+        title = TITLES.get(key, key.replace("_", " "))
         chart = _bar_chart(rows, max(values), min(values), f"{title}: {_as_text(rows)}")
         charts.append(GapBars(title, report.gap[key], chart.image, chart.alt))
     return charts
 
 
 def _bar_chart(rows: Sequence[Bar], most: float, least: float, alt: str) -> SvgImage:
-    """Gap before and after on a logarithmic axis; bars start at 1, the value of noise alone."""
-    high = 10.0 ** (1.45 * math.log10(max(most, 4.0)) + 0.2)
-    low = min(0.5, 0.7 * max(least, 1e-3))
+    """The chart as an image."""
     with report_style():
         canvas = new_figure(30 + 46 * len(rows) + 24)
-        axes = canvas.add_axes(
-            (0.27, 48 / (54 + 46 * len(rows)), 0.71, 1 - 56 / (54 + 46 * len(rows)))
-        )
-        for i, row in enumerate(rows):
-            pair = [(row.before, BEFORE), (row.after, AFTER)]
-            if math.isnan(row.after):
-                pair = [(row.before, UNCHANGED)]
-            for k, (value, colour) in enumerate(pair):
-                y = i + (0.0 if len(pair) == 1 else 0.36 * k - 0.18)
-                end = min(max(value, low), high) if math.isfinite(value) else 1.0
-                axes.barh(y, end - 1.0, 0.3, left=1.0, color=colour)
-                axes.plot([end], [y], "|", color=colour, ms=14, mew=2, clip_on=False)
-                text = format_number(value) if math.isfinite(value) else "not finite"
-                axes.annotate(
-                    text, (max(end, 1.0), y), xytext=(7, 0), textcoords="offset points",
-                    va="center", ha="left", annotation_clip=False,
-                    fontweight="bold" if row.label == rows[0].label else "normal",
-                )  # fmt: skip
-        axes.set_xscale("log")
-        axes.set_xlim(low, high)
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.axvline(1.0, color="black", lw=1.2)
-        axes.set_yticks(range(len(rows)), [row.label for row in rows])
-        axes.tick_params(axis="y", length=0)
-        axes.spines["left"].set_visible(False)
-        decades = range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1)
-        step = max(1, math.ceil(len(decades) / 5))
-        ticks = [10.0**d for d in decades if d % step == 0]
-        axes.set_xticks(ticks, [format_number(t, 1) for t in ticks])
-        axes.minorticks_off()
-        axes.set_xlabel("mean squared residual; line at 1: noise alone", fontsize=10.5)
+        height = 54 + 46 * len(rows)
+        axes = canvas.add_axes((0.27, 48 / height, 0.71, 1 - 56 / height))
+        draw_bars(axes, rows, most, least)
         return svg_image(canvas, alt)
 
 

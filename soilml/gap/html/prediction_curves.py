@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.html.formatting import channel_name, channel_unit, format_number, with_unit
-from soilml.gap.html.svg_image import (
+from soilml.gap.report_parts import ReadingsAndPredictions
+from soilml.quantities import Z_90
+from soilml.report.figure_style import (
     AFTER,
     BEFORE,
     SvgImage,
@@ -18,8 +19,7 @@ from soilml.gap.html.svg_image import (
     report_style,
     svg_image,
 )
-from soilml.gap.report_parts import ReadingsAndPredictions
-from soilml.quantities import Z_90
+from soilml.report.numbers import channel_name, channel_unit, format_number, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

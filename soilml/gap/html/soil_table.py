@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from soilml.gap.html.formatting import (
+from soilml.gap.report_parts import EstimatedValue
+from soilml.gap.results import GapReport
+from soilml.quantities import Z_90
+from soilml.report.numbers import (
     display_unit,
     format_change,
     format_in_si,
@@ -13,9 +16,6 @@ from soilml.gap.html.formatting import (
     parameter_name,
     with_unit,
 )
-from soilml.gap.report_parts import EstimatedValue
-from soilml.gap.results import GapReport
-from soilml.quantities import Z_90
 
 
 def soil_table(report: GapReport) -> list[dict[str, Any]]:

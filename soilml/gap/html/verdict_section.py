@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from soilml.gap.html.formatting import format_estimate, format_in_si, format_probability
 from soilml.gap.results import GapReport
 from soilml.physics.effects import EFFECTS
+from soilml.report.numbers import format_estimate, format_in_si, format_probability
 
 #: What the reader should do, by status.
 _ADVICE = {

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.gap.report_parts import decimal
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import linearise
 from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
@@ -18,6 +17,7 @@ from soilml.gap.statistics.reml_covariance import (
 from soilml.gap.statistics.repeats import repeat_disagreement
 from soilml.gap.verdict.cross_validation import region_fold
 from soilml.quantities import column
+from soilml.report.numbers import decimal
 
 #: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
 #: about 10 % with the usual fifty degrees of freedom of a channel.

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.report_parts import RemainingDiscrepancy, decimal
+from soilml.gap.report_parts import RemainingDiscrepancy
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.quantities import QUANTITIES, column
+from soilml.report.numbers import decimal
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.html.svg_image import AFTER, SvgImage, new_figure, report_style, svg_image
 from soilml.log_import.recording import Floats
 from soilml.log_import.result import ImportedLog, WheelSeries
+from soilml.log_import.rows_figure import draw_over_slip, panels_over_slip
 from soilml.quantities import Z_90
+from soilml.report.figure_style import AFTER, SvgImage, new_figure, report_style, svg_image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +31,6 @@ _LINES = (AFTER, "#cc7a00")
 #: Most points of a line; a longer one is drawn by the extremes of its parts.
 _MOST_POINTS = 700
 _WINDOW, _LEFT_OUT, _HEIGHT = "#dbe9f4", "#eeeeee", 74
-#: Colours of loads, from light to heavy.
-_LOADS = ("#0d0887", "#9c179e", "#cc4778", "#e0603f", "#d98300")
 
 
 def run_figure(series: WheelSeries, imported: ImportedLog) -> SvgImage:
@@ -138,63 +137,10 @@ def slip_figures(imported: ImportedLog) -> list[SvgImage]:
     """The rows over slip: T / (W r) or torque, drawbar pull over load, sinkage; 90 % intervals."""
     found = []
     with report_style():
-        for key, unit, title in _over_slip(imported):
+        for panel in panels_over_slip(imported.table, imported.radius):
             canvas = new_figure(250)
-            _draw_over_slip(canvas.add_axes((0.14, 0.17, 0.83, 0.72)), imported, key, unit, title)
-            found.append(svg_image(canvas, f"{title} of {len(imported.table)} rows over slip"))
+            draw_over_slip(canvas.add_axes((0.14, 0.17, 0.83, 0.72)), imported.table, panel)
+            found.append(
+                svg_image(canvas, f"{panel.title} of {len(imported.table)} rows over slip")
+            )
     return found
-
-
-def draw_slip(canvas: FigureBase, imported: ImportedLog) -> None:
-    """Draw the rows over slip, one below the other, into a matplotlib figure."""
-    shown = _over_slip(imported)[:2]
-    for k, (key, unit, title) in enumerate(shown):
-        place = (0.14, 0.1 + 0.48 * (len(shown) - 1 - k), 0.83, 0.88 / len(shown) - 0.1)
-        _draw_over_slip(canvas.add_axes(place), imported, key, unit, title)
-
-
-def _over_slip(imported: ImportedLog) -> list[tuple[str, Floats, str]]:
-    """Columns to show over slip, what they are divided by, and their titles."""
-    table = imported.table
-    load, found = table["load_N"], []
-    if np.isfinite(table["torque_Nm"]).any():
-        if np.isfinite(imported.radius):
-            found.append(("torque_Nm", load * imported.radius, "torque / (load × radius)"))
-        else:
-            found.append(("torque_Nm", np.ones(len(table)), "torque, N m"))
-    if "drawbar_pull_N" in table:
-        found.append(("drawbar_pull_N", load, "drawbar pull / load"))
-    if "sinkage_m" in table:
-        found.append(("sinkage_m", np.full(len(table), 1e-3), "sinkage, mm"))
-    return found
-
-
-def _draw_over_slip(axes: Axes, imported: ImportedLog, key: str, unit: Floats, title: str) -> None:
-    table = imported.table
-    loads = table["load_N"]
-    groups = load_groups(loads)
-    std = table[f"{key}_std"] if f"{key}_std" in table else np.zeros(len(table))
-    slip_std = table["slip_std"] if "slip_std" in table else np.zeros(len(table))
-    for k in range(int(groups.max()) + 1):
-        rows = groups == k
-        colour = _LOADS[round(k * (len(_LOADS) - 1) / max(1, groups.max()))]
-        axes.errorbar(
-            table["slip"][rows], (table[key] / unit)[rows],
-            Z_90 * np.nan_to_num(std / unit)[rows], Z_90 * np.nan_to_num(slip_std)[rows],
-            fmt="o", ms=4, color=colour, elinewidth=1, label=f"{np.median(loads[rows]):.3g} N",
-        )  # fmt: skip
-    axes.axhline(0.0, color="#999999", lw=0.8, zorder=0)
-    axes.set_xlabel("slip")
-    axes.set_title(title)
-    axes.legend(fontsize=9, frameon=False, title="load", title_fontsize=9)
-
-
-def load_groups(loads: Floats) -> NDArray[np.int64]:
-    """Group (rows,) of each load: gaps of more than 10 % divide them, into at most five."""
-    order = np.argsort(loads)
-    gaps = np.diff(np.log(loads[order]))
-    edges = np.sort(np.argsort(-gaps)[: len(_LOADS) - 1])
-    edges = edges[gaps[edges] > 0.1]
-    groups = np.zeros(loads.size, dtype=np.int64)
-    groups[order] = np.searchsorted(edges, np.arange(loads.size), side="left")
-    return groups

@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from soilml.gap.html.formatting import format_number, format_with_std
 from soilml.log_import.report.figures import run_figure, slip_figures
 from soilml.log_import.result import ImportedLog
 from soilml.optional_imports import need
+from soilml.report.numbers import format_number, format_with_std
+from soilml.report.origin import Origin
+from soilml.report.page import Report, render
 
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24
@@ -36,23 +38,24 @@ _CONSTANTS = {
 _UNITS = {"slip": "", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkage": "m"}
 
 
-def page(imported: ImportedLog, progress: Callable[[str, int, int], None] | None = None) -> str:
-    """The report as HTML; `progress` is called with a stage, the pictures done and their number."""
+def page(
+    imported: ImportedLog,
+    progress: Callable[[str, int, int], None] | None = None,
+    origin: Origin | None = None,
+) -> str:
+    """The report as HTML.
+
+    Parameters
+    ----------
+    progress
+        Called with a stage, the pictures done and their number.
+    origin
+        The command and its files; by default the call of `import_log` in Python.
+    """
     for library in ("jinja2", "matplotlib"):
         need(library, "import")
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
-    from soilml import __version__
-
-    environment = Environment(
-        loader=ChoiceLoader(
-            [PackageLoader("soilml.log_import", "report"), PackageLoader("soilml.gap", "html")]
-        ),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    if origin is None:
+        origin = Origin.of(["import", *imported.sources, "--map", imported.map_name], [])
     shown = imported.series[:MOST_RUNS]
     pictures = []
     for i, series in enumerate(shown):
@@ -61,9 +64,12 @@ def page(imported: ImportedLog, progress: Callable[[str, int, int], None] | None
         pictures.append({"series": series, "image": run_figure(series, imported)})
     if progress is not None:
         progress("drawing the report", len(shown), len(shown))
-    return environment.get_template("import_page.html.j2").render(
-        imported=imported,
-        version=__version__,
+    return render(
+        "import_page.html.j2",
+        "soilml.log_import.report",
+        "import",
+        page=summary(imported),
+        origin=origin,
         pictures=pictures,
         runs=len(imported.series),
         slip=slip_figures(imported),
@@ -71,9 +77,34 @@ def page(imported: ImportedLog, progress: Callable[[str, int, int], None] | None
         rows=_rows(imported),
         left_out=_left_out(imported),
         shared=_shared(imported),
-        bias=[(key, n.as_setting()) for key, n in imported.bias.items()],
         bias_text=imported.bias_toml(),
-        kept_share=_kept_share(imported),
+    )
+
+
+def summary(imported: ImportedLog) -> Report:
+    """What every report says: question, verdict, what looks odd, what to do."""
+    rows, runs = len(imported.table), len(imported.series)
+    odd = (*imported.implausible, *imported.remarks)
+    if imported.implausible:
+        answer, tone = f"The map looks wrong: {odd[0]}", "bad-data"
+        step = "Correct the map, and import again."
+    elif odd:
+        answer, tone = odd[0], "suspected"
+        step = "Look at the remarks and the pictures; then identify the soil from the rows."
+    else:
+        answer, tone = "Nothing looks odd.", "no-gap"
+        step = "Identify the soil from the rows: soilml identify, or soilml gap."
+    return Report(
+        kind="import",
+        title=f"Import report: {imported.map_name}",
+        badge=f"{rows} row{'s'[: rows != 1]}",
+        meaning=f"from {runs} run{'s'[: runs != 1]}; {_kept_share(imported)} of the time is in "
+        "steady windows",
+        answer=[answer],
+        tone=tone,
+        warnings=odd[1:],
+        next_steps=[step],
+        notation=[("±", "one standard deviation, of what is independent from row to row.")],
     )
 
 

@@ -1,27 +1,30 @@
-"""A rover on slopes, as a picture."""
+"""A rover on slopes: slip, margin and energy with bands, and the steepest slope."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.numerics.quantile_band import quantile_band
+from soilml.report.figure_style import take_axes
 from soilml.traction.plot import POSTERIOR, PRIOR
-from soilml.traction.rover.report import RoverReport
+
+if TYPE_CHECKING:
+    from soilml.traction.rover.report import RoverReport
 
 Floats = NDArray[np.float64]
 
 
-def save_figure(report: RoverReport, path: Path) -> None:
-    """Write a PNG file: slip, margin and energy against the slope, and the steepest slope."""
-    from matplotlib.figure import Figure
+#: Width and height of the figure, inches.
+SIZE = (10.0, 6.4)
 
+
+def plot_rover(report: RoverReport, ax: Any = None) -> NDArray[Any]:
+    """Draw slip, margin and energy against the slope, and the steepest slope; see `take_axes`."""
     found = report.performance
-    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
-    panels = figure.subplots(2, 2)
+    panels = take_axes(ax, 2, 2, SIZE)
     degrees = np.rad2deg(found.slope)
     _band(panels[0, 0], degrees, found.slip, "slip needed")
     _band(panels[0, 1], degrees, found.margin, "margin of pull, N")
@@ -35,11 +38,12 @@ def save_figure(report: RoverReport, path: Path) -> None:
     for values, color, label in zip(
         known, (PRIOR, POSTERIOR), ("before the rows", "after"), strict=True
     ):
-        last.hist(values, bins, density=True, color=color, alpha=0.8, label=label)
+        if len(values):
+            last.hist(values, bins, density=True, color=color, alpha=0.8, label=label)
     last.set_xlabel("steepest slope, degrees")
     last.set_yticks([])
     last.legend(frameon=False)
-    figure.savefig(path, format="png", dpi=110)
+    return panels
 
 
 def _band(panel: Any, x: Floats, draws: Floats, label: str) -> None:

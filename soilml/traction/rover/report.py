@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,27 @@ class RoverReport:
     performance: RoverPerformance
     prior_steepest: Floats
     warnings: tuple[str, ...]
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw slip, margin and energy against the slope, and the steepest slope.
+
+        Parameters
+        ----------
+        ax
+            Four axes of matplotlib; a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (2, 2)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.traction.rover.plot import plot_rover
+
+        return plot_rover(self, ax)
 
 
 def rover_report(

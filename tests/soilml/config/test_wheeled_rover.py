@@ -112,6 +112,13 @@ def test_what_is_wrong_is_told(model_file, old, new, said):
         read_case(model_file)
 
 
+def test_a_track_is_no_wheel_of_a_rover(model_file):
+    text = model_file.read_text().replace('type = "wheel"', 'type = "track"\nbase = 0.5')
+    model_file.write_text(text + ROVER)
+    with pytest.raises(InputError, match=r"its gear is a track, but .rover. shares the load"):
+        read_case(model_file)
+
+
 def test_gravity_by_name_or_number():
     assert [read_gravity(g) for g in ("moon", "Earth", "1.35", 9.8)] == [1.62, 9.80665, 1.35, 9.8]
     with pytest.raises(InputError, match="needed is a number in m/s"):

@@ -1,6 +1,7 @@
 """`soilml compare` on the fixed benchmark."""
 
 import csv
+import json
 
 import pytest
 
@@ -32,7 +33,10 @@ def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsy
     }
     assert {r["unknown_effect"] for r in rows} == {"", *UNMODELLED_EFFECTS}
     assert (out / "benchmark.png").stat().st_size > 20_000
-    assert "## Acceptance goals" in (out / "benchmark.md").read_text()
+    assert "Acceptance goals" in (out / "report.html").read_text()
+    content = json.loads((out / "benchmark.json").read_text())
+    assert content["report"]["answer"][0].endswith("acceptance goals are met.")
+    assert max(map(len, printed.splitlines())) <= 100
 
 
 def test_without_released_models_the_command_names_the_clone(tmp_path, monkeypatch, capsys):

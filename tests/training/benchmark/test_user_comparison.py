@@ -1,6 +1,7 @@
 """The comparison on test data: every method scored on the same sets."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -81,4 +82,7 @@ def test_the_command_writes_table_picture_and_page(test_data, small_model, capsy
         "shear_modulus_m",
     }
     assert (out / "compare.png").stat().st_size > 10_000
-    assert "prior" in (out / "compare.md").read_text()
+    assert "Comparison of methods" in (out / "report.html").read_text()
+    content = json.loads((out / "compare.json").read_text())
+    assert len(content["columns"]["rmse"]) == len(rows)
+    assert content["report"]["kind"] == "compare" and len(content["report"]["files"]) == 3

@@ -21,12 +21,12 @@ def run(args: argparse.Namespace) -> int:
         raise ModelFileError(
             "this installation has no released model files; train one with soilml train"
         )
-    header = ("name", "gear", "reads", "estimates", "several readings", "kB")
+    header = ("name", "gear", "reads", "estimates", "readings", "kB")
     rows = []
     for name, file in files.items():
         estimator = Estimator.load(file)
         gear = dict(json.loads(estimator.metadata["gear"]))
-        sizes = [f"{k[0]} {gear[k]:g} m" for k in ("radius", "width") if gear.get(k)]
+        sizes = [f"{k[0]} {gear[k]:g}" for k in ("radius", "width") if gear.get(k)]
         rows.append(
             (
                 name,
@@ -38,5 +38,5 @@ def run(args: argparse.Namespace) -> int:
             )
         )
     print(format_table(header, rows, text_columns=5))
-    print("r, w: radius and width; c, phi, K: cohesion, friction angle, shear modulus")
+    print("r, w: radius and width in m; c, phi, K: cohesion, friction angle, shear modulus")
     return 0

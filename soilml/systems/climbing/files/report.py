@@ -89,12 +89,33 @@ class ClimbingReport:
             warnings.append(f"the slip of run {', '.join(outside)} lies outside the curve")
         most = float(quantile_band(self.ability.steepest).upper)
         warnings += [
-            f"run {climb.name} climbed {climb.slope:.3g} rad, more than predicted (at most "
-            f"{most:.3g}): it is inconsistent with the others"
+            f"run {climb.name} climbed {np.rad2deg(climb.slope):.3g} deg, more than predicted (at "
+            f"most {np.rad2deg(most):.3g}): it is inconsistent with the others"
             for climb in self.data.climbs
             if climb.slope > most
         ]
         return tuple(warnings)
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw pull (N) and slope (degrees) against slip with 90 % bands, and the climbs.
+
+        Parameters
+        ----------
+        ax
+            Two axes of matplotlib; a new figure where None.
+
+        Returns
+        -------
+        ndarray of Axes, shape (2,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.systems.climbing.plot import plot_climbing
+
+        return plot_climbing(self, ax)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml climb` writes."""

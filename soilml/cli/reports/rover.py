@@ -1,14 +1,21 @@
-"""What `soilml pull` prints of a rover."""
+"""A rover's performance as text, as columns, and as a page."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from soilml.cli.reports.presentation import Presentation
 from soilml.config.wheeled_rover import WheeledRover
 from soilml.io.text_tables import format_table
 from soilml.numerics.quantile_band import quantile_band
+from soilml.report.figure_style import picture
+from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.traction.rover.plot import SIZE
 from soilml.traction.rover.report import RoverReport
 
 #: Share of draws that climb a slope below which nothing is said of the slip there.
@@ -104,11 +111,102 @@ def _cells(draws: np.ndarray, form: str, needs: float = 0.0) -> list[str]:
     return [form.format(float(v)) for v in (band.middle, band.lower, band.upper)]
 
 
-def _range(draws: np.ndarray, form: str) -> str:
+def _range(draws: np.ndarray, form: str, unit: str = "") -> str:
     band = quantile_band(draws)
-    return f"{band.middle:{form}} ({band.lower:{form}} to {band.upper:{form}})"
+    return f"{band.middle:{form}}{unit} ({band.lower:{form}} to {band.upper:{form}})"
 
 
 def _ends(draws: np.ndarray) -> str:
     band = quantile_band(draws)
     return f"{band.lower:.1f} to {band.upper:.1f}" if np.isfinite(band.middle) else "not known"
+
+
+def rover_presentation(rover: WheeledRover) -> Presentation[RoverReport]:
+    """What `pull` writes of this rover."""
+    return Presentation(
+        columns=rover_columns,
+        text=partial(rover_text, rover),
+        warnings=lambda report: report.warnings,
+        page=partial(rover_page, rover),
+        panels=lambda report: (2, 2, SIZE),
+    )
+
+
+def rover_page(
+    rover: WheeledRover,
+    found: Mapping[str, RoverReport],
+    by: str | None,
+    files: tuple[str, str],
+) -> Report:
+    """The page of `pull` for a whole rover: performance by group; model file and table."""
+    heads = {name: f"{by} {name}: " if by else "" for name in found}
+    moves = [_moves(report) for report in found.values()]
+    tables = [
+        ReportTable(
+            f"{heads[name]}slopes",
+            ["slope, °", "climbed", "slip", "90 %", "margin, N", "90 %", "work, J/m", "90 %"],
+            _page_rows(report),
+        )
+        for name, report in found.items()
+    ]
+    images = [
+        ReportPicture(
+            f"{heads[name]}slopes of the rover",
+            picture(report.plot, 2, 2, SIZE, _sentence(report)),
+            "Lines: medians. Bands: 90 % of the soils that the rows allow.",
+        )
+        for name, report in list(found.items())[:MOST_PICTURES]
+    ]
+    return Report(
+        kind="pull",
+        title=f"Rover {Path(files[0]).name} on the soil of {Path(files[1]).name}",
+        badge="moves" if all(moves) else "does not move" if not any(moves) else "moves in part",
+        meaning=f"rover of {rover.mass:g} kg on {len(rover.wheels)} wheels, gravity "
+        f"{rover.gravity:.4g} m/s²",
+        answer=[heads[name] + _sentence(report) for name, report in found.items()],
+        tone="named" if all(moves) else "bad-data",
+        pictures=images,
+        tables=tables,
+        warnings=[heads[n] + text for n, report in found.items() for text in report.warnings],
+        next_steps=["Keep below the lower end of the band, and drive rows that narrow it."],
+        notation=[
+            ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
+            ("climbed", "share of the soils, which the rows allow, that the rover climbs."),
+            ("margin", "largest pull less the weight along the slope."),
+        ],
+    )
+
+
+#: Most pictures of a page.
+MOST_PICTURES = 6
+
+
+def _moves(report: RoverReport) -> bool:
+    return bool(np.mean(~np.isfinite(report.performance.steepest_slope)) <= FEWEST)
+
+
+def _sentence(report: RoverReport) -> str:
+    found = report.performance
+    if not _moves(report):
+        still = float(np.mean(~np.isfinite(found.steepest_slope)))
+        return f"There is no steepest slope: {still:.0%} of the soils do not let the rover move."
+    return (
+        f"The steepest slope is {_range(np.rad2deg(found.steepest_slope), '.1f', '°')}, at slips "
+        f"up to {found.slip_limit:.2g}; the best slip on level ground is "
+        f"{_range(found.best_slip, '.2f')}."
+    )
+
+
+def _page_rows(report: RoverReport) -> list[list[str]]:
+    found, rows = report.performance, []
+    for i, slope in enumerate(np.rad2deg(found.slope)):
+        cells = [f"{slope:.3g}", f"{100 * found.climbed[i]:.0f} %"]
+        for draws, form, needs in (
+            (found.slip[:, i], "{:.2f}", FEWEST),
+            (found.margin[:, i], "{:.1f}", 0.0),
+            (found.energy[:, i], "{:.1f}", FEWEST),
+        ):
+            middle, low, high = _cells(draws, form, needs)
+            cells += [middle or "–", f"{low} to {high}" if middle else "–"]
+        rows.append([cell.replace("-", "−") for cell in cells])
+    return rows

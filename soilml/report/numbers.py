@@ -1,10 +1,10 @@
-"""Numbers, units and names as the page shows them."""
+"""Numbers, units and names as reports and tables show them: rounded to what is known of them."""
 
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
-from soilml.gap.report_parts import EstimatedValue, decimal
 from soilml.quantities import COLUMNS
 
 _SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")
@@ -33,6 +33,30 @@ _NAMES = {
     "a1": "its growth with slip",
 }
 _SYMBOLS |= {"a_1": "a₁"}
+
+
+class Estimated(Protocol):
+    """An estimate in an SI unit, with its standard deviation."""
+
+    @property
+    def value(self) -> float:
+        """The estimate."""
+
+    @property
+    def std(self) -> float:
+        """Its standard deviation."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of both."""
+
+
+def decimal(value: float, digits: int = 3) -> str:
+    """A number with this many significant digits, never with a power of ten."""
+    if not math.isfinite(value):
+        return f"{value:g}"
+    exponent = 0 if value == 0.0 else math.floor(math.log10(abs(value)))
+    return f"{value:.{max(0, digits - 1 - exponent)}f}"
 
 
 def format_number(x: float, digits: int = 3) -> str:
@@ -75,6 +99,16 @@ def format_with_std(value: float, std: float) -> str:
     return _minus(f"({inside}) × 10{_raised(power)}")
 
 
+def format_interval(low: float, high: float, std: float) -> str:
+    """Both ends to the second significant digit of the standard deviation: 0.85 to 1.24."""
+    ends = [format_with_std(end, std).split(" ± ")[0].lstrip("(") for end in (low, high)]
+    power = format_with_std(low, std).rpartition(") ")[2]
+    text = f"{ends[0]} to {ends[1]}"
+    if not power.startswith("×"):
+        return text
+    return f"{format_number(low, 3)} to {format_number(high, 3)}"
+
+
 def format_change(x: float, std: float) -> str:
     """A change with its sign, to the second significant digit of its standard deviation."""
     decimals = 1 - math.floor(math.log10(std)) if std > 0.0 and math.isfinite(std) else 3
@@ -100,13 +134,19 @@ def format_unit(unit: str) -> str:
     return base + (exponent.translate(_SUPERSCRIPT).replace(" ", "") if caret else "")
 
 
-def format_estimate(value: EstimatedValue) -> str:
+def format_estimate(value: Estimated) -> str:
     """An estimate ± standard deviation in its display unit."""
     factor, unit = display_unit(value.unit, value.value)
     return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
 
 
-def format_in_si(value: EstimatedValue) -> str:
+def format_quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A number in an SI unit, in the display unit of its kind."""
+    factor, shown = display_unit(unit, abs(value))
+    return with_unit(format_number(factor * value, digits), shown)
+
+
+def format_in_si(value: Estimated) -> str:
     """The same in SI units; empty where that is the display unit."""
     factor, _ = display_unit(value.unit, value.value)
     if factor == 1.0:
@@ -143,6 +183,13 @@ def format_range(low: float, high: float, digits: int = 3) -> str:
     """A range, or a single value where both ends agree."""
     one, two = (_trimmed(format_number(x, digits)) for x in (low, high))
     return one if one == two else f"{one} to {two}" if low < 0.0 else f"{one}–{two}"
+
+
+def capitalised(text: str) -> str:
+    """The text as the beginning of a sentence; symbols, files and commands stay."""
+    first = text.split(" ", 1)[0].rstrip(":,;.")
+    word = len(first) > 1 and first.isalpha() and first != "soilml"
+    return text[0].upper() + text[1:] if word or first == "a" else text
 
 
 def format_variance_component(key: str, value: float) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from soilml.gap.html import formatting
+from soilml.report import numbers
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from soilml.gap.html import formatting
     ],
 )
 def test_values_are_rounded_to_their_standard_deviation(value, std, text):
-    assert formatting.format_with_std(value, std) == text
+    assert numbers.format_with_std(value, std) == text
 
 
 @pytest.mark.parametrize(
@@ -23,4 +23,4 @@ def test_values_are_rounded_to_their_standard_deviation(value, std, text):
     [(320.18, "320"), (0.0, "0.00"), (3311.0, "3311"), (1.2e7, "1.20 × 10⁷"), (-0.05, "−0.0500")],
 )
 def test_numbers_have_three_significant_digits(x, text):
-    assert formatting.format_number(x) == text
+    assert numbers.format_number(x) == text

@@ -1,0 +1,133 @@
+"""Matplotlib figures as SVG images inside the page."""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Before and after: orange and blue, which colour-blind readers and grey prints distinguish.
+BEFORE, AFTER, UNCHANGED = "#cc7a00", "#005b96", "#4d4d4d"
+#: Width of a figure in pixels.
+WIDTH = 380
+_STYLE: dict[str, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "soilml",
+    "text.parse_math": False,
+    "font.size": 11.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.titlesize": 11.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+    "axes.unicode_minus": True,
+}
+
+
+@dataclass(frozen=True)
+class SvgImage:
+    """A figure as a data URI, with its text alternative."""
+
+    image: str
+    alt: str
+
+
+@contextmanager
+def report_style() -> Iterator[None]:
+    """Matplotlib's defaults with the style of the report, whatever the user's settings are."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        settings: Any = matplotlib.rcParams
+        settings.update(_STYLE)
+        yield
+
+
+def new_figure(height: float) -> Figure:
+    """A figure of this height in pixels and the width of the report's columns."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH / 72, height / 72))
+
+
+def take_axes(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> NDArray[Any]:
+    """The axes (rows, columns) that a `plot` method draws into.
+
+    Parameters
+    ----------
+    ax
+        Axes of matplotlib, or a sequence or array of rows times columns of them; None for a new
+        figure of pyplot.
+    size
+        Width and height of a new figure, inches.
+
+    Raises
+    ------
+    InputError
+        For another number of axes.
+    """
+    if ax is None:
+        from matplotlib import pyplot
+
+        _, found = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+        return np.asarray(found)
+    given = np.asarray(ax, dtype=object).ravel()
+    if given.size != rows * columns:
+        raise InputError(
+            f"ax is {given.size} axes; this plot needs {rows * columns}, such as those of "
+            f"pyplot.subplots({rows}, {columns})"
+        )
+    return given.reshape(rows, columns)
+
+
+def picture(
+    draw: Callable[[Any], object], rows: int, columns: int, size: tuple[float, float], alt: str
+) -> SvgImage:
+    """The image of a figure with axes (rows, columns), size in inches, which `draw` fills."""
+    from matplotlib.figure import Figure
+
+    with report_style():
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure.subplots(rows, columns, squeeze=False))
+        return svg_image(figure, alt)
+
+
+def save_png(
+    draw: Callable[[Any], object],
+    rows: int,
+    columns: int,
+    size: tuple[float, float],
+    path: str | os.PathLike[str],
+) -> None:
+    """The same figure as a PNG file."""
+    from matplotlib.figure import Figure
+
+    with report_style():
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure.subplots(rows, columns, squeeze=False))
+        figure.savefig(path, format="png", dpi=110, metadata={"Software": "soilml"})
+
+
+def svg_image(figure: Figure, alt: str) -> SvgImage:
+    """The figure as an image; the same figure gives the same bytes."""
+    text = io.StringIO()
+    without = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    figure.savefig(text, format="svg", metadata=without, transparent=True)
+    encoded = base64.b64encode(text.getvalue().encode()).decode()
+    return SvgImage(f"data:image/svg+xml;base64,{encoded}", alt)

@@ -1,0 +1,107 @@
+"""What all commands print on a terminal: usual units, rounded numbers, at most 100 columns."""
+
+import re
+from pathlib import Path
+
+import pytest
+from conftest import THREE_CHANNEL_MODEL
+
+from soilml.cli import main
+from soilml.cli.main import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+#: A number with more digits than anybody reads.
+RAW = re.compile(r"\d\.\d{6,}")
+#: An SI unit in the name of a column, and one beside a number or as a cell.
+SI_COLUMN = re.compile(r"_(Pa|rad|m)(?!_s)(?=[\s_]|$)")
+SI_UNIT = re.compile(r"(?<=[\d.] )(Pa|rad)\b|  (Pa|rad)\b")
+
+RUNS = """\
+run,slip,load_N,torque_Nm,drawbar_pull_N,sinkage_m
+a,0.1,40,0.75,-3.1,0.0112
+a,0.3,80,3.2,1.4,0.0197
+a,0.5,40,1.95,5.1,0.0117
+b,0.1,80,1.8,-7.6,0.0194
+b,0.3,40,1.4,1.6,0.0115
+b,0.5,80,4.1,7.2,0.0199
+"""
+PLATES = "test,plate_radius_m,sinkage_m,load_N\n" + "".join(
+    f"p{i},{r},{z},{3.1415 * r * r * 1528e3 * z**1.1:.4g}\n"
+    for i, r in enumerate((0.04, 0.06))
+    for z in (0.005, 0.01, 0.02, 0.03)
+)
+LINEAR = str(ROOT / "exported/wheel_linear.onnx")
+WORDS = {
+    "models": [],
+    "doctor": [],
+    "soils": [],
+    "effects": [],
+    "simulate": ["m.toml", "--slip", "0.1,0.5", "--load", "60,1e6", "--speed", "0.1"],
+    "identify": ["m.toml", "runs.csv", "--by", "run"],
+    "bevameter": ["plates.csv"],
+    "audit": ["m.toml", "runs.csv", "--ignore-extra"],
+    "gap": ["m.toml", "runs.csv", "--out", "gap"],
+    "estimate": [LINEAR, "runs.csv"],
+    "advise": ["m.toml", "runs.csv"],
+    "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
+    "papers": ["comin2017-slip"],
+}
+#: Commands whose tables have tests of their own, or that print none.
+ELSEWHERE = {
+    "init",
+    "completion",
+    "import",
+    "generate",
+    "train",
+    "export-c",
+    "export-step",
+    "compare",
+    "climb",
+}
+
+
+def test_every_command_is_looked_at():
+    assert {*WORDS, *ELSEWHERE} == set(COMMANDS)
+
+
+def tables(text):
+    """The lines of tables: those about a line of dashes, and below it up to a blank line."""
+    lines, found = text.splitlines(), []
+    for i, line in enumerate(lines):
+        if line and set(line) <= {"-", " "}:
+            found.append(lines[i - 1])
+            for row in lines[i:]:
+                if not row or row.startswith("!"):
+                    break
+                found.append(row)
+    return found
+
+
+@pytest.mark.parametrize("command", [c for c in WORDS if c != "papers"])
+def test_tables_are_narrow_rounded_and_in_usual_units(command, tmp_path, monkeypatch, capsys):
+    (tmp_path / "m.toml").write_text(THREE_CHANNEL_MODEL)
+    (tmp_path / "runs.csv").write_text(RUNS)
+    (tmp_path / "plates.csv").write_text(PLATES)
+    monkeypatch.chdir(tmp_path)
+    for module in ("soilml.cli.output", "soilml.cli.execution.identify"):
+        monkeypatch.setattr(f"{module}.is_terminal", lambda: True)
+    monkeypatch.setattr("soilml.cli.reports.presentation.is_terminal", lambda: True)
+    assert main([command, *WORDS[command]]) == 0
+    found = tables(capsys.readouterr().out)
+    assert found
+    assert not SI_COLUMN.search(found[0])
+    for line in found:
+        assert len(line) <= 100, line
+        assert not RAW.search(line), line
+        assert not SI_UNIT.search(line), line
+
+
+def test_columns_that_do_not_fit_are_named(tmp_path, monkeypatch, capsys):
+    (tmp_path / "m.toml").write_text(THREE_CHANNEL_MODEL)
+    (tmp_path / "runs.csv").write_text(RUNS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("soilml.cli.output.is_terminal", lambda: True)
+    assert main(["estimate", LINEAR, "runs.csv"]) == 0
+    said = capsys.readouterr().out
+    assert "not shown here, but with --out: cohesion_kPa_p05" in said
+    assert re.search(r"\d\.\d+ \+- \d\.\d+", said)  # a value beside its standard deviation

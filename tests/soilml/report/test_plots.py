@@ -1,0 +1,116 @@
+"""Every result draws itself, into axes of the caller or into a figure of its own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import MODEL
+
+from soilml import Estimator, Table, identify, read_case
+from soilml.errors import InputError
+from soilml.gap.report_parts import GapReduction
+from soilml.gap.results import GapReport
+from soilml.traction.report import pull_report
+
+matplotlib = pytest.importorskip("matplotlib")
+matplotlib.use("Agg")
+ROOT = Path(__file__).parents[3]
+ROVER = ROOT / "examples/rover/rover.toml"
+ROWS = {
+    "run": np.asarray(["a"] * 4),
+    "slip": np.asarray([0.1, 0.2, 0.3, 0.5]),
+    "load_N": np.asarray([40.0, 80.0, 40.0, 80.0]),
+    "torque_Nm": np.asarray([0.75, 2.5, 1.4, 4.1]),
+}
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    file = tmp_path_factory.mktemp("case") / "model.toml"
+    file.write_text(MODEL)
+    return read_case(file)
+
+
+def fit(case):
+    return identify(case, Table(dict(ROWS)))
+
+
+def estimate(case):
+    estimator = Estimator.load(ROOT / "exported/wheel_linear.onnx")
+    return estimator(slip=ROWS["slip"], torque=ROWS["torque_Nm"], load=ROWS["load_N"])
+
+
+def gap(case):
+    figures = GapReduction(320.0, 1.0, {"torque_Nm": (55.2, 1.1)}, 12, "all rows fitted")
+    return GapReport("named", "named", case, gap={"train": figures})
+
+
+def pull(case):
+    return pull_report(case, Table(dict(ROWS)), loads=[60.0], slip_limit=0.4)
+
+
+def rover(case):
+    from soilml.traction.rover.report import rover_report
+
+    return rover_report(read_case(ROVER), Table(dict(ROWS)), slopes=np.asarray([0.0, 0.1]))
+
+
+def imported(case):
+    from soilml.log_import.result import ImportedLog
+
+    table = Table(ROWS | {"torque_Nm_std": np.full(4, 0.05)})
+    return ImportedLog(table, {}, (), (), radius=0.15)
+
+
+def comparison(case):
+    from training.benchmark.methods import MethodKind
+    from training.benchmark.user_comparison import Comparison, MethodScore
+
+    half = np.full(2, 0.5)
+    score = MethodScore(1, "m", MethodKind.ANALYTIC, "torque", 9, 0, half, half, half, half, 0.1)
+    return Comparison([score, replace(score, rows=6)], ["cohesion", "friction_angle"])
+
+
+@pytest.mark.parametrize(
+    ("make", "shape", "said"),
+    [
+        (fit, (3,), "cohesion c (kPa)"),
+        (estimate, (3,), "friction angle φ (°)"),
+        (gap, (), "Fitted rows"),
+        (pull, (2, 1), "60 N on the wheel"),
+        (rover, (2, 2), "steepest slope, degrees"),
+        (imported, (1,), "torque / (load × radius)"),
+        (comparison, (2, 2), "friction angle"),
+    ],
+)
+def test_results_draw_themselves(make, shape, said, case):
+    from matplotlib import pyplot
+    from matplotlib.figure import Figure
+
+    result = make(case)
+    own = result.plot()
+    assert np.shape(own) == shape
+    texts = " ".join(t.get_text() for a in np.ravel(own) for t in a.findobj(matplotlib.text.Text))
+    assert said in texts
+    assert all(a.has_data() for a in np.ravel(own))
+    pyplot.close("all")
+    given = Figure().subplots(*(shape or (1,)), squeeze=False)
+    back = np.ravel(result.plot(ax=given[0, 0] if not shape else given))
+    assert all(a is b for a, b in zip(back, given.ravel(), strict=True))
+    assert not pyplot.get_fignums()
+    with pytest.raises(InputError, match="this plot needs"):
+        result.plot(ax=Figure().subplots(5, 1))
+
+
+def test_shaded_priors_are_those_that_are_given(case):
+    axes = fit(case).plot(prior=case.prior)
+    low, high = axes[1].get_xlim()
+    assert low < 25.0 and high > 45.0  # the prior of the friction angle, in degrees
+    assert len(axes[1].patches) == 1 and not fit(case).plot()[1].patches
+    matplotlib.pyplot.close("all")
+
+
+def test_an_unknown_part_of_a_gap_report_is_refused(case):
+    with pytest.raises(InputError, match=r"this report has train"):
+        gap(case).plot(part="held_out")
