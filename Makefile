@@ -20,7 +20,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,logs,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,serve,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## from the forward model to an estimate on board, with a table and a picture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import available_effects, check_seed, parse_costs, parse_names
 from soilml.cli.output import json_text
@@ -20,12 +20,14 @@ from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
 
+if TYPE_CHECKING:
+    from soilml.gap import GapReport
+
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
-    from soilml.config.write_case import case_as_toml
     from soilml.gap import gap
 
     check_seed(args)
@@ -45,18 +47,7 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
         )
-    from soilml.gap.html.page import page
-
-    texts = {
-        "report.html": page(report, str(args.model), str(args.runs)),
-        "gap.json": json_text(report.as_json()),
-        "model.toml": case_as_toml(report.model, [report.sentence]),
-        "next_runs.csv": csv_text(_next_runs(report)),
-    }
-    if report.suspected_model is not None:
-        first = " + ".join(report.best_unclaimed)
-        heading = f"With {first}, which is suspected, not named. {report.sentence}"
-        texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
+    texts = gap_files(report, str(args.model), str(args.runs))
     with create_folder(args.out) as folder:
         names = [folder / name for name in texts]
         # a suspected model of an earlier analysis would contradict this one
@@ -67,6 +58,24 @@ def run(args: argparse.Namespace) -> int:
     print(_text(report))
     print(f"\n{', '.join(str(name) for name in names)}", file=sys.stderr)
     return 0
+
+
+def gap_files(report: GapReport, model: str, runs: str) -> dict[str, str]:
+    """The content of the files of a report by their names; `model` and `runs` were analysed."""
+    from soilml.config.write_case import case_as_toml
+    from soilml.gap.html.page import page
+
+    texts = {
+        "report.html": page(report, model, runs),
+        "gap.json": json_text(report.as_json()),
+        "model.toml": case_as_toml(report.model, [report.sentence]),
+        "next_runs.csv": csv_text(_next_runs(report)),
+    }
+    if report.suspected_model is not None:
+        first = " + ".join(report.best_unclaimed)
+        heading = f"With {first}, which is suspected, not named. {report.sentence}"
+        texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
+    return texts
 
 
 def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:
