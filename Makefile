@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
+.PHONY: help demo demo-papers demo-import gap test test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,6 +42,11 @@ test: $(VENV)/.ready ## all checks and tests
 test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, under a minute
 	@$(MAKE) --no-print-directory check
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network"
+
+test-browser: $(VENV)/.ready ## the live page with real clicks; needs Chromium: apt install chromium, or SOILML_CHROMIUM=/path
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[browser]'
+	@SOILML_BROWSER=needed $(BIN)/python -m pytest tests/soilml/serve/test_browser.py
 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \

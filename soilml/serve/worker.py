@@ -52,7 +52,8 @@ def main(folder: str) -> int:
 
 def _end_with_the_server() -> None:
     """Standard input ends when the server does, however it ends."""
-    sys.stdin.buffer.read()
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
     os._exit(1)
 
 

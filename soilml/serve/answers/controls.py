@@ -99,9 +99,10 @@ def _effects(case: Case) -> Any:
         unit, factor = _UNITS.get(parameter.unit, (parameter.unit, 1.0))
         default = float(getattr(type(effect)(), size))
         far = default + _REACH * (effect.about.reference[size] - default)
-        low, high = sorted((factor * default, factor * far))
-        if parameter.lower < 0.0 and effect.about.kind == "rig":
+        low, high = sorted((default, far))
+        if effect.about.kind == "rig":  # a slope may fall, a transfer may lift
             low = min(low, -high)
+        low, high = (factor * min(max(v, parameter.lower), parameter.upper) for v in (low, high))
         name = effect.name.replace("-", " ").capitalize()
         slider = Slider(name, "", unit, factor, low, high, text=effect.about.text)
         yield _control(path, slider, parameter, float(value)) | {"neutral": default}
@@ -124,7 +125,7 @@ def _control(path: str, slider: Slider, parameter: Parameter, value: float) -> d
         "least": slider.factor * parameter.lower,
         "most": slider.factor * parameter.upper,
         "log": slider.log,
-        "text": slider.text or parameter.text,
+        "text": slider.text,
         "value": float(value),
     }
 

@@ -19,7 +19,7 @@ from soilml.identification import Fit, identify
 from soilml.identification.free_parameters import select_free
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
+from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.serve.answers.dropped_file import table_summary
 from soilml.serve.answers.job_output import Tell, setting_file, write_files
 from soilml.serve.answers.pull_curves import pull_curves
@@ -49,6 +49,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     advice = advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
     pull = _pull(case, table)
+    pull["warnings"] = [w for w in pull.get("warnings", []) if w not in fit.warnings]
     found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
     texts = {
@@ -60,10 +61,11 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "remarks": remarks,
         "parameters": parameters(case, fit),
         "words": words(fit, advice),
-        "warnings": list(fit.warnings),
+        # the width that remains stands beside each parameter
+        "warnings": [text for text in fit.warnings if "prior's width remains" not in text],
         "next": "" if advice is None else row_message(advice, advice.best()),
         "misfit": fit.misfit,
-        "channels": [name.replace("_", " ") for name in fit.channels],
+        "channels": [COLUMNS[name].name.replace("_", " ") for name in fit.channels],
         "pull": pull,
         "files": write_files(texts),
     }

@@ -8,6 +8,7 @@ import json
 import os
 import secrets
 import shutil
+import signal
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,9 +90,8 @@ class Jobs:
         """End the process of a job that is running."""
         if job.state == "running":
             job.state = "cancelled"
-        if job.process is not None and job.process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                job.process.kill()
+        if job.process is not None:
+            _kill(job.process)
         if job.task is not None:
             await job.task
 
@@ -120,7 +120,7 @@ class Jobs:
         )
         job.process = process
         if job.state != "running":  # cancelled while it started
-            process.kill()
+            _kill(process)
         assert process.stdin is not None and process.stdout is not None
         try:
             process.stdin.write(json.dumps(request).encode() + b"\n")
@@ -131,12 +131,9 @@ class Jobs:
             if job.state == "running":
                 job.state, job.error = "failed", f"{_CRASHED} ({type(error).__name__})"
         finally:
-            if process.returncode is None:
-                with contextlib.suppress(ProcessLookupError):
-                    process.kill()
-            await process.wait()
             # the pipe stays open until here: a worker ends when the server does
             process.stdin.close()
+            await process.wait()
         if job.state == "running":
             job.state, job.error = "failed", _CRASHED
 
@@ -150,3 +147,10 @@ class Jobs:
             job.state, job.error = "failed", said["error"]
         elif "result" in said:
             job.state, job.result = "done", said["result"]
+
+
+def _kill(process: asyncio.subprocess.Process) -> None:
+    """End a process; its own `kill` would take the exit status from the event loop."""
+    if process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, getattr(signal, "SIGKILL", signal.SIGTERM))

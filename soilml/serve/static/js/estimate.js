@@ -3,7 +3,7 @@
 import { jobFile } from "./api.js";
 import { byId, drawn, element, options, showError, wordList } from "./dom.js";
 import { setSoil, showReadings } from "./forward.js";
-import { number, percent, range, withUnit } from "./format.js";
+import { counted, number, percent, range, withUnit } from "./format.js";
 import { work } from "./jobs.js";
 import { clearModelFault, modelFault, modelOfEstimate } from "./model_box.js";
 import { pullPlots } from "./pull_plots.js";
@@ -65,7 +65,7 @@ function show({ id, result }) {
   const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.si]));
   const place = byId("estimate-result");
   place.replaceChildren(
-    element("p", { class: "soft" }, `Posterior of ${result.used} rows (${result.channels.join(", ")}). Grey: the prior. Blue: what the log leaves, 90 % of it.`),
+    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: what the log leaves, 90 % of it.`),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
     ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
       wordList([...result.remarks, ...result.warnings], "remark")].filter(Boolean),

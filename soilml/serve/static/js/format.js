@@ -24,9 +24,12 @@ export const withUnit = (value, unit, digits = 3) => {
 export const percent = (share) => `${Math.round(100 * share)}\u00a0%`;
 
 export function range(low, high, unit) {
+  if (number(low) === number(high)) return withUnit(low, unit);
   const space = unit === "°" || !unit ? "" : "\u00a0";
   return `${number(low)} to ${number(high)}${space}${unit}`;
 }
+
+export const counted = (count, thing) => `${count} ${thing}${count === 1 ? "" : "s"}`;
 
 export const bytes = (count) =>
   count < 1e6 ? `${Math.max(1, Math.round(count / 1024))} kB` : `${Math.round(count / 2 ** 20)} MB`;

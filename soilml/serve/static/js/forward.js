@@ -140,7 +140,7 @@ function fault(text) {
 function makePlots() {
   for (const [name, unit] of Object.entries(CURVES)) {
     plots[name] = new Plot(byId(`${name}-plot`), {
-      x: "slip", y: unit, reading: byId(`${name}-reading`),
+      x: "slip", y: null, reading: byId(`${name}-reading`),
       series: [
         { label: "", colour: name, unit, width: 2.5 },
         { label: "held", colour: "held", unit, dash: [6, 5], width: 1.8 },
@@ -149,7 +149,7 @@ function makePlots() {
     });
   }
   plots.stress = new Plot(byId("stress-plot"), {
-    x: "angle from straight down (°), travel to the right", y: "kPa", height: 250, reading: byId("stress-reading"),
+    x: "angle from straight down (°)", y: "kPa", height: 250, reading: byId("stress-reading"),
     series: [
       { label: "σ", colour: "normal", unit: "kPa", width: 2.5 },
       { label: "τ", colour: "shear", unit: "kPa", width: 2.5 },

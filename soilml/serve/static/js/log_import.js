@@ -2,7 +2,7 @@
 
 import { jobFile } from "./api.js";
 import { byId, element, showError, wordList } from "./dom.js";
-import { percent } from "./format.js";
+import { counted, percent } from "./format.js";
 import { work } from "./jobs.js";
 
 let logs = [];
@@ -27,7 +27,7 @@ function panel(map, marked, names, imported) {
   text.value = map;
   const accept = element("input", { type: "checkbox", id: "map-accept" });
   const note = marked
-    ? `${marked} lines marked CHANGE or NEEDED are what no log can tell: look at them, then import.`
+    ? `What no log can tell is marked CHANGE or NEEDED, in ${counted(marked, "line")}: correct it, then import.`
     : "Look at the guesses, then import.";
   byId("map-panel").replaceChildren(
     element("h3", {}, `Map of the log${names.length ? `: ${names.join(", ")}` : ""}`),

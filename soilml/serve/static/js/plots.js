@@ -29,7 +29,7 @@ export class Plot {
   build() {
     this.plot?.destroy();
     const axis = (label, size) => ({
-      label, labelSize: 22, size, labelGap: 0, gap: 4, font: "12px system-ui, sans-serif",
+      label, labelSize: 20, size, labelGap: 0, gap: 3, font: "12px system-ui, sans-serif",
       labelFont: "12px system-ui, sans-serif", stroke: colour("soft"),
       grid: { stroke: colour("grid"), width: 1 }, ticks: { show: false },
       values: (_, ticks) => ticks.map((tick) => number(tick, 4)),
@@ -37,17 +37,17 @@ export class Plot {
     const first = { label: this.x };
     const lines = this.series.map((s) => ({
       label: s.label, stroke: colour(s.colour), width: s.width ?? 2, dash: s.dash,
-      paths: s.points ? () => null : undefined, spanGaps: !!s.points,
+      paths: s.points ? () => null : undefined, pxAlign: 0, spanGaps: !!s.points,
       points: { show: !!s.points, size: 7, fill: colour(s.colour), stroke: colour("panel") },
     }));
     const bands = this.bands.map(([upper, lower, name, share]) => ({
       series: [upper, lower], fill: withAlpha(colour(name), share ?? 0.2),
     }));
     this.plot = new uPlot({
-      width: this.width(), height: this.height, padding: [10, 8, 0, 0],
+      width: this.width(), height: this.height, padding: [10, 14, 0, 0], pxAlign: 0,
       legend: { show: false }, scales: { x: { time: false } },
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
-      series: [first, ...lines], bands, axes: [axis(this.x, 38), axis(this.y, 44)],
+      series: [first, ...lines], bands, axes: [axis(this.x, 26), axis(this.y, 46)],
       hooks: { draw: [(u) => this.drawMarker(u)], setCursor: [(u) => this.read(u)] },
     }, this.data, this.place);
   }

@@ -48,7 +48,7 @@ function answer(name, [low, middle, high], unit, known, where) {
 
 function curves(figure, unit, slip, [low, middle, high], [before, , after], points, description) {
   const plot = new Plot(figure.plot, {
-    x: "slip", y: unit, reading: figure.reading,
+    x: "slip", y: null, reading: figure.reading,
     series: [
       { label: "median", colour: "pull", unit, width: 2.5 },
       { label: "5 %", colour: "pull", width: 0.8 }, { label: "95 %", colour: "pull", width: 0.8 },

@@ -1,9 +1,9 @@
-// The wheel in the soil, to scale, with normal and shear stress along the rim.
+// The lower part of the wheel in the soil, to scale, with normal and shear stress along the rim.
 
 import { drawn } from "./dom.js";
 import { number } from "./format.js";
 
-const WIDTH = 420, HEIGHT = 270, RIM = 96, FAN = 62;
+const WIDTH = 420, HEIGHT = 292, RIM = 140, FAN = 64;
 
 /** Draw the wheel of an answer into an element; a gear that is no wheel has no picture. */
 export function wheelPicture(place, answer) {
@@ -12,7 +12,7 @@ export function wheelPicture(place, answer) {
   place.hidden = !isWheel;
   if (!isWheel) return;
   const scale = RIM / radius;
-  const cx = WIDTH / 2 - 10, cy = 118;
+  const cx = WIDTH / 2 - 20, cy = 70;
   const depth = Math.min(at.sinkage / 1000, radius) * scale;
   const surface = cy + RIM - depth;
   const entry = (profile.angle[0] * Math.PI) / 180;
@@ -58,8 +58,8 @@ function turning(cx, cy, slip) {
     drawn("path", { class: "p-dim", d: `M${cx - r} ${cy} A${r} ${r} 0 0 1 ${cx} ${cy - r}` }),
     drawn("path", { class: "p-dim", d: `M${cx - 6} ${cy - r - 5} L${cx + 1} ${cy - r} L${cx - 6} ${cy - r + 5}` }),
     label(cx - 22, cy - 12, text),
-    drawn("path", { class: "p-dim", d: `M${cx + 112} 24 h44 m-7 -5 l7 5 l-7 5` }),
-    label(cx + 112, 16, "travel"),
+    drawn("path", { class: "p-dim", d: `M${WIDTH - 60} 24 h44 m-7 -5 l7 5 l-7 5` }),
+    label(WIDTH - 60, 16, "travel"),
   ];
 }
 
