@@ -51,10 +51,9 @@ def chromium():
 
 
 @pytest.fixture
-def tab(chromium, page, request):
+def tab(chromium, page):
     """The page in a fresh profile; no console message, error or request to elsewhere is allowed."""
-    options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True}
-    context = chromium.new_context(**options | getattr(request, "param", {}))
+    context = chromium.new_context(viewport={"width": 1280, "height": 900}, accept_downloads=True)
     opened = context.new_page()
     said, asked = [], []
     opened.on("console", lambda message: said.append(message.text))
@@ -70,6 +69,15 @@ def tab(chromium, page, request):
 
 #: Chromium itself reports an answer with an error status, which the page shows in words.
 EXPECTED = "Failed to load resource: the server responded with a status of 422"
+
+
+def until(tab, expression):
+    """Wait for an expression; `wait_for_function` would need what the page's policy forbids."""
+    for _ in range(600):
+        if tab.evaluate(expression):
+            return
+        tab.wait_for_timeout(50)
+    raise AssertionError(f"never true: {expression}")
 
 
 def number(tab, path):
@@ -100,10 +108,9 @@ def test_sliders_keys_and_typed_values_move_the_curves(tab):
     )
     assert first["Torque"] == pytest.approx(float(expected.torque), rel=5e-3)
     number(tab, "shear_modulus").fill("10")
-    tab.wait_for_function(f"document.querySelector('#now dd').innerText !== '{first['Torque']}'")
-    tab.wait_for_timeout(300)
+    until(tab, f"!document.querySelector('#now dd').innerText.startsWith('{first['Torque']}')")
     assert now(tab)["Torque"] > first["Torque"]
-    slider = tab.get_by_label("Slip, slider")
+    slider = tab.get_by_label("Slip, slider", exact=True)
     slider.focus()
     before = number(tab, "slip").input_value()
     for _ in range(20):
@@ -112,7 +119,7 @@ def test_sliders_keys_and_typed_values_move_the_curves(tab):
     tab.get_by_role("button", name="Hold these curves").click()
     assert "Held (dashed)" in tab.locator("#held").inner_text()
     tab.get_by_role("button", name="Reset").click()
-    tab.wait_for_timeout(300)
+    until(tab, f"document.querySelector('#now dd').innerText.startsWith('{first['Torque']}')")
     assert now(tab) == first
 
 
@@ -133,10 +140,10 @@ def test_a_wrong_value_is_answered_beside_its_slider(tab):
 
 def test_another_wheel_and_soil_are_chosen(tab):
     tab.select_option("#wheel", "wang2018")
-    tab.wait_for_function("document.querySelector('#s-gear-base') !== null")
-    assert tab.locator("#wheel-picture").is_hidden()
+    until(tab, "document.querySelector('#s-gear-base') !== null")
+    until(tab, "document.querySelector('#wheel-picture').hidden")
     tab.select_option("#soil", "ding2015/lunar_soil")
-    tab.wait_for_function("document.querySelector('#soil-note').innerText.includes('Ding')")
+    until(tab, "document.querySelector('#soil-note').innerText.includes('Ding')")
 
 
 def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
@@ -159,14 +166,14 @@ def test_a_faulty_table_is_answered_beside_the_drop_zone(tab, tmp_path):
     tab.set_input_files("#file", tmp_path / "bad.csv")
     tab.wait_for_selector("#drop-error:not([hidden])", timeout=LONG)
     said = tab.locator("#drop-error").inner_text()
-    assert said.startswith("bad.csv, line 2, column slip") and "not in percent" in said
+    assert said.startswith("bad.csv line 2, column slip") and "not in percent" in said
 
 
 def test_a_model_file_moves_the_sliders_and_its_faults_are_shown(tab, tmp_path):
     text = '[gear]\ntype = "wheel"\nradius = "10 cm"\nwidth = 0.08\n[soil]\n'
     (tmp_path / "m.toml").write_text(f'{text}name = "wong1989/dry_sand"\n')
     tab.set_input_files("#file", tmp_path / "m.toml")
-    tab.wait_for_function("document.querySelector('#s-gear-radius').value === '100'")
+    until(tab, "document.querySelector('#s-gear-radius').value === '100'")
     assert "from m.toml" in tab.locator("#wheel option").first.inner_text()
     (tmp_path / "wrong.toml").write_text(text)
     tab.set_input_files("#file", tmp_path / "wrong.toml")
@@ -176,14 +183,14 @@ def test_a_model_file_moves_the_sliders_and_its_faults_are_shown(tab, tmp_path):
 
 def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     digging = Model(Wheel(radius=0.15, width=0.12)) + EFFECTS["slip-sinkage"](n1=0.5)
-    tab.set_input_files("#file", runs_file(tmp_path, digging, (40.0, 60.0, 90.0)))
+    tab.set_input_files("#file", runs_file(tmp_path, digging, (40.0, 90.0)))
     tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
     start = tab.get_by_role("button", name="Look for a gap")
     start.click()
     tab.locator("#gap-job").get_by_role("button", name="Cancel").click()
     tab.wait_for_selector("#gap-job", state="hidden")
     assert tab.locator(".verdict").count() == 0
-    tab.wait_for_function("!document.querySelector('#gap-start').disabled")
+    until(tab, "!document.querySelector('#gap-start').disabled")
     start.click()
     tab.wait_for_selector(".verdict", timeout=LONG)
     assert "slip-sinkage" in tab.locator(".verdict").inner_text()
@@ -205,15 +212,11 @@ def test_a_raw_log_goes_through_its_map(tab, tmp_path):
     text = tab.locator("#map-text").input_value()
     tab.locator("#map-text").fill(text.replace("gear_ratio = 1 ", "gear_ratio = 99 "))
     tab.get_by_role("button", name="Import", exact=True).click()
-    tab.wait_for_selector(".band", timeout=LONG)
+    tab.wait_for_selector("#table-panel:not([hidden])", timeout=LONG)
     assert tab.get_by_role("link", name="Open the import report").is_visible()
+    tab.locator("#estimate-job").get_by_role("button", name="Cancel").click()
+    assert tab.locator("#estimate-job").is_hidden()
 
-
-PHONES = [
-    {"viewport": {"width": 360, "height": 780}},
-    {"viewport": {"width": 360, "height": 780}, "color_scheme": "dark"},
-    {"viewport": {"width": 1280, "height": 900}, "color_scheme": "dark"},
-]
 
 #: Contrast of every visible text with what is behind it, by WCAG 2; the worst ones.
 CONTRAST = """() => {
@@ -233,19 +236,21 @@ CONTRAST = """() => {
   return bad;
 }"""
 #: Controls without a name that a screen reader can say.
-NAMELESS = """() => [...document.querySelectorAll('input, select, textarea, button, a')].filter((e) =>
-  !(e.labels?.length || e.getAttribute('aria-label') || e.textContent.trim())).map((e) => e.id)"""
+NAMELESS = """() => [...document.querySelectorAll('input, select, textarea, button, a')]
+  .filter((e) => !(e.labels?.length || e.getAttribute('aria-label') || e.textContent.trim()))
+  .map((e) => e.id)"""
 
 
-@pytest.mark.parametrize("tab", PHONES, indirect=True, ids=["phone", "phone-dark", "dark"])
 def test_it_fits_has_contrast_and_names(tab, tmp_path):
-    for group in tab.locator("details:not([open]) > summary").all():
-        group.click()
+    while (closed := tab.locator("details:not([open]) > summary")).count():
+        closed.first.click()
     tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
     tab.wait_for_selector("#pull-result figure", timeout=LONG)
-    width = tab.viewport_size["width"]
-    assert tab.evaluate("document.documentElement.scrollWidth") <= width
-    assert tab.evaluate(CONTRAST) == []
+    for width, scheme in ((1280, "light"), (1280, "dark"), (360, "dark"), (360, "light")):
+        tab.emulate_media(color_scheme=scheme)
+        tab.set_viewport_size({"width": width, "height": 800})
+        until(tab, f"document.documentElement.scrollWidth <= {width}")
+        assert tab.evaluate(CONTRAST) == [], (width, scheme)
     assert tab.evaluate(NAMELESS) == []
     ids = tab.evaluate("[...document.querySelectorAll('[id]')].map((e) => e.id)")
     assert len(ids) == len(set(ids))

@@ -109,25 +109,22 @@ async function loadControls() {
 }
 
 /** Ask for new curves: one question at a time, and always about the latest values. */
-export function update() {
+export async function update() {
   document.dispatchEvent(new CustomEvent("sliders-moved"));
-  if (busy) {
-    again = true;
-    return;
-  }
+  again = true;
+  if (busy) return;
   busy = true;
-  requestAnimationFrame(async () => {
-    const mine = generation;
+  while (again) {
     again = false;
+    const mine = generation;
     try {
       const answer = await ask("/api/forward", chosen());
       if (mine === generation) draw(answer);
     } catch (error) {
       if (mine === generation) fault(error.message);
     }
-    busy = false;
-    if (again) update();
-  });
+  }
+  busy = false;
 }
 
 /** An error of the server, beside the slider that it names, else above the curves. */
