@@ -10,6 +10,7 @@ from soilml.cli.advice_text import advice_after_fit
 from soilml.cli.output import json_text
 from soilml.cli.rover_text import rover_text
 from soilml.cli.table_remarks import table_remarks
+from soilml.cli.usual_errors.usual_fit import usual_fit
 from soilml.config.case import Case, read_case
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, SoilmlError
@@ -39,12 +40,14 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     advice cannot be had, the answer says why.
     """
     model = setting_file("MODEL.toml", request.get("model"))
-    case = read_case(model)
+    case = read_case(model, with_bias=True)
     tell("reading the table")
     table = read_rows(request)
     remarks = table_remarks(table, case)
     tell(f"estimating the soil from {len(table)} rows")
     fit = identify(case, table, None, "posterior")
+    tell("allowing for the errors that sensors and models usually have")
+    usual = usual_fit(case, table, None, "posterior", fit)
     tell("looking for the next measurement")
     advice = advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
@@ -53,13 +56,16 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
     texts = {
-        "identify.json": json_text(fit.as_json()),
+        "identify.json": json_text(
+            fit.as_json() | ({} if usual is None else {"as_usual": usual.as_json()})
+        ),
         "model.toml": case_as_toml(found, [f"Soil as estimated from {rows}; priors unchanged."]),
     }
     return {
         **table_summary(table),
         "remarks": remarks,
-        "parameters": parameters(case, fit),
+        "parameters": parameters(case, fit, None if usual is None else usual.usual),
+        "believe": "" if usual is None else usual.note(),
         "words": words(fit, advice),
         # the width that remains stands beside each parameter
         "warnings": [text for text in fit.warnings if "prior's width remains" not in text],
@@ -78,8 +84,11 @@ def read_rows(request: dict[str, Any]) -> Table:
     return table if not run else table.where("run", str(run))
 
 
-def parameters(case: Case, fit: Fit) -> list[dict[str, Any]]:
-    """Each parameter with its posterior and its prior, in shown units and in SI."""
+def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str, Any]]:
+    """Each parameter with its posterior, that with usual errors, and its prior.
+
+    In shown units; `si` and `usual_si` are the values in SI units.
+    """
     priors = {free.path: free.prior for free in select_free(case, None)}
     found = []
     for i, (path, unit) in enumerate(zip(fit.names, fit.units, strict=True)):
@@ -104,8 +113,21 @@ def parameters(case: Case, fit: Fit) -> list[dict[str, Any]]:
                 "weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
                 "si": float(fit.values[i]),
             }
+            | ({} if usual is None else _usual(usual, i, factor))
         )
     return found
+
+
+def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
+    """The second answer on parameter `i`."""
+    left = usual.remaining_fraction.get(usual.names[i], float("nan"))
+    return {
+        "usual": factor * float(usual.values[i]),
+        "usual_band": [factor * float(end[i]) for end in usual.interval],
+        "usual_identified": not left > NOT_IDENTIFIED_ABOVE,
+        "usual_left": left,
+        "usual_si": float(usual.values[i]),
+    }
 
 
 def words(fit: Fit, advice: Advice | None) -> list[str]:

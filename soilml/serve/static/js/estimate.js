@@ -65,7 +65,8 @@ function show({ id, result }) {
   const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.si]));
   const place = byId("estimate-result");
   place.replaceChildren(
-    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: what the log leaves, 90 % of it.`),
+    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue, the first answer: what the log leaves, 90 % of it, if the model file is right. Brown, the second: the same with the errors that sensors and models usually have.`),
+    ...(result.believe ? [element("p", { class: "next" }, `${result.believe[0].toUpperCase()}${result.believe.slice(1)}.`)] : []),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
     ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
       wordList([...result.remarks, ...result.warnings], "remark")].filter(Boolean),
@@ -92,13 +93,20 @@ function band(parameter) {
       element("span", { class: "value" }, identified ? `${withUnit(value, unit)} ` : "not known ",
         element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))),
     picture(parameter),
-    element("p", { class: `told ${identified ? "yes" : "no"}` }, told));
+    element("p", { class: `told ${identified ? "yes" : "no"}` }, told), usualWords(parameter));
+}
+
+/** The second answer, with the errors that sensors and models usually have. */
+function usualWords({ usual, usual_band: ends, usual_identified: known, usual_left: left, unit }) {
+  if (!ends) return null;
+  const value = known ? `${withUnit(usual, unit)} (90 %: ${range(...ends, unit)})` : `not known (90 %: ${range(...ends, unit)})`;
+  return element("p", { class: "told usual" }, `with usual errors: ${value}, ${percent(left)} of the prior's width remains`);
 }
 
 const SYMBOLS = { phi: "φ", k_phi: "kφ", k_c: "kc", a_0: "a₀", a_1: "a₁", gamma: "γ" };
 const symbolText = (symbol) => SYMBOLS[symbol] ?? symbol;
 
-function picture({ range: [low, high], prior, band: [from, to], value, log, identified, unit, label }) {
+function picture({ range: [low, high], prior, band: [from, to], usual_band: usual, value, log, identified, unit, label }) {
   const place = log
     ? (x) => (100 * Math.log(Math.max(x, low) / low)) / Math.log(high / low)
     : (x) => (100 * (x - low)) / (high - low);
@@ -113,7 +121,8 @@ function picture({ range: [low, high], prior, band: [from, to], value, log, iden
   return drawn("svg", { role: "img", "aria-label": `${label}: 90 % from ${number(from)} to ${withUnit(to, unit)}; before the log ${number(prior[0])} to ${withUnit(prior[2], unit)}` },
     drawn("line", { class: "b-range", x1: "0%", x2: "100%", y1: 15, y2: 15 }),
     bar(prior[0], prior[2], 5, 20, "b-prior"),
-    bar(from, to, 9, 12, `b-post${known}`),
-    drawn("line", { class: `b-mid${known}`, x1: `${within(value)}%`, x2: `${within(value)}%`, y1: 9, y2: 21 }),
+    bar(from, to, 7, 10, `b-post${known}`),
+    ...(usual ? [bar(usual[0], usual[1], 19, 4, "b-usual")] : []),
+    drawn("line", { class: `b-mid${known}`, x1: `${within(value)}%`, x2: `${within(value)}%`, y1: 7, y2: 17 }),
     words("0%", "start", low), words("100%", "end", high));
 }
