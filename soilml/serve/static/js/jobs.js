@@ -28,7 +28,6 @@ export async function work(place, content) {
       if (alive()) running.delete(place);
       box.hidden = true;
       await end(job.id).catch(() => {});
-      document.dispatchEvent(new CustomEvent("cancelled", { detail: place }));
     });
     while (job.state === "running") {
       if (!alive()) return null;
