@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -20,7 +20,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,logs,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,serve,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## from the forward model to an estimate on board, with a table and a picture
@@ -45,6 +45,11 @@ test-long: $(VENV)/.ready ## tests that `make test` leaves out: all versions of 
 test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, under a minute
 	@$(MAKE) --no-print-directory check
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network and not long"
+
+test-browser: $(VENV)/.ready ## the live page with real clicks; needs Chromium: apt install chromium, or SOILML_CHROMIUM=/path
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[browser]'
+	@SOILML_BROWSER=needed $(BIN)/python -m pytest tests/soilml/serve/test_browser.py
 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \

@@ -28,6 +28,7 @@ DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
 
+  all of it in the browser     soilml serve
   from a log to a table        soilml import
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
@@ -49,6 +50,7 @@ COMMANDS = {
     "models": "soilml.cli.commands.setup.models",
     "doctor": "soilml.cli.commands.setup.doctor",
     "completion": "soilml.cli.commands.setup.completion",
+    "serve": "soilml.serve.command",
     "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
     "effects": "soilml.cli.commands.effects",

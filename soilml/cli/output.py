@@ -61,14 +61,15 @@ def write_stdout(text: str) -> None:
 
 def json_text(content: Any) -> str:
     """The content as indented JSON; numbers that are not finite become null, as JSON has none."""
-    return json.dumps(_with_null(content), indent=2, allow_nan=False) + "\n"
+    return json.dumps(finite_or_null(content), indent=2, allow_nan=False) + "\n"
 
 
-def _with_null(value: Any) -> Any:
+def finite_or_null(value: Any) -> Any:
+    """The content with None for every number that is not finite."""
     if isinstance(value, dict):
-        return {key: _with_null(entry) for key, entry in value.items()}
+        return {key: finite_or_null(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_with_null(entry) for entry in value]
+        return [finite_or_null(entry) for entry in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

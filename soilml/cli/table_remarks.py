@@ -14,7 +14,13 @@ from soilml.log_import.checks.table_hints import table_hints
 
 
 def print_table_hints(table: Table, case: Case | None, radius: float | None = None) -> None:
-    """Print a line on standard error for each oddity of a table; see `table_hints`.
+    """Print a line on standard error for each oddity of a table; see `table_remarks`."""
+    for text in table_remarks(table, case, radius):
+        print(f"! {text}", file=sys.stderr)
+
+
+def table_remarks(table: Table, case: Case | None, radius: float | None = None) -> list[str]:
+    """A line for each oddity of a table; see `table_hints`.
 
     The radius of the wheel (m) is that of the case, else `radius`; None where it is not known.
     """
@@ -22,9 +28,9 @@ def print_table_hints(table: Table, case: Case | None, radius: float | None = No
     if case is not None and case.gears:
         used = with_rover_columns(case, used)
     radii = radius if case is None else _radii(used, case)
-    if len(used):
-        for hint in table_hints(used.columns, radii):
-            print(f"! {table.source}: {hint}", file=sys.stderr)
+    if not len(used):
+        return []
+    return [f"{table.source}: {hint}" for hint in table_hints(used.columns, radii)]
 
 
 def _radii(table: Table, case: Case) -> NDArray[np.float64] | None:

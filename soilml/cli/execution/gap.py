@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import available_effects, check_seed, parse_costs, parse_names
 from soilml.cli.output import json_text
@@ -22,14 +22,17 @@ from soilml.io.read_table import RUNS
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
+from soilml.report.origin import Origin
 from soilml.report.terminal import rounded, shown_unit, significant
+
+if TYPE_CHECKING:
+    from soilml.gap import GapReport
 
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
-    from soilml.config.write_case import case_as_toml
     from soilml.gap import gap
 
     check_seed(args)
@@ -49,21 +52,7 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
         )
-    from soilml.gap.html.page import page, summary
-
-    names = str(args.model), str(args.runs)
-    origin = origin_of(args)
-    entry = {"report": summary(report, *names).as_json(origin)}
-    texts = {
-        "report.html": page(report, *names, origin),
-        "gap.json": json_text(report.as_json() | entry),
-        "model.toml": case_as_toml(report.model, [report.sentence]),
-        "next_runs.csv": csv_text(_next_runs(report)),
-    }
-    if report.suspected_model is not None:
-        first = " + ".join(report.best_unclaimed)
-        heading = f"With {first}, which is suspected, not named. {report.sentence}"
-        texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
+    texts = gap_files(report, str(args.model), str(args.runs), origin_of(args))
     folder = Path(args.out)
     # a suspected model of an earlier analysis would contradict this one
     earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
@@ -72,6 +61,29 @@ def run(args: argparse.Namespace) -> int:
     print(_text(report))
     print(f"\n{', '.join(str(name) for name in files)}", file=sys.stderr)
     return 0
+
+
+def gap_files(
+    report: GapReport, model: str, runs: str, origin: Origin | None = None
+) -> dict[str, str]:
+    """The content of the files of a report by their names; `model` and `runs` were analysed."""
+    from soilml.config.write_case import case_as_toml
+    from soilml.gap.html.page import page, summary
+
+    if origin is None:
+        origin = Origin.of(["gap", model, runs], [])
+    entry = {"report": summary(report, model, runs).as_json(origin)}
+    texts = {
+        "report.html": page(report, model, runs, origin),
+        "gap.json": json_text(report.as_json() | entry),
+        "model.toml": case_as_toml(report.model, [report.sentence]),
+        "next_runs.csv": csv_text(_next_runs(report)),
+    }
+    if report.suspected_model is not None:
+        first = " + ".join(report.best_unclaimed)
+        heading = f"With {first}, which is suspected, not named. {report.sentence}"
+        texts[GAP_SUSPECTED] = case_as_toml(report.suspected_model, [heading])
+    return texts
 
 
 def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:

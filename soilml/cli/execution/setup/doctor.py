@@ -27,6 +27,7 @@ USES = {
     "torch": "train of an MLP",
     "scikit-learn": "train",
     "array-api-compat": "the forward model on torch tensors; train",
+    "tornado": "serve",
     "threadpoolctl": "gap, generate, train",
     "dask": "generate --engine dask",
     "distributed": "generate --engine dask",

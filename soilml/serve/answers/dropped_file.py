@@ -1,0 +1,76 @@
+"""What a dropped file is: a table of runs, checked as the commands do, or a raw log."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.cli.table_remarks import table_remarks
+from soilml.config.case import Case
+from soilml.io.read_table import RUNS, read_table
+from soilml.io.table import Table
+from soilml.quantities import COLUMNS
+from soilml.serve.answers.job_output import Tell
+
+#: Columns by two of which a table of runs is known, and rows that are drawn.
+_KNOWN, _DRAWN = {*RUNS, "drawbar_pull_N", "sinkage_m"}, 2000
+
+
+def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """The kind of a file, and of a table of runs its content.
+
+    Raises `TableError` for the first fault of a table.
+    """
+    names = request["names"]
+    tell(f"reading {names[0]}")
+    if len(names) > 1 or not is_table_of_runs(Path(names[0])):
+        return {"kind": "log"}
+    table = read_table(names[0], RUNS)
+    return {"kind": "runs", **table_summary(table), "remarks": table_remarks(table, None)}
+
+
+def is_table_of_runs(file: Path) -> bool:
+    """Whether a file has the columns of a table of runs, or two of them, and no clock."""
+    if file.suffix == ".parquet":
+        from soilml.io.parquet import read_parquet
+
+        header = set(read_parquet(file)[0])
+    elif file.suffix.lower() in (".csv", ".txt", ".tsv"):
+        with file.open("rb") as opened:
+            line = opened.readline(1 << 16).decode("utf-8-sig", errors="replace")
+        header = {cell.strip().strip("\"'") for cell in re.split(r"[,;\t]", line)}
+    else:
+        return False
+    clock = header & {"time", "t", "time_s"}
+    return header >= {*RUNS} or (len(header & _KNOWN) >= 2 and not clock)
+
+
+def table_summary(table: Table, case: Case | None = None) -> dict[str, Any]:
+    """Rows, runs, ranges and readings of a table, for a picture of it."""
+    rows = table.rows(table.answered)
+    index = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), _DRAWN)).astype(int))
+    drawn = rows.rows(index)
+    measured = [
+        key
+        for key in ("torque_Nm", "drawbar_pull_N", "sinkage_m")
+        if key in rows and np.isfinite(rows[key]).any()
+    ]
+    runs = list(dict.fromkeys(str(name) for name in rows["run"])) if "run" in rows else []
+    return {
+        "name": table.source,
+        "rows": len(table),
+        "used": len(rows),
+        "runs": runs,
+        "slip": _ends(rows["slip"]),
+        "load": _ends(rows["load_N"]),
+        "measured": [COLUMNS[key].name.replace("_", " ") for key in measured],
+        "points": {key: drawn[key].tolist() for key in ("slip", "load_N", *measured)},
+        "point_runs": [str(name) for name in drawn["run"]] if "run" in drawn else [],
+    }
+
+
+def _ends(values: Any) -> list[float]:
+    return [float(np.min(values)), float(np.max(values))] if len(values) else []

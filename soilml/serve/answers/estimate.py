@@ -1,0 +1,150 @@
+"""The soil from a table of runs: posterior, drawbar pull and slope, the next measurement."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from soilml.cli.advice_text import advice_after_fit
+from soilml.cli.output import json_text
+from soilml.cli.reports.rover import rover_text
+from soilml.cli.table_remarks import table_remarks
+from soilml.cli.usual_errors.usual_fit import usual_fit
+from soilml.config.case import Case, read_case
+from soilml.config.write_case import case_as_toml
+from soilml.errors import InputError, SoilmlError
+from soilml.experiment_design import Advice
+from soilml.experiment_design.messages import abstention_message, next_row_messages, row_message
+from soilml.identification import Fit, identify
+from soilml.identification.free_parameters import select_free
+from soilml.io.read_table import RUNS, read_table
+from soilml.io.table import Table
+from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
+from soilml.serve.answers.dropped_file import table_summary
+from soilml.serve.answers.job_output import Tell, setting_file, write_files
+from soilml.serve.answers.pull_curves import pull_curves
+from soilml.traction.report import pull_report
+from soilml.traction.rover.report import rover_report
+
+#: SI unit -> shown unit and its factor.
+SHOWN = {"Pa": ("kPa", 1e-3), "rad": ("°", float(np.rad2deg(1.0))), "m": ("mm", 1e3)}
+#: Ends of a 90 % interval as fractions of a distribution.
+_ENDS = np.asarray([0.05, 0.5, 0.95])
+
+
+def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """Estimates with their bands, drawbar pull, advice, warnings and the written files.
+
+    Raises `SoilmlError` as `soilml identify --method posterior` does; where only the pull or the
+    advice cannot be had, the answer says why.
+    """
+    model = setting_file("MODEL.toml", request.get("model"))
+    case = read_case(model, with_bias=True)
+    tell("reading the table")
+    table = read_rows(request)
+    remarks = table_remarks(table, case)
+    tell(f"estimating the soil from {len(table)} rows")
+    fit = identify(case, table, None, "posterior")
+    tell("allowing for the errors that sensors and models usually have")
+    usual = usual_fit(case, table, None, "posterior", fit)
+    tell("looking for the next measurement")
+    advice = advice_after_fit(case, table, None, fit)
+    tell("predicting drawbar pull and slope")
+    pull = _pull(case, table)
+    pull["warnings"] = [w for w in pull.get("warnings", []) if w not in fit.warnings]
+    found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
+    rows = f"{fit.rows_used} rows of {table.source}"
+    texts = {
+        "identify.json": json_text(
+            fit.as_json() | ({} if usual is None else {"as_usual": usual.as_json()})
+        ),
+        "model.toml": case_as_toml(found, [f"Soil as estimated from {rows}; priors unchanged."]),
+    }
+    return {
+        **table_summary(table),
+        "remarks": remarks,
+        "parameters": parameters(case, fit, None if usual is None else usual.usual),
+        "believe": "" if usual is None else usual.note(),
+        "words": words(fit, advice),
+        # the width that remains stands beside each parameter
+        "warnings": [text for text in fit.warnings if "prior's width remains" not in text],
+        "next": "" if advice is None else row_message(advice, advice.best()),
+        "misfit": fit.misfit,
+        "channels": [COLUMNS[name].name.replace("_", " ") for name in fit.channels],
+        "pull": pull,
+        "files": write_files(texts),
+    }
+
+
+def read_rows(request: dict[str, Any]) -> Table:
+    """The rows of a request: all, or those of one run."""
+    table = read_table(request["names"][0], RUNS)
+    run = request.get("run")
+    return table if not run else table.where("run", str(run))
+
+
+def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str, Any]]:
+    """Each parameter with its posterior, that with usual errors, and its prior.
+
+    In shown units; `si` and `usual_si` are the values in SI units.
+    """
+    priors = {free.path: free.prior for free in select_free(case, None)}
+    found = []
+    for i, (path, unit) in enumerate(zip(fit.names, fit.units, strict=True)):
+        shown, factor = SHOWN.get(unit, ("" if unit == "1" else unit, 1.0))
+        prior = priors[path]
+        left = fit.remaining_fraction.get(path, float("nan"))
+        quantity = QUANTITIES.get(path)
+        found.append(
+            {
+                "path": path,
+                "label": path.replace("_", " ").replace(".", " "),
+                "symbol": quantity.symbol if quantity else "",
+                "unit": shown,
+                "value": factor * float(fit.values[i]),
+                "std": factor * float(fit.std[i]),
+                "band": [factor * float(end[i]) for end in fit.interval],
+                "prior": (factor * prior.at(_ENDS)).tolist(),
+                "range": [factor * prior.lower, factor * prior.upper],
+                "log": prior.log,
+                "left": left,
+                "identified": not left > NOT_IDENTIFIED_ABOVE,
+                "weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
+                "si": float(fit.values[i]),
+            }
+            | ({} if usual is None else _usual(usual, i, factor))
+        )
+    return found
+
+
+def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
+    """The second answer on parameter `i`."""
+    left = usual.remaining_fraction.get(usual.names[i], float("nan"))
+    return {
+        "usual": factor * float(usual.values[i]),
+        "usual_band": [factor * float(end[i]) for end in usual.interval],
+        "usual_identified": not left > NOT_IDENTIFIED_ABOVE,
+        "usual_left": left,
+        "usual_si": float(usual.values[i]),
+    }
+
+
+def words(fit: Fit, advice: Advice | None) -> list[str]:
+    """What the rows do not determine, and what to measure next."""
+    if advice is not None:
+        return next_row_messages(advice)
+    left = fit.remaining_fraction.items()
+    return [abstention_message(name, part) for name, part in left if part > NOT_IDENTIFIED_ABOVE]
+
+
+def _pull(case: Case, table: Table) -> dict[str, Any]:
+    """Drawbar pull and slope, of the rover in words; the reason where there is none."""
+    try:
+        if case.rover is not None:
+            return {"text": rover_text(case.rover, rover_report(case, table))}
+        if case.gears:
+            raise InputError("MODEL.toml has several gears: `soilml pull --gear NAME` takes one")
+        return pull_curves(pull_report(case, table))
+    except SoilmlError as error:
+        return {"reason": " ".join(str(error).split())}

@@ -1,0 +1,35 @@
+// Numbers as an engineer writes them: three digits, no powers of ten in the usual range.
+
+const MINUS = "\u2212";
+
+export function number(value, digits = 3) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  const text = size >= 1e6 || size < 1e-4
+    ? value.toExponential(digits - 1).replace("e+", " × 10^").replace("e-", ` × 10^${MINUS}`)
+    : value.toLocaleString("en", {
+      useGrouping: false,
+      minimumFractionDigits: 0,
+      maximumFractionDigits: Math.max(0, digits - 1 - Math.floor(Math.log10(size))),
+    });
+  return text.replace("-", MINUS);
+}
+
+export const withUnit = (value, unit, digits = 3) => {
+  const space = unit === "°" || !unit ? "" : "\u00a0";
+  return `${number(value, digits)}${space}${unit}`;
+};
+
+export const percent = (share) => `${Math.round(100 * share)}\u00a0%`;
+
+export function range(low, high, unit) {
+  if (number(low) === number(high)) return withUnit(low, unit);
+  const space = unit === "°" || !unit ? "" : "\u00a0";
+  return `${number(low)} to ${number(high)}${space}${unit}`;
+}
+
+export const counted = (count, thing) => `${count} ${thing}${count === 1 ? "" : "s"}`;
+
+export const bytes = (count) =>
+  count < 1e6 ? `${Math.max(1, Math.round(count / 1024))} kB` : `${Math.round(count / 2 ** 20)} MB`;

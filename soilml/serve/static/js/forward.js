@@ -1,0 +1,264 @@
+// The forward model: choices and sliders ask, curves and stresses answer.
+
+import { ask } from "./api.js";
+import { byId, element, options, showError } from "./dom.js";
+import { number, percent, withUnit } from "./format.js";
+import { Plot } from "./plots.js";
+import { Slider } from "./sliders.js";
+import { wheelPicture } from "./wheel_picture.js";
+
+const FROM_FILE = "model-file";
+const CURVES = { torque: "N m", pull: "N", sinkage: "mm" };
+const COLUMNS = { torque: ["torque_Nm", 1], pull: ["drawbar_pull_N", 1], sinkage: ["sinkage_m", 1000] };
+const NEAR = 0.1; // readings under loads that differ by less are drawn beside the curves
+const OPEN = 2; // groups of sliders that are open at first
+
+const state = { model: "", modelName: "", sliders: new Map(), answer: null, held: null, readings: null };
+const plots = {};
+let generation = 0, busy = false, again = false;
+
+/** The choice and the sliders as the server takes them. */
+export function chosen() {
+  const values = {};
+  for (const slider of state.sliders.values()) values[slider.path] = slider.value;
+  const own = state.model ? { model: state.model } : { wheel: byId("wheel").value, soil: byId("soil").value };
+  return { ...own, values };
+}
+
+/** The dropped model file, or an empty text. */
+export const droppedModel = () => state.model;
+
+export async function startForward(choices) {
+  state.choices = choices;
+  fillChoices(choices.first);
+  makePlots();
+  byId("wheel").addEventListener("change", choose);
+  byId("soil").addEventListener("change", choose);
+  byId("reset").addEventListener("click", () => {
+    for (const slider of state.sliders.values()) slider.set(slider.first);
+    update();
+  });
+  byId("hold").addEventListener("click", hold);
+  await loadControls();
+}
+
+function fillChoices(first) {
+  const { wheels, soils } = state.choices;
+  const own = state.model ? [{ id: FROM_FILE, label: `from ${state.modelName}`, note: "" }] : [];
+  options(byId("wheel"), [...own, ...wheels], state.model ? FROM_FILE : first.wheel);
+  options(byId("soil"), [...own, ...soils], state.model ? FROM_FILE : first.soil);
+  notes();
+}
+
+function notes() {
+  for (const [id, list] of [["wheel", "wheels"], ["soil", "soils"]]) {
+    const entry = state.choices[list].find((e) => e.id === byId(id).value);
+    byId(`${id}-note`).textContent = entry ? entry.note : "as the model file has it";
+  }
+}
+
+async function choose() {
+  if (state.model && (byId("wheel").value !== FROM_FILE || byId("soil").value !== FROM_FILE)) {
+    const { first } = state.choices;
+    const keep = (id) => (byId(id).value === FROM_FILE ? first[id] : byId(id).value);
+    const next = { wheel: keep("wheel"), soil: keep("soil") };
+    state.model = "";
+    fillChoices(next);
+  }
+  notes();
+  await loadControls();
+}
+
+/** Take a model file that was dropped; its error stands beside the choices. */
+export async function takeModel(text, name) {
+  const before = [state.model, state.modelName];
+  const values = { wheel: byId("wheel").value, soil: byId("soil").value };
+  [state.model, state.modelName] = [text, name];
+  if (!(await loadControls())) {
+    [state.model, state.modelName] = before;
+    return false;
+  }
+  fillChoices(values);
+  return true;
+}
+
+async function loadControls() {
+  const mine = ++generation;
+  showError("choice-error", "");
+  const { values, ...own } = chosen();
+  let found;
+  try {
+    found = await ask("/api/controls", own);
+  } catch (error) {
+    showError("choice-error", error.message);
+    return false;
+  }
+  if (mine !== generation) return true;
+  const opened = new Map([...document.querySelectorAll("details.group")].map((d) => [d.dataset.title, d.open]));
+  state.sliders = new Map();
+  const groups = found.groups.map(({ title, controls }, i) => {
+    const made = controls.map((control) => new Slider(control, update));
+    for (const slider of made) state.sliders.set(slider.path, slider);
+    return element("details", { class: "group", "data-title": title, open: opened.get(title) ?? i < OPEN },
+      element("summary", {}, title), ...made.map((slider) => slider.place));
+  });
+  byId("sliders").replaceChildren(...groups);
+  release();
+  update();
+  return true;
+}
+
+/** Ask for new curves: one question at a time, and always about the latest values. */
+export async function update() {
+  document.dispatchEvent(new CustomEvent("sliders-moved"));
+  again = true;
+  if (busy) return;
+  busy = true;
+  while (again) {
+    again = false;
+    const mine = generation;
+    try {
+      const answer = await ask("/api/forward", chosen());
+      if (mine === generation) draw(answer);
+    } catch (error) {
+      if (mine === generation) fault(error.message);
+    }
+  }
+  busy = false;
+}
+
+/** An error of the server, beside the slider that it names, else above the curves. */
+function fault(text) {
+  const slider = [...state.sliders.values()].find((s) => text.includes(`${s.path} is `));
+  if (slider) slider.fail(text);
+  else showError("forward-error", text);
+}
+
+function makePlots() {
+  for (const [name, unit] of Object.entries(CURVES)) {
+    plots[name] = new Plot(byId(`${name}-plot`), {
+      x: "slip", y: null, reading: byId(`${name}-reading`),
+      series: [
+        { label: "", colour: name, unit, width: 2.5 },
+        { label: "held", colour: "held", unit, dash: [6, 5], width: 1.8 },
+        { label: "measured", colour: "ink", unit, points: true },
+      ],
+    });
+  }
+  plots.stress = new Plot(byId("stress-plot"), {
+    x: "angle from straight down (°)", y: "kPa", height: 250, reading: byId("stress-reading"),
+    series: [
+      { label: "σ", colour: "normal", unit: "kPa", width: 2.5 },
+      { label: "τ", colour: "shear", unit: "kPa", width: 2.5 },
+      { label: "strength", colour: "strength", unit: "kPa", dash: [6, 5], width: 1.8 },
+      { label: "held σ", colour: "normal", dash: [2, 4], width: 1.4 },
+      { label: "held τ", colour: "shear", dash: [2, 4], width: 1.4 },
+    ],
+  });
+}
+
+function draw(answer) {
+  state.answer = answer;
+  showError("forward-error", answer.reason ? `Slip ${number(answer.at.slip)}, load ${withUnit(answer.at.load, "N")}: ${answer.reason}` : "");
+  byId("now").replaceChildren(
+    now("Torque", answer.at.torque, "N m"), now("Drawbar pull", answer.at.pull, "N"),
+    now("Pull over load", answer.at.pull_per_load, ""), now("Sinkage", answer.at.sinkage, "mm"));
+  for (const name of Object.keys(CURVES)) drawCurve(name, answer);
+  drawStress(answer);
+}
+
+const now = (label, value, unit) => element("div", {}, element("dt", {}, label),
+  element("dd", {}, number(value), element("small", {}, unit ? `\u00a0${unit}` : "")));
+
+function drawCurve(name, answer) {
+  const points = measured(name, answer.at.load);
+  const x = [...new Set([...answer.slip, ...(state.held?.slip ?? []), ...points.keys()])].sort((a, b) => a - b);
+  const line = (curve) => {
+    if (!curve) return x.map(() => null);
+    const known = new Map(curve.slip.map((s, i) => [s, curve[name][i]]));
+    return fill(x, known);
+  };
+  const here = answer.at[name];
+  plots[name].set([x, line(answer), line(state.held), x.map((s) => points.get(s) ?? null)],
+    [answer.at.slip, here, name],
+    `${name === "pull" ? "Drawbar pull" : name} against slip; ${withUnit(here, CURVES[name])} at slip ${number(answer.at.slip)}`);
+}
+
+/** A curve at the slips of all curves; linear between its own points. */
+function fill(x, known) {
+  const own = [...known.keys()].sort((a, b) => a - b);
+  let i = 0;
+  return x.map((s) => {
+    if (known.has(s)) return known.get(s);
+    if (s < own[0] || s > own.at(-1)) return null;
+    while (own[i + 1] < s) i += 1;
+    const [a, b] = [known.get(own[i]), known.get(own[i + 1])];
+    return a === null || b === null ? null : a + ((b - a) * (s - own[i])) / (own[i + 1] - own[i]);
+  });
+}
+
+/** Readings of the dropped table under about this load, by slip. */
+function measured(name, load) {
+  const found = new Map();
+  const [column, factor] = COLUMNS[name], points = state.readings?.points;
+  if (!points?.[column]) return found;
+  points.slip.forEach((slip, i) => {
+    const value = points[column][i];
+    if (value !== null && Math.abs(points.load_N[i] / load - 1) < NEAR) found.set(slip, factor * value);
+  });
+  return found;
+}
+
+function drawStress(answer) {
+  const { profile } = answer;
+  byId("stress-figure").hidden = !profile;
+  if (!profile) return;
+  wheelPicture(byId("wheel-picture"), answer);
+  const held = state.held?.profile;
+  const back = (values) => [...values].reverse();
+  const mine = back(profile.angle);
+  const x = [...new Set([...mine, ...(held ? held.angle : [])])].sort((a, b) => a - b);
+  const line = (from, name) => (from ? fill(x, new Map(from.angle.map((a, i) => [a, from[name][i]]))) : x.map(() => null));
+  plots.stress.set([x, line(profile, "normal"), line(profile, "shear"), line(profile, "strength"),
+    line(held, "normal"), line(held, "shear")], null,
+  `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
+  byId("mobilised").textContent = `${percent(profile.mobilised)} of the shear strength below the wheel is mobilised. Torque is the shear stress summed along the rim: it grows with slip, and with a smaller shear modulus K, until τ reaches the strength.`;
+}
+
+function hold() {
+  if (state.held) return release();
+  const { at } = state.answer;
+  state.held = state.answer;
+  byId("hold").setAttribute("aria-pressed", "true");
+  byId("hold").textContent = "Let held curves go";
+  byId("held").hidden = false;
+  byId("held").textContent = `Held (dashed): torque ${withUnit(at.torque, "N m")}, pull ${withUnit(at.pull, "N")}, sinkage ${withUnit(at.sinkage, "mm")} at slip ${number(at.slip)}, load ${withUnit(at.load, "N")}.`;
+  return draw(state.answer);
+}
+
+function release() {
+  state.held = null;
+  byId("hold").setAttribute("aria-pressed", "false");
+  byId("hold").textContent = "Hold these curves";
+  byId("held").hidden = true;
+  if (state.answer) draw(state.answer);
+}
+
+/** Draw the readings of a table beside the curves, and set the load to one of theirs. */
+export function showReadings(table) {
+  state.readings = table;
+  const loads = table.points.load_N;
+  const slider = state.sliders.get("load");
+  if (slider && loads.length && !loads.some((l) => Math.abs(l / slider.value - 1) < NEAR)) {
+    slider.set([...loads].sort((a, b) => a - b)[Math.floor(loads.length / 2)]);
+  }
+  byId("points-note").hidden = false;
+  byId("points-note").textContent = `Dots: readings of ${table.name} under loads within ${percent(NEAR)} of the slider's.`;
+  update();
+}
+
+/** Set soil parameters (SI units by path), as an estimate found them. */
+export function setSoil(values) {
+  for (const [path, value] of Object.entries(values)) state.sliders.get(path)?.set(value);
+  update();
+}

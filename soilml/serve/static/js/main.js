@@ -1,0 +1,30 @@
+// The page: what is started, and how its parts meet.
+
+import { get } from "./api.js";
+import { byId, showError } from "./dom.js";
+import { startEstimate, takeTable } from "./estimate.js";
+import { startFiles } from "./files.js";
+import { startForward } from "./forward.js";
+import { startGap } from "./gap.js";
+import { showMap, takeMap } from "./log_import.js";
+import { startModelBox } from "./model_box.js";
+
+async function start() {
+  const choices = await get("/api/choices");
+  byId("version").textContent = choices.version;
+  startModelBox();
+  startEstimate();
+  startGap();
+  startFiles(choices.largest_file, {
+    runs: (file, table) => {
+      byId("map-panel").hidden = true;
+      return takeTable(file, table);
+    },
+    logs: (files, names) => showMap(files, names, takeTable),
+    map: (text) => takeMap(text, takeTable),
+  });
+  await startForward(choices);
+  document.documentElement.dataset.ready = "yes";
+}
+
+start().catch((error) => showError("choice-error", error.message));

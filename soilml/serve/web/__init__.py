@@ -1,0 +1,1 @@
+"""HTTP: who is answered, uploads, jobs in processes of their own."""

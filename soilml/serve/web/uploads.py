@@ -1,0 +1,73 @@
+"""Files that were dropped on the page, in a folder that goes when the server ends."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+from soilml.errors import InputError
+
+#: Largest file, and all files together, bytes.
+LARGEST_FILE, LARGEST_SUM = 256 << 20, 1 << 30
+_LONGEST_NAME = 120
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file of the page."""
+
+    key: str
+    path: Path
+
+    def as_json(self) -> dict[str, object]:
+        """What the page knows of it."""
+        return {"id": self.key, "name": self.path.name, "bytes": self.path.stat().st_size}
+
+
+class Uploads:
+    """The files, by keys that cannot be guessed; each stands in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._files: dict[str, Upload] = {}
+
+    def place(self, name: str, size: int) -> Upload:
+        """Where a file of this name and size (bytes) will be written; `InputError` if too large."""
+        if size > LARGEST_FILE:
+            raise InputError(
+                f"{plain_name(name)} has {size / 2**20:.0f} MB; at most {LARGEST_FILE >> 20} MB "
+                "are taken here: thin it, or use `soilml import` on the command line"
+            )
+        held = sum(f.path.stat().st_size for f in self._files.values() if f.path.exists())
+        if held + size > LARGEST_SUM:
+            raise InputError(
+                f"the files of this page have {LARGEST_SUM >> 20} MB together: restart soilml serve"
+            )
+        key = secrets.token_hex(16)
+        (self.folder / key).mkdir(parents=True)
+        return Upload(key, self.folder / key / plain_name(name))
+
+    def add(self, upload: Upload) -> Upload:
+        """Make a file known that has been written to its place."""
+        self._files[upload.key] = upload
+        return upload
+
+    def find(self, key: object) -> Upload:
+        """The file of a key; `InputError` where there is none."""
+        if not isinstance(key, str) or key not in self._files:
+            raise InputError("the file is gone: the server was restarted; drop it again")
+        return self._files[key]
+
+
+def plain_name(name: str) -> str:
+    """A file name without folders and without characters that mean something to a shell or system.
+
+    >>> plain_name("../../etc/pass wd.csv"), plain_name("..")
+    ('pass wd.csv', 'file')
+    """
+    base = re.split(r"[/\\]", name)[-1]
+    kept = re.sub(r"[^\w .()+-]", "_", base).strip(" .")
+    stem, dot, ending = kept.rpartition(".")
+    return f"{stem[:_LONGEST_NAME]}{dot}{ending[:16]}".strip() or "file"

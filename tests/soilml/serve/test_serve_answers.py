@@ -1,0 +1,143 @@
+"""What the forward model of the page answers is what the library computes."""
+
+import numpy as np
+import pytest
+
+from soilml import EFFECTS, Model, Operating, Wheel, read_case, soil
+from soilml.errors import InputError
+from soilml.serve.answers.choices import WHEELS, choices
+from soilml.serve.answers.controls import controls
+from soilml.serve.answers.forward import forward
+from soilml.serve.answers.model_text import model_text
+
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.1
+width = 0.08
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+[noise]
+torque_Nm = "5 %"
+[[effect]]
+name = "slip-sinkage"
+n1 = 0.3
+"""
+
+
+def sliders(request):
+    groups = controls(request)["groups"]
+    return {control["path"]: control for group in groups for control in group["controls"]}
+
+
+@pytest.mark.parametrize("slip", [0.3, -0.4])
+def test_curves_and_stresses_are_those_of_the_model(slip):
+    values = {"slip": slip, "load": 80.0, "shear_modulus": 0.01, "slip-sinkage.n1": 0.4}
+    found = forward({"values": values})
+    model = Model(Wheel(radius=0.15, width=0.12)) + EFFECTS["slip-sinkage"](n1=0.4)
+    ground = soil("wong1989/dry_sand", shear_modulus=0.01)
+    own = model(ground, Operating(slip=np.asarray(found["slip"]), load=80.0))
+    np.testing.assert_allclose(found["torque"], own.torque, rtol=1e-5)
+    np.testing.assert_allclose(found["pull"], own.drawbar_pull, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(found["sinkage"], 1e3 * own.sinkage, rtol=1e-5)
+    assert min(found["slip"]) == pytest.approx(0.0 if slip > 0 else -0.9)
+    at = Operating(slip=slip, load=80.0)
+    profile = model.profile(ground, at, 97)
+    np.testing.assert_allclose(found["profile"]["normal"], 1e-3 * profile.normal, rtol=1e-5)
+    np.testing.assert_allclose(
+        found["profile"]["angle"], np.rad2deg(profile.angle), rtol=1e-5, atol=1e-9
+    )
+    assert found["at"]["torque"] == pytest.approx(float(model(ground, at).torque), rel=1e-5)
+
+
+def test_shear_never_exceeds_the_strength_and_approaches_it_with_a_small_modulus():
+    shares = []
+    for modulus in (0.05, 0.01, 0.001):
+        profile = forward({"values": {"shear_modulus": modulus}})["profile"]
+        assert np.all(np.asarray(profile["shear"]) <= np.asarray(profile["strength"]) + 1e-6)
+        shares.append(profile["mobilised"])
+    assert shares == sorted(shares) and shares[-1] > 0.9
+
+
+@pytest.mark.parametrize("wheel", WHEELS)
+def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
+    values = {path: c["value"] for path, c in sliders({"wheel": wheel}).items()}
+    found = forward({"wheel": wheel, "values": values})
+    assert found["reason"] == "" and np.isfinite(found["torque"]).all()
+    assert len(found["profile"]["angle"]) == 97
+
+
+def test_sliders_begin_at_the_values_of_the_choice_and_change_nothing():
+    request = {"wheel": "kls1", "soil": "comin2017/es-3"}
+    values = {path: c["value"] for path, c in sliders(request).items()}
+    moved = forward(request | {"values": values})
+    own = {"slip": values["slip"], "load": values["load"]}
+    assert moved == forward(request | {"values": own})
+
+
+def test_units_of_the_sliders():
+    found = sliders({})
+    assert found["cohesion"]["unit"] == "kPa" and found["cohesion"]["factor"] == 1e-3
+    assert found["friction_angle"]["unit"] == "°"
+    assert found["friction_angle"]["factor"] == pytest.approx(180.0 / np.pi)
+    assert found["shear_modulus"]["unit"] == found["gear.radius"]["unit"] == "mm"
+    for control in found.values():
+        shown = control["factor"] * control["value"]
+        assert control["min"] - 1e-9 <= shown <= control["max"] + 1e-9, control
+        assert control["least"] <= control["min"] < control["max"] <= control["most"], control
+
+
+def test_a_model_file_gives_its_own_sliders():
+    found = sliders({"model": MODEL})
+    assert found["gear.radius"]["value"] == 0.1
+    assert found["slip-sinkage.n1"]["value"] == 0.3
+    text = model_text({"model": MODEL})["text"]
+    assert text == MODEL
+
+
+def test_the_text_of_the_sliders_is_a_model_file(tmp_path):
+    values = {"cohesion": 500.0, "gear.radius": 0.2, "bulldozing.share": 0.3, "slip": 0.2}
+    (tmp_path / "model.toml").write_text(model_text({"values": values})["text"])
+    case = read_case(tmp_path / "model.toml")
+    assert case.soil.cohesion == 500.0 and case.model.gear.radius == 0.2
+    assert [effect.name for effect in case.model.effects] == ["bulldozing"]
+    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
+    assert set(case.noise) == {"torque_Nm", "drawbar_pull_N", "sinkage_m"}
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"wheel": "square"}, "no wheel 'square'"),
+        ({"soil": "wong1989/drysand"}, "did you mean 'wong1989/dry_sand'"),
+        ({"soil": 3}, "needed is the name of a soil"),
+        ({"values": {"cohesion": -1.0}}, "cohesion is -1 Pa"),
+        ({"values": {"cohesion": "1"}}, "cohesion: needed is a number"),
+        ({"values": {"cohesion": float("nan")}}, "cohesion: needed is a number"),
+        ({"values": {"cohesive": 1.0}}, "no parameter 'cohesive'"),
+        ({"values": [1]}, "needed are numbers by name"),
+        ({"model": "[gear"}, "MODEL.toml"),
+        ({"model": MODEL.replace("0.08", "-3")}, "MODEL.toml"),
+    ],
+    ids=str,
+)
+def test_a_wrong_request_is_answered_in_one_line(request_, said):
+    with pytest.raises(InputError) as error:
+        forward(request_)
+    assert said in str(error.value) and "\n" not in str(error.value)
+    assert "soilml-model-" not in str(error.value)
+
+
+def test_a_load_that_is_too_heavy_is_said_in_words():
+    found = forward({"values": {"load": 5e4}})
+    assert "the soil carries less than this load" in found["reason"]
+    assert found["profile"] is None and not np.isfinite(found["at"]["torque"])
+
+
+def test_the_lists_name_their_sources():
+    found = choices()
+    assert {w["id"] for w in found["wheels"]} == set(WHEELS)
+    assert any("Nagatani" in s["note"] for s in found["soils"])
+    assert all(entry["label"] and entry["note"] for entry in found["wheels"] + found["soils"])

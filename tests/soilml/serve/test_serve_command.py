@@ -1,0 +1,81 @@
+"""The command: port, address, end."""
+
+import os
+import signal
+import socket
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from served_page import Page, serve
+
+from soilml.cli import main
+
+
+def test_a_port_in_use_is_one_line(capsys):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        assert main(["serve", "--no-browser", "--port", str(port)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert f"port {port} of 127.0.0.1 cannot be opened" in said and "--port N" in said
+
+
+@pytest.mark.parametrize("port", ["-1", "70000"])
+def test_a_port_that_does_not_exist_is_one_line(port, capsys):
+    assert main(["serve", "--no-browser", "--port", port]) == 2
+    assert f"--port is {port}; needed is a number from 0 to 65535" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
+    process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
+    page = Page(process)
+    key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
+    job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
+    assert job["state"] == "running" and list(tmp_path.iterdir())
+    process.send_signal(getattr(signal, name))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + getattr(signal, name)
+    assert said == "soilml: the page is closed, and what was dropped on it is removed\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_worker_ends_with_its_server(tmp_path):
+    """Even where the server is killed: the worker sees the end of its input."""
+    process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
+    page = Page(process)
+    key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
+    page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
+    process.kill()
+    process.communicate(timeout=60)
+    until = time.monotonic() + 60.0
+    while _workers_below(tmp_path) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not _workers_below(tmp_path)
+
+
+def _workers_below(folder):
+    """Processes whose arguments name the folder."""
+    proc = Path("/proc")
+    if not proc.exists():
+        pytest.skip("needs /proc")
+    found = []
+    for entry in proc.iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                words = (entry / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if str(folder).encode() in words and b"soilml.serve.worker" in words:
+                found.append(entry.name)
+    return found
+
+
+def test_a_missing_library_names_its_extra(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "tornado", None)
+    assert main(["serve", "--no-browser", "--port", "0"]) == 2
+    assert "pip install 'soilml[serve]'" in capsys.readouterr().err

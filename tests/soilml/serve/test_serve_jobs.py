@@ -1,0 +1,153 @@
+"""Tables, logs, estimates and gaps through the server, as the page asks for them."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from served_page import ROOT
+from served_page import page as page
+
+from soilml import Model, Operating, Wheel, read_case, soil
+from soilml.io.text_tables import csv_text
+
+RUNS = "run,slip,load_N,torque_Nm\n"
+
+
+def runs_text(count=6):
+    """Rows of the first wheel on its soil, with 2 % of noise on the torque."""
+    slip, load = np.tile(np.linspace(0.1, 0.6, count), 2), np.repeat([40.0, 90.0], count)
+    force = Model(Wheel(radius=0.15, width=0.12))(
+        soil("wong1989/dry_sand"), Operating(slip=slip, load=load)
+    )
+    noise = 1.0 + 0.02 * np.random.default_rng(5).standard_normal(slip.size)
+    names = np.repeat(["light", "heavy"], count)
+    columns = {"run": names, "slip": slip, "load_N": load, "torque_Nm": force.torque * noise}
+    return csv_text(columns).encode()
+
+
+def test_a_table_of_runs_is_known_and_estimated(page):
+    key = page.put("RUNS.csv", runs_text())
+    job = page.job(kind="look", files=[key])
+    assert job["state"] == "done", job["error"]
+    table = job["result"]
+    assert table["kind"] == "runs" and table["runs"] == ["light", "heavy"] and table["rows"] == 12
+    job = page.job(kind="estimate", files=[key], model={"values": {}})
+    assert job["state"] == "done", job["error"]
+    found = {p["path"]: p for p in job["result"]["parameters"]}
+    angle = found["friction_angle"]
+    assert angle["unit"] == "°" and angle["band"][0] < 28.0 < angle["band"][1]
+    assert angle["prior"][0] < angle["band"][0] and angle["band"][1] < angle["prior"][2] + 10.0
+    assert job["result"]["next"].startswith("slip ")
+    pull = job["result"]["pull"]["loads"][0]
+    assert np.all(np.asarray(pull["pull"][0]) <= np.asarray(pull["pull"][2]))
+    status, headers, text = page.request("GET", f"/api/jobs/{job['id']}/identify.json")
+    assert status == 200 and "attachment" in headers["Content-Disposition"]
+    values = json.loads(text)["parameters"]
+    assert values["friction_angle"]["value"] == pytest.approx(angle["si"])
+
+
+def test_one_reading_leaves_a_parameter_unknown_in_words(page):
+    key = page.put("one.csv", (RUNS + "a,0.3,60,2.26\n").encode())
+    job = page.job(kind="estimate", files=[key], model={"values": {}})
+    assert job["state"] == "done", job["error"]
+    by_path = {p["path"]: p for p in job["result"]["parameters"]}
+    assert not by_path["cohesion"]["identified"]
+    assert any(text.startswith("cohesion: not identified") for text in job["result"]["words"])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("run,slip,load_N,torque_Nm\na,30,60,2\n", "slip: 30 given; needed is a slip ratio"),
+        ("run,slip,load_N\na,0.3,60\n", "column torque_Nm is missing"),
+        ("run,slip,load_N,torque_Nm\na,0.3,x,2\n", "line 2, column load_N"),
+        ("run,slip,load_N,torque_Nm\n", "a header but no row"),
+    ],
+)
+def test_a_table_is_checked_with_the_messages_of_the_commands(page, text, said):
+    job = page.job(kind="look", files=[page.put("bad.csv", text.encode())])
+    assert job["state"] == "failed" and job["error"].startswith("bad.csv")
+    assert said in job["error"] and "\n" not in job["error"]
+
+
+def test_a_fault_of_the_model_file_names_it(page):
+    key = page.put("RUNS.csv", runs_text(3))
+    wrong, status = page.ask(
+        "/api/jobs", {"kind": "estimate", "files": [key], "model": {"model": "[gear]\n"}}
+    )
+    assert status == 422 and "MODEL.toml" in wrong["error"]
+
+
+def test_a_gap_runs_with_progress_and_its_files_are_there(page):
+    key = page.put("RUNS.csv", runs_text(7))
+    job = page.job(kind="gap", files=[key], model={"values": {}})
+    assert job["state"] == "done", job["error"]
+    found = job["result"]
+    assert found["status"] == "no-gap" and found["advice"] and found["sizes"]
+    assert {"report.html", "gap.json", "model.toml", "next_runs.csv"} <= set(found["files"])
+    path = f"/api/jobs/{job['id']}/report.html"
+    status, headers, text = page.request("GET", f"{path}?show=1")
+    assert status == 200 and b"Gap report" in text
+    assert "sandbox" in headers["Content-Security-Policy"]
+    assert "script" not in headers["Content-Security-Policy"]
+    assert "attachment" in page.request("GET", path)[1]["Content-Disposition"]
+    assert page.request("GET", f"/api/jobs/{job['id']}/MODEL.toml")[0] == 422
+
+
+def test_a_job_can_be_cancelled_and_the_page_stays_live(page):
+    key = page.put("RUNS.csv", runs_text(7))
+    job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
+    assert page.request("POST", "/api/forward", {})[0] == 200
+    _, _, text = page.request("DELETE", f"/api/jobs/{job['id']}", b"")
+    assert json.loads(text)["state"] == "cancelled"
+    again = json.loads(page.request("GET", f"/api/jobs/{job['id']}")[2])
+    assert again["state"] == "cancelled" and again["result"] is None
+
+
+def test_a_raw_log_is_guessed_edited_and_imported(page, tmp_path):
+    sys.path.insert(0, str(ROOT / "examples" / "import"))
+    from rig import write_logs
+
+    keys = [page.put(Path(f).name, Path(f).read_bytes()) for f in write_logs(tmp_path / "rig")[:1]]
+    assert page.job(kind="look", files=keys)["result"] == {"kind": "log"}
+    guessed = page.job(kind="map", files=keys)["result"]
+    assert "gear_ratio = 1  # CHANGE" in guessed["map"] and guessed["marked"] == 1
+    wrong = page.job(kind="import", files=keys, map=guessed["map"])
+    assert wrong["state"] == "failed" and "gear" in wrong["error"]
+    fixed = guessed["map"].replace("gear_ratio = 1 ", "gear_ratio = 99 ")
+    job = page.job(kind="import", files=keys, map=fixed)
+    assert job["state"] == "done", job["error"]
+    assert job["result"]["rows"] == 4 and job["result"]["load"][0] == pytest.approx(40.0, abs=1.0)
+    assert page.request("GET", f"/api/jobs/{job['id']}/import_report.html?show=1")[0] == 200
+    again = page.job(kind="look", files=[f"{job['id']}/runs.csv"])
+    assert again["result"]["kind"] == "runs" and again["result"]["rows"] == 4
+
+
+def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp_path):
+    key = page.put("RUNS.csv", runs_text(3))
+    job = page.job(kind="estimate", files=[key], model={"values": {}}, run="heavy")
+    assert job["result"]["rows"] == 3 and job["result"]["load"] == [90.0, 90.0]
+    text = page.request("GET", f"/api/jobs/{job['id']}/model.toml")[2]
+    (tmp_path / "model.toml").write_bytes(text)
+    case = read_case(tmp_path / "model.toml")
+    for found in job["result"]["parameters"]:
+        assert getattr(case.soil, found["path"]) == pytest.approx(found["si"])
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"kind": "look", "files": ["0" * 32]}, "the file is gone"),
+        ({"kind": "look", "files": [7]}, "the file is gone"),
+        ({"kind": "look", "files": ["0" * 32 + "/runs.csv"]}, "this analysis is gone"),
+        ({"kind": "look", "files": []}, "a list of files"),
+        ({"kind": "shell", "files": ["x"]}, "needed is a kind"),
+        ({"files": "x"}, "needed is a kind"),
+    ],
+    ids=str,
+)
+def test_a_wrong_job_is_refused_in_one_line(page, request_, said):
+    wrong, status = page.ask("/api/jobs", request_)
+    assert status in (400, 422) and said in wrong["error"]
