@@ -16,10 +16,15 @@ from sphinx.application import Sphinx
 SITE = Path(__file__).parent
 ROOT = SITE.parents[1]
 sys.path[:0] = [str(SITE), str(ROOT)]
-# notebooks run the commands of this environment, one thread each, without colours
+# notebooks run the commands of this environment, one thread each, without colours and moving bars
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 os.environ["PYTHONPATH"] = str(ROOT)
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NO_COLOR": "1"}
+os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NO_COLOR": "1", "TTY_INTERACTIVE": "0"}
+# ... with settings of their own, not those of whoever builds
+_PROFILE = ROOT / "build/ipython/profile_default"
+_PROFILE.mkdir(parents=True, exist_ok=True)
+(_PROFILE / "ipython_kernel_config.py").write_text("c.Application.log_level = 'ERROR'\n")
+os.environ["IPYTHONDIR"] = str(_PROFILE.parent)
 
 import soilml  # noqa: E402
 
@@ -36,15 +41,18 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
+    "command_output",
     "error_listing",
+    "foreign_addresses",
     "mathml",
+    "page_tree",
     "python_reference",
 ]
 include_patterns = ["*.md", "docs/**.md", "exported/*.md", "examples/*/README.md"]
 exclude_patterns = [".*", "build", "demo", "dist", "docs/site", "node_modules", "tests"]
 
-# `serve*` of the start page: a page that may not be there
-suppress_warnings = ["toc.empty_glob"]
+# words in the types of parameters, such as `rows`, are looked up as names, and some are attributes
+suppress_warnings = ["ref.python"]
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
@@ -68,6 +76,7 @@ html_static_path = ["static"]
 html_css_files = ["soilml.css"]
 html_extra_path = ["root"]
 html_copy_source = False
+html_show_copyright = False
 html_show_sphinx = False
 html_math_renderer = "mathml"
 pygments_style = "tango"

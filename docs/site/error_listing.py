@@ -107,7 +107,7 @@ def _listing(patterns: tuple[str, ...], found: list[Message]) -> str:
     if not lines:
         return ""
     head = f":::{{dropdown}} {len(lines)} message{'s' if len(lines) > 1 else ''}"
-    return "\n".join([head, *lines, ":::"])
+    return "\n".join([head, "", "In the words of the sources:", "", *lines, ":::"])
 
 
 def _insert(app: Any, docname: str, source: list[str]) -> None:
