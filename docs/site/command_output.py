@@ -1,4 +1,4 @@
-"""Takes the progress bars out of the outputs of commands, which a terminal would have overwritten."""
+"""Takes progress bars out of the outputs of commands; a terminal would have overwritten them."""
 
 from __future__ import annotations
 

@@ -19,7 +19,12 @@ sys.path[:0] = [str(SITE), str(ROOT)]
 # notebooks run the commands of this environment, one thread each, without colours and moving bars
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 os.environ["PYTHONPATH"] = str(ROOT)
-os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NO_COLOR": "1", "TTY_INTERACTIVE": "0"}
+os.environ |= {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "NO_COLOR": "1",
+    "TTY_INTERACTIVE": "0",
+}
 # ... with settings of their own, not those of whoever builds
 _PROFILE = ROOT / "build/ipython/profile_default"
 _PROFILE.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Completes the tree of pages: folders with a README, and pages that the start page does not name."""
+"""Completes the tree: folders with a README, and pages that the start page does not name."""
 
 from __future__ import annotations
 
