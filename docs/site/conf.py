@@ -26,6 +26,7 @@ os.environ |= {
     "TTY_INTERACTIVE": "0",
 }
 # ... with settings of their own, not those of whoever builds
+os.environ.pop("MPLBACKEND", None)
 _PROFILE = ROOT / "build/ipython/profile_default"
 _PROFILE.mkdir(parents=True, exist_ok=True)
 (_PROFILE / "ipython_kernel_config.py").write_text("c.Application.log_level = 'ERROR'\n")

@@ -11,6 +11,7 @@ from sphinx.application import Sphinx
 from soilml.parameters import declared
 
 _PARAMETER = re.compile(r"(?:~?[\w.]*\.)?Annotated\[(.*?), ~?[\w.]*Parameter\(.*?\)\]")
+_COLON = "\ue000"  # a character that no docstring has
 _ARRAY = re.compile(r"float \| ~?[\w.]*NumericArray")
 
 
@@ -48,8 +49,30 @@ def _parameters(
     lines.append("")
 
 
+def _before_napoleon(
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    """Hide colons of comments on attributes, before which napoleon expects a type.
+
+    Docstrings of modules are for those who change them; the pages have introductions of their own.
+    """
+    if what == "module":
+        lines.clear()
+    if what == "attribute":
+        lines[:] = [line.replace(": ", _COLON) for line in lines]
+
+
+def _after_napoleon(
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    """Bring the colons back."""
+    lines[:] = [line.replace(_COLON, ": ") for line in lines]
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register both hooks of autodoc."""
+    """Register the hooks of autodoc."""
     app.connect("autodoc-process-signature", _signature)
     app.connect("autodoc-process-docstring", _parameters)
+    app.connect("autodoc-process-docstring", _before_napoleon, priority=400)
+    app.connect("autodoc-process-docstring", _after_napoleon, priority=600)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
