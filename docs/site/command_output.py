@@ -8,6 +8,8 @@ from docutils import nodes
 from sphinx.application import Sphinx
 
 _CURSOR = re.compile(r"\x1b?\[?\?25[lh]")
+#: The rule below the head of a table of more than 100 columns, whose lines are not to be broken.
+_WIDE = re.compile(r"^-[- ]{100,}$", re.MULTILINE)
 _BAR = re.compile(r"^.*[━╸╺].*\n?|^[ \w-]+ 0:\d\d:\d\d *$\n?", re.MULTILINE)
 
 
@@ -23,6 +25,8 @@ def _clean(app: Sphinx, doctree: nodes.document) -> None:
             text = cleaned(node.astext())
             node.rawsource = text
             node.children = [nodes.Text(text)]
+            if _WIDE.search(text):
+                node["classes"].append("wide")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
@@ -9,13 +11,12 @@ from sphinx.errors import ExtensionError
 
 
 def _mathml(formula: str, display: str) -> str:
-    """MathML of one formula; blank lines, `&=` and two backslashes make it several lines."""
-    parts = [" ".join(part.split()) for part in formula.split("\n\n") if part.strip()]
-    text = r" \\ ".join(parts)
-    if len(parts) > 1 or r"\\" in text or "&" in text:
-        text = rf"\begin{{aligned}} {text} \end{{aligned}}" if "\\begin" not in text else text
+    """MathML of a formula, an element for each line: blank lines and two backslashes separate."""
+    lines = re.split(r"\n\s*\n", formula.strip())
+    if r"\begin" not in formula:
+        lines = [one.replace("&", "") for line in lines for one in line.split(r"\\")]
     try:
-        return convert(text, display=display)
+        return "".join(convert(" ".join(line.split()), display=display) for line in lines)
     except Exception as error:
         raise ExtensionError(f"this formula cannot be drawn: {formula}") from error
 

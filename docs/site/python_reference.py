@@ -58,7 +58,7 @@ def _before_napoleon(
     """
     if what == "module":
         lines.clear()
-    if what == "attribute":
+    if what in ("attribute", "property"):
         lines[:] = [line.replace(": ", _COLON) for line in lines]
 
 
