@@ -9,6 +9,16 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
+#: Names of functions stand apart from what is beside them; not inside of scripts, which are pairs.
+_FUNCTION = re.compile(
+    r"(?<!<msup>)(?<!<msub>)(?<!<munder>)<mi>(sin|cos|tan|exp|log|ln|arc\w+)</mi>(?=(<m[is])?)"
+)
+
+
+def _apart(found: re.Match[str]) -> str:
+    after = '<mspace width="0.17em"/>' if found[2] else ""
+    return f'<mspace width="0.1em"/><mi>{found[1]}</mi>{after}'
+
 
 def _mathml(formula: str, display: str) -> str:
     """MathML of a formula, an element for each line: blank lines and two backslashes separate."""
@@ -16,7 +26,8 @@ def _mathml(formula: str, display: str) -> str:
     if r"\begin" not in formula:
         lines = [one.replace("&", "") for line in lines for one in line.split(r"\\")]
     try:
-        return "".join(convert(" ".join(line.split()), display=display) for line in lines)
+        elements = [convert(" ".join(line.split()), display=display) for line in lines]
+        return _FUNCTION.sub(_apart, "".join(elements))
     except Exception as error:
         raise ExtensionError(f"this formula cannot be drawn: {formula}") from error
 
