@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -84,6 +84,12 @@ faults: $(VENV)/.ready ## kill commands at random moments and run them again: ma
 
 bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
 	@$(BIN)/python bench/bounds.py
+
+docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/docs/index.html, two minutes
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[docs]'
+	@$(BIN)/sphinx-build -q -W --keep-going -E -c docs/site . build/docs
+	@echo "build/docs/index.html"
 
 clean: ## remove the environment and what demo and tests made
 	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache

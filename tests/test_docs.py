@@ -16,7 +16,7 @@ from soilml.log_import import read_map
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
     page
-    for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "exported/*.md", "examples/*/*.md")
+    for pattern in ("*.md", "docs/**/*.md", "exported/*.md", "examples/*/*.md")
     for page in ROOT.glob(pattern)
 )
 #: pages whose Python blocks are run; docs/physics.md ends with an effect that a command loads
@@ -30,6 +30,8 @@ RUN = (
     "docs/pull.md",
     "docs/reports.md",
     "docs/papers/slip_models.md",
+    "docs/start/board.md",
+    "docs/start/research.md",
     "exported/README.md",
 )
 
@@ -73,7 +75,6 @@ def test_the_model_file_is_valid(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
     model = blocks("docs/model-file.md", "toml")[0]
     extra, spec = blocks("docs/recipes-and-specs.md", "toml")
@@ -82,6 +83,22 @@ def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     assert main(["generate", "recipe.toml", "data.parquet", "--rows", "3000"]) == 0
     assert main(["train", "spec.toml", "data.parquet", "model.onnx"]) == 0
+
+
+def test_the_recipe_of_my_wheel_is_valid(tmp_path):
+    from datagen.recipe import read_recipe
+
+    (tmp_path / "recipe.toml").write_text(blocks("docs/how-to/train-my-wheel.md", "toml")[0])
+    recipe = read_recipe(tmp_path / "recipe.toml")
+    assert recipe.rows == 60000
+
+
+def test_the_prior_of_bearing_is_valid(tmp_path):
+    model = blocks("docs/model-file.md", "toml")[0]
+    (bearing,) = blocks("docs/how-to/priors-for-bearing.md", "toml")
+    inside = bearing.removeprefix("[soil.prior]\n")
+    (tmp_path / "model.toml").write_text(model.replace("[soil.prior]", "[soil.prior]\n" + inside))
+    assert {"kphi", "n"} < set(read_case(tmp_path / "model.toml").prior)
 
 
 def test_the_map_of_a_log_is_valid(tmp_path):

@@ -259,7 +259,7 @@ class Estimator:
         return estimate, memory.packed()
 
     def prior_estimate(self, *shape: int) -> Estimate:
-        """The prior as an estimate (*shape, q), flagged as out of range."""
+        """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
         return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
 
     @property

@@ -47,7 +47,7 @@ class Wheel(RigidWheel):
     shear stress has the sign of j: backward in front of the point where j is back at zero, forward
     behind it. Torque, pull and sinkage are continuous through zero slip, and a wheel that is towed
     without torque has a small negative slip. `braking="slip-sign"` is the law as the source papers
-    print it: 1 - s at any slip, |j|, and the sign of the slip all along the rim, so that the three
+    print it: 1 - s at any slip, \|j\|, and the sign of the slip along the rim, so that the three
     jump at zero slip.
 
     References: Wong and Reece, J. Terramechanics 4(1), 1967; the same set in Nagatani et al. 2009,

@@ -1,0 +1,161 @@
+"""The sources of the documentation site, without Sphinx: tree, tutorials, messages, symbols."""
+
+import ast
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import notebooks
+import numpy as np
+import pytest
+
+import soilml
+from soilml.cli.main import parser
+from soilml.quantities import QUANTITIES
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "docs/site"))
+
+import error_listing  # noqa: E402
+import foreign_addresses  # noqa: E402
+
+PAGES = [
+    page
+    for pattern in ("*.md", "docs/**/*.md", "exported/*.md", "examples/*/README.md")
+    for page in ROOT.glob(pattern)
+]
+NOTEBOOKS = sorted(page for page in PAGES if page.read_text().startswith("---\nkernelspec"))
+
+
+def named_in_trees():
+    """Pages in the trees, as paths; folders of docs with a README have all their pages in one."""
+    found = {ROOT / "docs/index.md", *ROOT.glob("docs/*.md")}
+    for page in PAGES:
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(), flags=re.DOTALL):
+            for entry in tree.splitlines():
+                target = re.sub(r".*<(.*)>$", r"\1", entry.strip())
+                if target and not target.startswith((":", "(")):
+                    found.add((page.parent / f"{target}.md").resolve())
+    for readme in [page for page in found if page.parent.parent == ROOT / "docs"]:
+        if readme.name == "README.md":
+            found |= set(readme.parent.glob("*.md"))
+    return found
+
+
+def test_every_page_is_in_the_tree_and_every_entry_is_a_page():
+    assert named_in_trees() == set(PAGES)
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda page: page.stem)
+def test_notebooks_have_cells_that_parse_and_commands_that_exist(page):
+    assert notebooks.cells(page)
+    for cell in notebooks.cells(page):
+        ast.parse(notebooks.COMMAND.sub("pass", cell))
+    for line in notebooks.commands(page):
+        program, command, *words = shlex.split(line)
+        assert program == "soilml"
+        parser(command).parse_args([command, *words])
+
+
+@pytest.fixture
+def clone(tmp_path, monkeypatch):
+    """A folder with the files of the repository that pages use, in which they run."""
+    for folder in ("examples", "exported"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_a_wrong_bearing_moves_the_estimate_and_a_prior_of_it_does_not(clone, capsys):
+    notebooks.run(ROOT / "docs/how-to/priors-for-bearing.md")
+    moved = [
+        max(abs(float(one)) for one in re.findall(r"([+-][\d.]+) std off", line))
+        for line in capsys.readouterr().out.splitlines()
+    ]
+    right, wrong, prior, with_sinkage, second_answer = moved
+    assert wrong > 3.0 > max(right, prior, with_sinkage, second_answer)
+
+
+@pytest.mark.slow
+def test_noise_that_is_stated_too_small_is_told(clone, capsys):
+    notebooks.run(ROOT / "docs/how-to/noise.md")
+    small, _ = capsys.readouterr().out.split("2.0%:")
+    assert "the noise is understated" in small
+
+
+@pytest.mark.slow
+def test_the_tutorial_of_the_board_tells_what_happened(clone):
+    names = notebooks.run(ROOT / "docs/tutorials/board.md")
+    truth = np.degrees([0.62, 0.50])
+    assert abs(names["phi"][[59, -1]] - truth).max() < 3 * names["width"][[59, -1]].max()
+    assert not names["in_mm"].in_range
+    assert (clone / "demo/tutorials/board/wheel.c").exists()
+
+
+@pytest.mark.slow
+def test_the_effect_of_the_page_is_neutral_by_default(clone, capsys):
+    page = ROOT / "docs/how-to/effect.md"
+    names: dict = {"__name__": "documented"}
+    for cell in notebooks.cells(page)[:2]:
+        exec(cell, names)
+    assert "neutral: True" in capsys.readouterr().out
+
+
+def test_every_message_belongs_to_one_group_of_the_page():
+    found = list(error_listing.messages())
+    assert len(found) > 400
+    assert error_listing.faults(error_listing.PAGE.read_text(), found) == []
+
+
+def test_a_module_without_a_group_and_a_group_without_a_module_are_told():
+    found = [error_listing.Message("soilml/new.py", "InputError", "a new message")]
+    page = "<!-- messages: soilml/old.py -->"
+    no_group, no_module = error_listing.faults(page, found)
+    assert "soilml/new.py raises messages and is in no group" in no_group
+    assert "soilml/old.py" in no_module
+    twice = "<!-- messages: soilml/new.py -->\n<!-- messages: soilml/** -->"
+    assert "2 groups" in error_listing.faults(twice, found)[0]
+
+
+def test_messages_are_read_with_their_gaps():
+    source = 'raise InputError(f"{name} is {value!r}; needed is " + hint)'
+    (message,) = error_listing._of(source, "soilml/new.py")
+    assert message.text == "… is …; needed is …"
+
+
+def test_every_quantity_is_on_the_page_of_symbols():
+    page = (ROOT / "docs/reference/symbols.md").read_text()
+    for quantity in QUANTITIES.values():
+        row = re.search(rf"^\|.*\| `{re.escape(quantity.column)}` \|.*$", page, re.MULTILINE)
+        if row is None:
+            assert f"| `{quantity.column}` | {quantity.text} |" in page
+        else:
+            assert f"| {quantity.unit} |" in row[0] and quantity.text in row[0]
+
+
+def test_every_public_name_is_in_the_reference():
+    pages = "".join(page.read_text() for page in (ROOT / "docs/reference/api").glob("*.md"))
+    modules = re.findall(r"automodule:: (\S+)", pages)
+    named = set(re.findall(r"(?:autoclass|autofunction):: \S+\.(\w+)", pages))
+    for module in modules:
+        imported = __import__(module, fromlist=["__all__"])
+        named |= set(getattr(imported, "__all__", vars(imported)))
+    values = {"__version__", "EFFECTS", "GEARS", "METHODS"}
+    assert set(soilml.__all__) - values <= named
+
+
+@pytest.mark.parametrize(
+    ("page", "loads"),
+    [
+        ('<script src="https://cdn.example/a.js"></script>', True),
+        ('<link rel="stylesheet" href="//fonts.example/a.css">', True),
+        ('<a href="https://example.org">a link that is followed</a>', False),
+        ('<img src="_images/a.png"><script src="_static/a.js"></script>', False),
+    ],
+)
+def test_addresses_that_a_page_would_load_are_found(tmp_path, page, loads):
+    (tmp_path / "page.html").write_text(page)
+    assert bool(foreign_addresses.loaded_addresses(tmp_path)) == loads
