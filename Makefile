@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast check models limit kls1 gap-real bench bench-gap fuzz faults bounds endurance clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -76,6 +76,9 @@ fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make 
 
 faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
 	@$(BIN)/python tests/faults/fault_run.py --kills $(or $(FAULT_KILLS),200)
+
+endurance: $(VENV)/.ready ## a day at 10 Hz through the estimator on board, an hour
+	@$(BIN)/python tests/endurance/endurance_run.py
 
 bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
 	@$(BIN)/python bench/bounds.py
