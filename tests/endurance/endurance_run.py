@@ -12,6 +12,7 @@ import argparse
 import gc
 import sys
 import time
+from array import array
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,14 +48,14 @@ class Result:
 
     Parameters
     ----------
-    seconds : list of float
+    seconds : array of float
         Time of each step that was read.
     counts : Counter
         Readings by what they were, and ``refused``.
     bytes_of_memory : list of int
         Size of `Memory.system` and `Memory.counts` after each soil.
     resident : list of int
-        Resident memory of the process after each soil, without the list `seconds`, bytes.
+        Resident memory of the process after each soil, without the times in `seconds`, bytes.
     errors, drifts : list of ndarray
         After each soil, in standard deviations: distance of the estimate from the truth, and from
         the estimate of the same readings in one call, (3,).
@@ -62,7 +63,7 @@ class Result:
         Soils whose last estimate is out of range.
     """
 
-    seconds: list[float] = field(default_factory=list)
+    seconds: array[float] = field(default_factory=lambda: array("d"))
     counts: Counter[str] = field(default_factory=Counter)
     bytes_of_memory: list[int] = field(default_factory=list)
     resident: list[int] = field(default_factory=list)
