@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds endurance lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -82,6 +82,9 @@ fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make 
 faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
 	@$(BIN)/python tests/faults/fault_run.py --kills $(or $(FAULT_KILLS),200)
 
+endurance: $(VENV)/.ready ## a day at 10 Hz through the estimator on board, an hour
+	@$(BIN)/python tests/endurance/endurance_run.py
+
 bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
 	@$(BIN)/python bench/bounds.py
 
@@ -91,5 +94,23 @@ docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/d
 	@$(BIN)/sphinx-build -q -W --keep-going -E -c docs/site . build/docs
 	@echo "build/docs/index.html"
 
+.venv-supply/.ready: Makefile
+	@$(PYTHON) -m venv .venv-supply
+	@.venv-supply/bin/python -m pip install --quiet --disable-pip-version-check \
+	  uv==0.13.9 cyclonedx-bom==7.5.0 pip-audit==2.10.1
+	@touch $@
+
+lock: .venv-supply/.ready ## write the packages with their hashes: onboard-hashes.txt, ground-hashes.txt
+	@$(PYTHON) bench/packages.py lock
+
+sbom: .venv-supply/.ready ## write bills of materials (CycloneDX) into build/
+	@$(PYTHON) bench/packages.py sbom
+
+licences: $(VENV)/.ready ## print the licences of the installed packages
+	@$(BIN)/python bench/packages.py licences
+
+audit-packages: .venv-supply/.ready ## compare the packages with known faults, by pip-audit
+	@$(PYTHON) bench/packages.py audit
+
 clean: ## remove the environment and what demo and tests made
-	rm -rf $(VENV) demo build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-supply demo build dist .mypy_cache .ruff_cache .pytest_cache

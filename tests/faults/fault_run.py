@@ -21,6 +21,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "examples" / "import"))
+
+from rig import write_logs  # noqa: E402
+
+LOGS = ("sand_1.csv", "sand_2.csv", "sand_3.csv", "sand_4.csv")
 MODEL = """\
 [gear]
 type = "wheel"
@@ -43,6 +48,7 @@ COMMANDS = {
     "train": "train spec.toml data.parquet out/m.onnx",
     "gap": "gap model.toml runs.csv --out out",
     "estimate": "estimate wheel.onnx long.csv --out out/e.csv",
+    "import": f"import {' '.join(LOGS)} --map map.toml --out out/runs.csv",
     "simulate": "simulate model.toml --slip 0:0.6:400 --load 30:90:400 --out out/s.csv",
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -84,9 +90,13 @@ def completed(folder: Path, words: str) -> float:
 
 def prepared(folder: Path) -> None:
     """The inputs of all commands."""
+    write_logs(folder)
     (folder / "model.toml").write_text(MODEL)
     (folder / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
     shutil.copy(ROOT / "exported" / "wheel.onnx", folder / "wheel.onnx")
+    completed(folder, f"import --init {' '.join(LOGS)} --out map.toml")
+    chart = folder / "map.toml"
+    chart.write_text(chart.read_text().replace("gear_ratio = 1 ", "gear_ratio = 99 "))
     completed(folder, "generate wheel data.parquet --rows 2000 --workers 1")
     completed(folder, "simulate model.toml --slip 0.05:0.6:6 --load 30:90:5 --run a --out one.csv")
     completed(folder, "simulate model.toml --slip 0.05:0.6:6 --load 40:80:5 --run b --out two.csv")

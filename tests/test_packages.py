@@ -1,0 +1,61 @@
+"""Locked packages agree with constraints.txt, and an audit that saw nothing does not pass."""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+
+
+from packages import LOCKED, TOOLS, audited, licence, lock_command, without_accelerators
+
+ROOT = Path(__file__).parents[1]
+
+
+def versions(name):
+    found = re.findall(r"^([\w.\-]+)==([\w.]+)", (ROOT / name).read_text(), re.MULTILINE)
+    return {re.sub(r"[-_.]+", "-", package).lower(): version for package, version in found}
+
+
+@pytest.mark.parametrize("name", LOCKED)
+def test_locked_versions_are_the_tested_ones_and_all_have_hashes(name):
+    locked, tested = versions(name), versions("constraints.txt")
+    assert {"numpy", "onnxruntime"} <= locked.keys()
+    shared = locked.keys() & tested.keys()
+    assert {package: locked[package] for package in shared} == {
+        package: tested[package] for package in shared
+    }
+    entries = re.split(r"\n(?=\S)", (ROOT / name).read_text().strip())
+    assert all("--hash=sha256:" in entry for entry in entries)
+    assert not any(package.startswith("nvidia") or package == "torch" for package in locked)
+
+
+def test_only_entries_of_accelerators_are_left_out_of_a_lock():
+    text = "a==1 \\\n    --hash=sha256:1\nnvidia-x==2 \\\n    --hash=sha256:2\n    \n"
+    assert "a==1 \\\n    --hash=sha256:1" in without_accelerators(text)
+    assert "nvidia" not in without_accelerators(text)
+    assert "sha256:2" not in without_accelerators(text)
+
+
+def test_a_lock_asks_for_hashes_and_the_tested_versions():
+    command = lock_command(TOOLS, "ground-hashes.txt")
+    assert {"--generate-hashes", "--constraint=constraints.txt", "--extra=ground"} <= set(command)
+
+
+def test_packages_that_were_not_compared_are_not_taken_for_sound():
+    report = {
+        "dependencies": [
+            {"name": "a", "version": "1", "vulns": []},
+            {"name": "b", "version": "2", "vulns": [{"id": "CVE-1"}]},
+            {"name": "c", "skip_reason": "not found"},
+        ]
+    }
+    assert audited(json.dumps(report)) == (2, ["c"], ["b 2: CVE-1"])
+
+
+def test_the_licence_of_an_installed_package_is_found():
+    assert "BSD" in licence("numpy")
+    assert licence("no-such-package") == "not installed here"
