@@ -195,6 +195,11 @@ def read_case(
     case = take_case(settings, effects)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))
+    elif "bias" in settings:
+        settings.fail(
+            "[bias] is read by identify and estimate --case alone (in Python, with_bias=True); for "
+            "other commands delete it"
+        )
     settings.finish()
     return case
 
@@ -218,6 +223,11 @@ def read_case_of_one_gear(
     case = take_case(settings, effects)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))
+    elif "bias" in settings:
+        settings.fail(
+            "[bias] is read by identify and estimate --case alone (in Python, with_bias=True); for "
+            "other commands delete it"
+        )
     settings.finish()
     if not case.gears and gear is None:
         return case

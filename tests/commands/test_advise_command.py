@@ -203,3 +203,16 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
     assert "mostly the prior" in done.stderr and "not identified by these rows" in done.stderr
+
+
+def test_the_noise_of_the_rows_suffices(tmp_path, model_file, capsys):
+    """Rows of `soilml import` have standard deviations, and their model file may have no noise."""
+    text = model_file.read_text()
+    (tmp_path / "quiet.toml").write_text(text[: text.index("[noise]")])
+    rows = ["run,slip,load_N,torque_Nm,torque_Nm_std"]
+    rows += [f"a,{s},{w},{t},0.04" for s, w, t in ((0.1, 60, 1.6), (0.3, 60, 2.7), (0.5, 80, 4.2))]
+    (tmp_path / "runs.csv").write_text("\n".join(rows) + "\n")
+    out = str(tmp_path / "next.csv")
+    files = [str(tmp_path / "quiet.toml"), str(tmp_path / "runs.csv")]
+    assert main(["advise", *files, "--out", out]) == 0
+    assert "taken from torque_Nm_std: 0.04" in capsys.readouterr().err

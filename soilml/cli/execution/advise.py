@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from soilml.cli.output import write_columns
 from soilml.cli.progress import working
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
-from soilml.config.case import read_case_of_one_gear
+from soilml.config.case import Case, read_case_of_one_gear
+from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.experiment_design import (
     Advice,
@@ -27,13 +29,26 @@ from soilml.experiment_design import (
 )
 from soilml.experiment_design.candidate_rows import channel_label
 from soilml.experiment_design.messages import next_row_messages
-from soilml.identification.data.observations import read_observations
+from soilml.identification.data.observations import Observations, read_observations
 from soilml.identification.free_parameters import select_free
 from soilml.io.read_table import RUNS
 from soilml.optional_imports import need
+from soilml.quantities import column
 
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
+
+
+def _with_noise_of_rows(case: Case, data: Observations) -> Case:
+    """The case with the noise of the rows' columns where it declares none: their median."""
+    noise = dict(case.noise)
+    for channel in data.channels:
+        key = column(channel.name)
+        if key not in noise and channel.declared:
+            std = float(np.nanmedian(channel.std[np.isfinite(channel.reading)]))
+            noise[key] = Noise(constant=std)
+            print(f"the noise of further {key} is taken from {key}_std: {std:.3g}", file=sys.stderr)
+    return replace(case, noise=noise)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
         table = read_rows(args, RUNS)
         print_table_hints(table, case)
         data = read_observations(case, table)
+        case = _with_noise_of_rows(case, data)
         ranges, at = candidate_grid(slips, loads, data.load), data.at
     if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(

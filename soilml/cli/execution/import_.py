@@ -68,7 +68,8 @@ def _init(args: argparse.Namespace) -> int:
         return 0
     save_text(args.out, text)
     changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
-    todo = f"{changes} lines need a look (CHANGE, NEEDED)" if changes else "look at its guesses"
+    lines = "1 line needs" if changes == 1 else f"{changes} lines need"
+    todo = f"{lines} a look (CHANGE, NEEDED)" if changes else "look at its guesses"
     print(
         f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv",
         file=sys.stderr,
