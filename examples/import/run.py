@@ -54,6 +54,9 @@ if __name__ == "__main__":
     print(f"\nin {chart}: {EDIT[0].strip()} -> {EDIT[1].strip()}")
     chart.write_text(chart.read_text().replace(*EDIT))
     run("import", *logs, "--map", str(chart), "--out", str(runs))
-    run("identify", str(FOLDER / "model.toml"), str(runs), "--out", str(FOLDER / "soil.json"))
+    model = FOLDER / "with_bias.toml"
+    shared = runs.with_suffix(".bias.toml").read_text()
+    model.write_text(f"{(FOLDER / 'model.toml').read_text()}\n{shared}")
+    run("identify", str(model), str(runs), "--out", str(FOLDER / "soil.json"))
     picture(logs, chart, FOLDER / "import.png")
     print(f"\npicture: {FOLDER / 'import.png'}; report: {runs.with_suffix('.report.html')}")
