@@ -60,7 +60,8 @@ def advice_after_fit(
         return None
     try:
         data = read_observations(case, table)
-        samples = samples_of_rows(case, data, select_free(case, free), QUICK_SAMPLES)
+        selected = select_free(case, free)
+        samples = samples_of_rows(case, data, selected, QUICK_SAMPLES, found=fit.samples)
         current = np.asarray([fit.remaining_fraction[f.path] for f in samples.free])
         return _quick(
             case, samples, candidate_grid(None, None, data.load), data.at, current_fraction=current

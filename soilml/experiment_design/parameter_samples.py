@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
 from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.posterior import posterior_samples
+from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 
@@ -65,9 +65,13 @@ def samples_of_rows(
     free: Sequence[FreeParameter],
     count: int = SAMPLES,
     seed: int = 0,
+    found: PosteriorSamples | None = None,
 ) -> ParameterSamples:
-    """Samples of the exact posterior of rows; raises `FitError` as the posterior method does."""
-    found = posterior_samples(case, data, free)
+    """Samples of the exact posterior of rows; raises `FitError` as the posterior method does.
+
+    `found` are samples that were drawn of it before.
+    """
+    found = posterior_samples(case, data, free) if found is None else found
     offset = np.random.default_rng(seed).random()
     drawn = systematic_resampling(found.sample.weights, count, offset)
     index, multiplicity = np.unique(drawn, return_counts=True)

@@ -50,6 +50,9 @@ class Fit:
         Columns that were fitted.
     low, high
         Ends (p,) of the 90 % interval where the method computes them, as the posterior does.
+    samples
+        Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
+        where the method drew them.
     """
 
     method: str
@@ -64,6 +67,7 @@ class Fit:
     channels: tuple[str, ...] = ()
     low: Floats | None = None
     high: Floats | None = None
+    samples: Any = field(default=None, repr=False, compare=False)
 
     @property
     def interval(self) -> tuple[Floats, Floats]:

@@ -130,6 +130,7 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         channels=tuple(column(c.name) for c in data.channels),
         low=low,
         high=high,
+        samples=found,
     )
     return with_warnings(
         fit, case, data, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False

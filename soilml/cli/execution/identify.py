@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     def solve(rows: Table) -> Identification:
         fit = identify(case, rows, free, args.method)
         advice = advice_after_fit(case, rows, free, fit) if fit.method == "posterior" else None
+        fit = replace(fit, samples=None)  # those of thousands of runs are not held together
         return Identification(fit, usual_fit(case, rows, free, args.method, fit), advice)
 
     if args.by is None:

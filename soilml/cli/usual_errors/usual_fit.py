@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from soilml.config.case import Case
@@ -86,6 +86,7 @@ def usual_fit(
     if method in CLOSED_FORM or case.discrepancy:
         return None
     try:
-        return UsualFit(right, identify(case, rows, free, method, as_usual=True))
+        usual = identify(case, rows, free, method, as_usual=True)
+        return UsualFit(right, replace(usual, samples=None))
     except FitError:
         return None
