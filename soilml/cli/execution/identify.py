@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from soilml.cli.advice_text import advice_after_fit
 from soilml.cli.option_values import available_effects, parse_names
