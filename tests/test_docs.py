@@ -74,7 +74,7 @@ def test_the_model_file_is_valid(tmp_path):
     assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus", "slip-sinkage.n1"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
     model = blocks("docs/model-file.md", "toml")[0]
     extra, spec = blocks("docs/recipes-and-specs.md", "toml")

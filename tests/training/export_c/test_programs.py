@@ -57,6 +57,7 @@ def sanitized(folder, program):
     return done.returncode == 0
 
 
+@pytest.mark.long
 @pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
 def test_no_access_out_of_bounds_and_nothing_undefined(exported, compiled, tmp_path):
     """Sets with rows of every sort; the answers are also those of the file without sanitizers."""
