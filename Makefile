@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds endurance lock sbom licences audit-packages docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults bounds endurance release lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -99,6 +99,9 @@ docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/d
 	@.venv-supply/bin/python -m pip install --quiet --disable-pip-version-check \
 	  uv==0.13.9 cyclonedx-bom==7.5.0 pip-audit==2.10.1
 	@touch $@
+
+release: $(VENV)/.ready ## build wheel and source archive twice, compare, install and measure them: dist/
+	@$(BIN)/python bench/release.py
 
 lock: .venv-supply/.ready ## write the packages with their hashes: onboard-hashes.txt, ground-hashes.txt
 	@$(PYTHON) bench/packages.py lock

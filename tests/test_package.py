@@ -44,6 +44,15 @@ def run(program, *arguments, cwd):
     )
 
 
+def test_two_builds_are_the_same_to_the_last_byte(tmp_path):
+    built = []
+    for name in ("first", "second"):
+        command = [sys.executable, "-m", "hatchling", "build", "-d", str(tmp_path / name)]
+        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+        built.append({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()})
+    assert built[0] == built[1] and len(built[0]) == 2
+
+
 def test_the_wheel_holds_the_packages_and_their_data(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     for needed in (
