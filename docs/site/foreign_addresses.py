@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from sphinx.application import Sphinx
-from sphinx.errors import ExtensionError
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 #: What a browser loads by itself, as opposed to links that somebody follows.
 _LOADED = re.compile(
@@ -27,6 +28,8 @@ def loaded_addresses(folder: Path) -> list[str]:
 
 
 def _check(app: Sphinx, exception: Exception | None) -> None:
+    from sphinx.errors import ExtensionError
+
     if exception is None and (found := loaded_addresses(Path(app.outdir))):
         raise ExtensionError("pages would load from a network:\n" + "\n".join(found))
 

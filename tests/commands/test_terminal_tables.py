@@ -57,6 +57,7 @@ ELSEWHERE = {
     "export-step",
     "compare",
     "climb",
+    "serve",
 }
 
 
