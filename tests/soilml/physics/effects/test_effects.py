@@ -68,6 +68,13 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
+@every
+def test_an_effect_that_is_given_no_size_is_neutral(name):
+    before, neutral = WHEEL(SAND, AT), (WHEEL + EFFECTS[name]())(SAND, AT)
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("gear", RIGID)
 @every
@@ -105,6 +112,7 @@ def test_signs_are_as_declared(name):
     effect = sized(name)
     before, changed = WHEEL(SAND, AT), (WHEEL + effect)(SAND, AT)
     assert set(effect.about.signs) <= set(CHANNELS)
+    assert set(effect.about.signs.values()) <= {-1, 1}
     for channel, sign in effect.about.signs.items():
         assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
     assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
