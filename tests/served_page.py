@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -36,15 +37,16 @@ class Page:
         if body is not None:
             sent["Content-Type"] = "application/json"
         sent |= {name.replace("_", "-"): value for name, value in headers.items()}
-        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
-        data = json.dumps(body).encode() if isinstance(body, dict) else body
-        if data is not None and "Content-Length" not in sent:
-            sent["Content-Length"] = str(len(data))
-        for name, value in sent.items():
-            connection.putheader(name, value)
-        connection.endheaders(data)
-        answer = connection.getresponse()
-        return answer.status, answer.headers, answer.read()
+        with closing(connection):
+            connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+            data = json.dumps(body).encode() if isinstance(body, dict) else body
+            if data is not None and "Content-Length" not in sent:
+                sent["Content-Length"] = str(len(data))
+            for name, value in sent.items():
+                connection.putheader(name, value)
+            connection.endheaders(data)
+            with connection.getresponse() as answer:
+                return answer.status, answer.headers, answer.read()
 
     def ask(self, path, body):
         """The JSON of an answer, and its status."""

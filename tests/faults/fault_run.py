@@ -16,14 +16,17 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "examples" / "import"))
+sys.path[:0] = [str(ROOT), str(ROOT / "examples" / "import")]
 
 from rig import write_logs  # noqa: E402
+
+from soilml.cli.progress import progress_bar  # noqa: E402
 
 LOGS = ("sand_1.csv", "sand_2.csv", "sand_3.csv", "sand_4.csv")
 MODEL = """\
@@ -54,10 +57,11 @@ COMMANDS = {
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 
 
-def start(folder: Path, words: str) -> subprocess.Popen[str]:
-    """The command in a process group of its own."""
+@contextmanager
+def started(folder: Path, words: str) -> Iterator[subprocess.Popen[str]]:
+    """The command in a process group of its own, which is killed where the caller is."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-m", "soilml", *words.split()],
         cwd=folder,
         env=environment,
@@ -67,6 +71,12 @@ def start(folder: Path, words: str) -> subprocess.Popen[str]:
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -81,8 +91,8 @@ def digests(folder: Path) -> dict[str, str]:
 def completed(folder: Path, words: str) -> float:
     """Run to the end; the seconds that it took. Raises `RuntimeError` where it fails."""
     begun = time.monotonic()
-    process = start(folder, words)
-    error = process.communicate()[1]
+    with started(folder, words) as process:
+        error = process.communicate()[1]
     if process.returncode:
         raise RuntimeError(f"soilml {words}: {error.strip()}")
     return time.monotonic() - begun
@@ -115,10 +125,10 @@ def disturbed(
     out = folder / "out"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir()
-    process = start(folder, words)
-    time.sleep(delay)
-    process.send_signal(number)
-    error = process.communicate()[1]
+    with started(folder, words) as process:
+        time.sleep(delay)
+        process.send_signal(number)
+        error = process.communicate()[1]
     faults = []
     said = process.returncode == 128 + number and error.count("soilml: interrupted") == 1
     if not said and process.returncode not in (0, -number):
@@ -137,10 +147,12 @@ def disturbed(
     return faults
 
 
-def run(kills: int, seed: int, commands: Sequence[str] = tuple(COMMANDS)) -> Counter[str]:
-    """Kill the commands in turn at random moments; counts of kills and faults by command."""
-    rng, counts = random.Random(seed), Counter[str]()
-    with TemporaryDirectory() as name:
+def run(
+    kills: int, seed: int, counts: Counter[str], commands: Sequence[str] = tuple(COMMANDS)
+) -> None:
+    """Kill the commands in turn at random moments; count kills and faults by command."""
+    rng = random.Random(seed)
+    with TemporaryDirectory() as name, progress_bar("kills", kills) as show:
         folder = Path(name)
         prepared(folder)
         right, seconds = {}, {}
@@ -157,20 +169,28 @@ def run(kills: int, seed: int, commands: Sequence[str] = tuple(COMMANDS)) -> Cou
             counts[f"{command} faults"] += len(faults)
             for fault in faults:
                 print(f"{command}, {number.name} after {delay:.2f} s: {fault}", flush=True)
-    return counts
+            show(i + 1)
 
 
 def main() -> int:
-    """Print the counts; 1 where there was a fault."""
+    """Print the counts, after Ctrl-C as well; 1 where there was a fault, 130 after Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("commands", nargs="*", metavar="COMMAND", help=", ".join(COMMANDS))
     args = parser.parse_args()
-    counts = run(args.kills, args.seed, args.commands or tuple(COMMANDS))
+    counts, interrupted = Counter[str](), False
+    try:
+        run(args.kills, args.seed, counts, args.commands or tuple(COMMANDS))
+    except KeyboardInterrupt:
+        interrupted = True
     for command in args.commands or COMMANDS:
         kills, faults = counts[f"{command} kills"], counts[f"{command} faults"]
         print(f"{command:16} {kills:4} kills {faults:4} faults")
+    if interrupted:
+        done = sum(counts[f"{command} kills"] for command in COMMANDS)
+        print(f"interrupted after {done} of {args.kills} kills", file=sys.stderr)
+        return 130
     return 1 if any(counts[f"{command} faults"] for command in COMMANDS) else 0
 
 

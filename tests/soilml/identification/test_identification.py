@@ -231,6 +231,26 @@ def test_newton_raphson_is_exact_on_the_closed_form(case):
     assert fit["kphi"] == pytest.approx(1.2e6, rel=1e-6)
 
 
+def test_newton_raphson_s_std_is_that_of_the_linearised_model(case):
+    prior = {name: p for name, p in case.prior.items() if name != "cohesion"}
+    noise = case.noise | {"sinkage_m": Noise(1e-4)}
+    truth = TRUTH | {"kphi": 1.2e6}
+    given = replace(closed(case).with_values(truth), prior=prior, noise=noise)
+    table = measured(given, truth, SLIPS, LOADS, sinkage_m=True)
+    fit = identify(given, table, method="newton")
+
+    def readings(name, share):
+        other = given.with_values({name: (1.0 + share) * truth[name]})
+        force = other.model(other.soil, Operating(slip=SLIPS, load=LOADS))
+        return np.append(force.torque / (0.02 * table["torque_Nm"]), force.sinkage / 1e-4)
+
+    h = 1e-4
+    slopes = [(readings(n, h) - readings(n, -h)) / (2.0 * h * truth[n]) for n in fit.names]
+    jacobian = np.stack(slopes, axis=1)
+    expected = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    np.testing.assert_allclose(fit.std, expected, rtol=1e-3)
+
+
 def test_newton_raphson_says_when_the_rows_do_not_determine_all(case):
     with pytest.raises(FitError, match="three or more"):
         identify(case, measured(case, TRUTH, SLIPS[:2], LOADS[:2]), method="newton")

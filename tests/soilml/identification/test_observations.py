@@ -7,6 +7,7 @@ from conftest import MODEL
 from soilml import Operating, identify, read_case
 from soilml.errors import FitError, TableError
 from soilml.identification.data.observations import read_observations
+from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 
 SHEAR = ["friction_angle", "shear_modulus"]
@@ -42,8 +43,26 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
     assert (identify(case, shaky, SHEAR).std > 1.5 * plain.std).all()
     huge = changed(table, load_N_std=np.full(12, 1e300), slip_std=np.full(12, 1e300))
     assert np.isfinite(identify(case, huge, SHEAR).std).all()
+
+
+@pytest.mark.parametrize("column, std", [("slip_std", 0.05), ("load_N_std", 4.0)])
+def test_a_closed_form_says_that_it_leaves_out_noise_of_slip_or_of_load(case, table, column, std):
+    shaky = changed(table, **{column: np.full(12, std)})
     said = " ".join(identify(case, shaky, SHEAR, "newton").warnings)
     assert "newton method does not propagate noise of slip and load" in said
+    assert "not propagate noise" not in " ".join(identify(case, table, SHEAR, "newton").warnings)
+
+
+def test_noise_of_slip_is_linearised_at_the_mean_of_the_posterior(case, table, monkeypatch):
+    means, linearise = [], PosteriorDensity.linearise_at_mean
+
+    def at_mean(density, sample):
+        means.append(sample.mean(sample.u))
+        return linearise(density, sample)
+
+    monkeypatch.setattr(PosteriorDensity, "linearise_at_mean", at_mean)
+    identify(case, changed(table, slip_std=np.full(12, 0.02)), SHEAR, "posterior")
+    assert means and np.isfinite(means).all()
 
 
 @pytest.mark.slow

@@ -210,3 +210,13 @@ def test_what_a_file_carries_is_read_back_as_it_was_written():
     for damage in ({"std": file.std - 1.0}, {"truth": [0.1]}, {"repeats": [2, 8]}):
         with pytest.raises(ValueError):
             HeldOutErrors.of(file.entry() | damage)
+
+
+def test_repetition_scales_both_ends_of_the_interval():
+    (errors,) = joint_errors(tuple(Sensors().files()))
+    mean, std = np.asarray([0.2, 0.4]), np.asarray([0.05, 0.02])
+    wide = replace(errors, repeats=float(REPEATS), repeat_interval=0.5)
+    single, half = wide.interval(mean, std), wide.interval(mean, std, count=REPEATS)
+    for end, near in zip(single, half, strict=True):
+        np.testing.assert_allclose(near - mean, 0.5 * (end - mean), rtol=1e-12)
+    assert (single[0] < mean).all() and (single[1] > mean).all()

@@ -68,6 +68,13 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
+@every
+def test_an_effect_that_is_given_no_size_is_neutral(name):
+    before, neutral = WHEEL(SAND, AT), (WHEEL + EFFECTS[name]())(SAND, AT)
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("gear", RIGID)
 @every
@@ -98,6 +105,11 @@ def test_any_size_within_its_bounds_is_answered_or_flagged(name):
         ok = force.status == Status.OK
         for channel in CHANNELS:
             np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_sign_is_a_sign(name):
+    assert set(EFFECTS[name].about.signs.values()) <= {-1, 1}
 
 
 @every

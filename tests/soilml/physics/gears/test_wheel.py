@@ -119,6 +119,13 @@ SHALLOW = [  # radius, width, c, phi, K, kc, kphi, n, slip, load; first rest, m
 ]  # fmt: skip
 
 
+def test_a_search_from_a_few_points_does_not_pass_the_first_of_several_depths():
+    radius, width, c, phi, K, kc, kphi, n, slip, load, first = np.transpose(SHALLOW)
+    ground = Soil(cohesion=c, friction_angle=phi, shear_modulus=K, kc=kc, kphi=kphi, n=n)
+    wheel = Model(Wheel(radius=radius, width=width, braking="slip-sign"))
+    assert wheel(ground, Operating(slip=slip, load=load)).sinkage == pytest.approx(first, rel=5e-4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", SHALLOW)
 def test_a_braking_wheel_rests_at_the_first_of_several_depths(case):

@@ -10,7 +10,9 @@ from soilml import Soil, soil, soil_catalogue
 from soilml.errors import InputError
 from soilml.parameters import check
 
-PRINTED = list(csv.DictReader((Path(__file__).parent / "soils_printed.csv").open()))
+PRINTED = list(
+    csv.DictReader(Path(__file__).with_name("soils_printed.csv").read_text().splitlines())
+)
 FACTOR = {"kPa": 1e3, "deg": math.pi / 180.0, "kN": 1e3, "1": 1.0, "mm": 1e-3, "rad": 1.0, "m": 1.0}
 
 

@@ -1,0 +1,300 @@
+"""Seeded sample of mutants of the rooms where numbers are made: `make mutation MUTANTS=12`.
+
+A mutant is the source with one operator, comparison, number or truth value changed. It is tried in
+a copy of the tree, by those quick tests of its room that call the changed function, shortest first
+(a constant of a module: the tests that call any function of the file). It is killed where a test
+fails, and survives where none does; survivors are written with their difference into
+`build/mutants.txt`. A time-out counts as killed. Some mutants change no result, as those of a
+tolerance, and survive rightly: the share that is killed is a lower bound.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import compileall
+import difflib
+import importlib
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from scipy.stats import binomtest
+
+ROOT = Path(__file__).parents[1]
+#: Source folders with the folders of their tests, and what belongs to another room.
+ROOMS = {
+    "physics": ("soilml/physics", "tests/soilml/physics", ""),
+    "identification": ("soilml/identification", "tests/soilml/identification", ""),
+    "fusion": ("soilml/onboard/fusion", "tests/soilml/onboard", ""),
+    "onboard": ("soilml/onboard", "tests/soilml/onboard", "soilml/onboard/fusion"),
+    "gap": ("soilml/gap", "tests/soilml/gap", ""),
+}
+QUICK = "not slow and not network and not long and not browser"
+#: Each operator with its replacement.
+OPERATORS = {
+    ast.Add: ("+", "-"),
+    ast.Sub: ("-", "+"),
+    ast.Mult: ("*", "/"),
+    ast.Div: ("/", "*"),
+    ast.Pow: ("**", "*"),
+    ast.And: ("and", "or"),
+    ast.Or: ("or", "and"),
+    ast.Lt: ("<", "<="),
+    ast.LtE: ("<=", "<"),
+    ast.Gt: (">", ">="),
+    ast.GtE: (">=", ">"),
+    ast.Eq: ("==", "!="),
+    ast.NotEq: ("!=", "=="),
+    ast.Is: ("is", "is not"),
+    ast.IsNot: ("is not", "is"),
+}
+#: Libraries that every process of tests shares; soilml is not among them.
+SHARED = ("numpy", "scipy.optimize", "scipy.stats", "hypothesis", "pyarrow.parquet", "onnxruntime")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change of bytes `begin` to `end` of a file, in the function that begins in line `scope`."""
+
+    path: str
+    begin: int
+    end: int
+    text: str
+    scope: int
+
+    def of(self, source: bytes) -> bytes:
+        """The changed source."""
+        return source[: self.begin] + self.text.encode() + source[self.end :]
+
+
+def mutants(path: str, source: bytes) -> Iterator[Mutant]:
+    """Every mutant of a file."""
+    starts = [0]
+    for line in source.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+
+    def span(node: ast.expr) -> tuple[int, int]:
+        assert node.end_lineno is not None and node.end_col_offset is not None
+        begin = starts[node.lineno - 1] + node.col_offset
+        return begin, starts[node.end_lineno - 1] + node.end_col_offset
+
+    def replaced(operator: ast.AST, left: ast.expr, right: ast.expr) -> Iterator[tuple[int, ...]]:
+        old, new = OPERATORS.get(type(operator), ("", ""))
+        begin = source.find(old.encode(), span(left)[1], span(right)[0]) if old else -1
+        if begin >= 0:
+            yield begin, begin + len(old), new
+
+    def changes(node: ast.AST) -> Iterator[tuple[int, int, str]]:
+        if isinstance(node, ast.BinOp):
+            yield from replaced(node.op, node.left, node.right)
+        elif isinstance(node, ast.BoolOp):
+            for left, right in zip(node.values, node.values[1:], strict=False):
+                yield from replaced(node.op, left, right)
+        elif isinstance(node, ast.Compare):
+            sides = [node.left, *node.comparators]
+            for operator, left, right in zip(node.ops, sides, sides[1:], strict=False):
+                yield from replaced(operator, left, right)
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub):
+            yield span(node)[0], span(node.operand)[0], ""
+        elif isinstance(node, ast.Constant) and type(node.value) is bool:
+            yield *span(node), str(not node.value)
+        elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            value = node.value + 1 if type(node.value) is int else 1.5 * node.value or 1.0
+            yield *span(node), repr(value)
+
+    def visit(node: ast.AST, scope: int) -> Iterator[Mutant]:
+        for begin, end, text in changes(node):
+            yield Mutant(path, begin, end, text, scope)
+        inner = scope
+        if isinstance(node, ast.FunctionDef):
+            inner = min([node.lineno, *(part.lineno for part in node.decorator_list)])
+        for name, field in ast.iter_fields(node):
+            for child in field if isinstance(field, list) else [field]:
+                if isinstance(child, ast.AST) and name not in ("annotation", "returns"):
+                    yield from visit(child, inner if name == "body" else scope)
+
+    yield from visit(ast.parse(source), 0)
+
+
+class Recorder:
+    """Which functions of soilml each test calls, as file and first line, and how long it takes."""
+
+    def __init__(self, tree: Path):
+        self.prefix, self.called = f"{tree}/soilml/", set[tuple[str, int]]()
+        self.tests: dict[str, tuple[float, list[tuple[str, int]]]] = {}
+
+    def call(self, frame, event, argument):  # type: ignore[no-untyped-def]
+        """Note a function that is called; bodies of modules and classes are none."""
+        code = frame.f_code
+        if code.co_flags & 1 and code.co_filename.startswith(self.prefix):
+            name = code.co_filename[len(self.prefix) - len("soilml/") :]
+            self.called.add((name, code.co_firstlineno))
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item):  # type: ignore[no-untyped-def]
+        """Functions of one test, with those of its fixtures."""
+        self.called, begun = set(), time.perf_counter()
+        sys.settrace(self.call)
+        try:
+            return (yield)
+        finally:
+            sys.settrace(None)
+            self.tests[item.nodeid] = time.perf_counter() - begun, sorted(self.called)
+
+
+class Selection:
+    """Runs the named tests, in their order."""
+
+    def __init__(self, names: list[str]):
+        self.place = {name: i for i, name in enumerate(names)}
+
+    def pytest_collection_modifyitems(self, items):  # type: ignore[no-untyped-def]
+        """Leave out the others."""
+        chosen = [item for item in items if item.nodeid in self.place]
+        items[:] = sorted(chosen, key=lambda item: self.place[item.nodeid])
+
+
+def tested(tree: Path, paths: list[str], plugin: Recorder | Selection, limit: float) -> int | None:
+    """Exit status of pytest in a process of its own; None where it took longer than `limit` s."""
+    child = os.fork()
+    if child == 0:
+        os.setsid()
+        os.chdir(tree)
+        out = os.open("mutation.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        resource.setrlimit(resource.RLIMIT_DATA, (8 << 30, 8 << 30))
+        words = ["-x", "-m", QUICK, "-p", "no:cacheprovider", "--hypothesis-seed=0", *paths]
+        status = int(pytest.main(words, plugins=[plugin]))
+        if isinstance(plugin, Recorder):
+            Path("mutation.json").write_text(json.dumps(plugin.tests))
+        sys.stdout.flush()
+        os._exit(status)
+    due = time.monotonic() + limit
+    try:
+        while time.monotonic() < due:
+            done, status = os.waitpid(child, os.WNOHANG)
+            if done:
+                return os.waitstatus_to_exitcode(status)
+            time.sleep(0.02)
+        return None
+    finally:
+        try:
+            os.killpg(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+        except (ProcessLookupError, ChildProcessError):
+            pass  # it had ended
+
+
+def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
+    """What became of one mutant: killed, survived, timed out."""
+    near = {
+        name: seconds
+        for name, (seconds, called) in tests.items()
+        if any(
+            path == mutant.path and (line == mutant.scope or not mutant.scope)
+            for path, line in called
+        )
+    }
+    if not near:
+        return "survived"
+    file, source = tree / mutant.path, (tree / mutant.path).read_bytes()
+    file.write_bytes(mutant.of(source))
+    for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
+        compiled.unlink()  # its time and size may be those of the mutant
+    try:
+        order = sorted(near, key=lambda name: near[name])
+        paths = sorted({name.partition("::")[0] for name in order})
+        status = tested(tree, paths, Selection(order), 30.0 + 5.0 * sum(near.values()))
+    finally:
+        file.write_bytes(source)
+    if status == int(pytest.ExitCode.USAGE_ERROR):
+        raise RuntimeError((tree / "mutation.log").read_text()[-2000:])
+    return "timed out" if status is None else "killed" if status else "survived"
+
+
+def difference(mutant: Mutant, source: bytes) -> str:
+    """The mutant as a unified difference."""
+    old, new = (text.decode().splitlines() for text in (source, mutant.of(source)))
+    return "\n".join(difflib.unified_diff(old, new, mutant.path, "", n=1, lineterm="")) + "\n\n"
+
+
+def run(room: str, count: int, seed: int, tree: Path, out: Path, counts: Counter[str]) -> None:
+    """Try a sample of the mutants of a room; count what became of them."""
+    folder, tests, other = ROOMS[room]
+    print(f"{room}: the tests without a mutant ...", file=sys.stderr, flush=True)
+    if tested(tree, [tests], Recorder(tree), 1200.0) != 0:
+        raise RuntimeError((tree / "mutation.log").read_text()[-2000:])
+    called = json.loads((tree / "mutation.json").read_text())
+    files = [str(path.relative_to(tree)) for path in sorted((tree / folder).rglob("*.py"))]
+    here = [name for name in files if not other or not name.startswith(f"{other}/")]
+    every = [mutant for name in here for mutant in mutants(name, (tree / name).read_bytes())]
+    counts[f"{room} all"] = len(every)
+    sample = random.Random(f"{seed} {room}").sample(every, min(count, len(every)))
+    for i, mutant in enumerate(sample):
+        became = answer(tree, mutant, called)
+        counts[f"{room} {became}"] += 1
+        source = (tree / mutant.path).read_bytes()
+        line = source[: mutant.begin].count(b"\n") + 1
+        old = source[mutant.begin : mutant.end].decode()
+        where = f"{mutant.path}:{line}: {old} -> {mutant.text or 'nothing'}"
+        print(f"{room} {i + 1}/{len(sample)} {became}: {where}", file=sys.stderr, flush=True)
+        if became == "survived":
+            with out.open("a") as survivors:
+                survivors.write(difference(mutant, source))
+
+
+def main() -> int:
+    """Print the table, after Ctrl-C as well."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--mutants", type=int, default=12, help="mutants of each room")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("rooms", nargs="*", metavar="ROOM", help=", ".join(ROOMS))
+    args = parser.parse_args()
+    rooms, counts, status = args.rooms or list(ROOMS), Counter[str](), 0
+    out = ROOT / "build" / "mutants.txt"
+    out.parent.mkdir(exist_ok=True)
+    out.write_text("")
+    with TemporaryDirectory() as name:
+        tree = Path(name).resolve() / "tree"
+        unused = shutil.ignore_patterns(".*", "build", "demo", "__pycache__")
+        shutil.copytree(ROOT, tree, ignore=unused, symlinks=True)
+        compileall.compile_dir(tree / "soilml", quiet=1)
+        sys.dont_write_bytecode = True
+        os.environ |= {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+        os.environ |= {"ORT_DISABLE_TELEMETRY": "1", "OMP_NUM_THREADS": "1"}
+        sys.path[:] = [str(tree), *(path for path in sys.path if path not in ("", str(ROOT)))]
+        for library in SHARED:
+            importlib.import_module(library)
+        try:
+            for room in rooms:
+                run(room, args.mutants, args.seed, tree, out, counts)
+        except KeyboardInterrupt:
+            status = 130
+    print("| room | mutants | tried | killed | timed out | survived | killed, 90 % interval |")
+    print("|---|---:|---:|---:|---:|---:|---:|")
+    for room in rooms:
+        killed, late, alive = (counts[f"{room} {x}"] for x in ("killed", "timed out", "survived"))
+        if tried := killed + late + alive:
+            low, high = binomtest(killed + late, tried).proportion_ci(0.9)
+            share = f"{100 * low:.0f} to {100 * high:.0f} %"
+            of = counts[f"{room} all"]
+            print(f"| {room} | {of} | {tried} | {killed} | {late} | {alive} | {share} |")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())
