@@ -180,7 +180,7 @@ def _each(values: Floats) -> str:
     return " / ".join(f"{value:.2f}" for value in values)
 
 
-def tables(file: Path) -> str:
+def tables(file: Path = ROOT / "exported" / "wheel.onnx") -> str:
     """All tables of a model file."""
     estimator = Estimator.load(file)
     parts = [
@@ -202,4 +202,4 @@ def tables(file: Path) -> str:
 
 
 if __name__ == "__main__":
-    print(tables(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "exported" / "wheel.onnx"))
+    print(tables(*map(Path, sys.argv[1:2])))

@@ -131,13 +131,7 @@ PARTS = (
         "has about 3.3. Last table: the two answers of `identify --method posterior`, without and "
         f"with usual errors of sensors and model, to {wrong_worlds_identified.SETS} sets that were "
         "made in the same way.",
-        lambda folder: "\n\n".join(
-            [
-                model_errors.tables(ROOT / "exported" / "wheel.onnx"),
-                "### Posterior of the full model",
-                wrong_worlds_identified.table(),
-            ]
-        ),
+        lambda folder: f"{model_errors.tables()}\n\n{wrong_worlds_identified.section()}",
     ),
     Part(
         "rules",

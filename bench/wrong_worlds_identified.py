@@ -61,5 +61,10 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def section() -> str:
+    """The table with its heading."""
+    return f"### Posterior of the full model\n\n{table()}"
+
+
 if __name__ == "__main__":
     print(table())
