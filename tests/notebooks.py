@@ -1,7 +1,9 @@
 """Text notebooks (MyST Markdown with code cells), run without Jupyter."""
 
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 CELL = re.compile(r"```\{code-cell\} python\n(?::tags:[^\n]*\n+)?(.*?)```", re.DOTALL)
@@ -21,8 +23,11 @@ def commands(page: Path) -> list[str]:
 def run(page: Path) -> dict:
     """Run the cells of a page in the working folder; the names that they leave."""
 
+    own = Path(sys.executable).parent
+    path = {**os.environ, "PATH": f"{own}{os.pathsep}{os.environ['PATH']}"}
+
     def shell(line: str) -> None:
-        subprocess.run(line, shell=True, check=False)
+        subprocess.run(line, shell=True, check=True, env=path)
 
     names: dict = {"__name__": "documented", "shell": shell}
     for cell in cells(page):
