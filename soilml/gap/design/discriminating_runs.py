@@ -17,7 +17,12 @@ from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.coordinates import EffectCoordinate, linearise, predict_readings
+from soilml.gap.statistics.batched_predictions import (
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
+from soilml.gap.statistics.coordinates import EffectCoordinate
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.verdict.cross_validation import covariance_at
 from soilml.physics.effects.base import Effect
@@ -56,8 +61,7 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
     effects = [
         problem.effects[name] for name in _effects_of(fits.values()) if name in problem.effects
     ]
-    whiten = problem.covariance.whiten
-    present = [_difference(first, rival, problem.readings, whiten) for rival in rivals]
+    present = _differences(fits, problem.readings, problem.covariance.whiten)
     proposals: list[NextRun] = []
     for option in run_options(problem.readings, first.fitted(), effects):
         changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
@@ -67,18 +71,15 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
             if _is_plain_repeat(option, readings, changed):
                 continue
             whiten = covariance_at(problem, one, readings).whiten
+            new = _differences(changed, readings, whiten)
             sigmas = [
-                _discrimination(
-                    rival,
-                    old,
-                    _all_columns(rival, _difference(one, other, readings, whiten), other),
-                )
-                for rival, other, old in zip(rivals, others, present, strict=True)
+                _discrimination(rival, old, _all_columns(rival, added, other))
+                for rival, other, old, added in zip(rivals, others, present, new, strict=True)
             ]
+            rows = _rows(readings, changed, option)
         except (InputError, np.linalg.LinAlgError):
             continue
         if np.isfinite(sigmas).all():
-            rows = _rows(readings, changed, option)
             proposals.append(NextRun(option.kind, option.text, _mean_capped(sigmas), rows))
     proposals += _static_proposals(fits, present, effects)
     useful = [
@@ -117,15 +118,28 @@ def _is_plain_repeat(
     """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
     if option.plain is None:
         return False
-    for fit in fits.values():
-        plain = replace(readings, at=with_default_covariates(option.plain, fit.case))
-        new = replace(readings, at=with_default_covariates(option.at, fit.case))
-        y, usual = (
-            predict_readings(fit.case, fit.coordinates, fit.x[None, :], r)[0] for r in (new, plain)
+    requests = [
+        PredictionRequest(
+            fit.case,
+            fit.coordinates,
+            fit.x[None, :],
+            replace(readings, at=with_default_covariates(at, fit.case)),
         )
-        if np.any(np.abs(y - usual) > SAME_PREDICTION * readings.std):
-            return False
-    return True
+        for at in (option.at, option.plain)
+        for fit in fits.values()
+    ]
+    y = np.split(_predicted(requests), 2)
+    return not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
+
+
+def _predicted(requests: Sequence[PredictionRequest]) -> Floats:
+    """Predictions (requests, m) of fits for the same readings."""
+    predictions = []
+    for found in predict_many(requests):
+        if isinstance(found, InputError):
+            raise found
+        predictions.append(found)
+    return np.concatenate(predictions)
 
 
 def _without_equal_rows(runs: Sequence[NextRun]) -> list[NextRun]:
@@ -188,12 +202,21 @@ def _mean_capped(sigmas: Sequence[float]) -> float:
     return float(np.mean([min(sigma, MAX_DISCRIMINATION) for sigma in sigmas]))
 
 
-def _difference(
-    first: GapFit, rival: GapFit, readings: StackedReadings, whiten: Floats
-) -> Difference:
-    expected = predict_readings(first.case, first.coordinates, first.x[None, :], readings)[0]
-    rival_expected, jacobian = linearise(rival.case, rival.coordinates, rival.x, readings)
-    return whiten @ (expected - rival_expected), whiten @ jacobian
+def _differences(
+    fits: Mapping[str, GapFit], readings: StackedReadings, whiten: Floats
+) -> list[Difference]:
+    """How the first explanation differs from each of the others on some rows."""
+    requests = [
+        PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
+        for fit in fits.values()
+    ]
+    expected = _predicted(requests[:1])[0]
+    differences = []
+    for rival in linearise_many(requests[1:]):
+        if isinstance(rival, InputError):
+            raise rival
+        differences.append((whiten @ (expected - rival.prediction), whiten @ rival.jacobian))
+    return differences
 
 
 def _discrimination(rival: GapFit, present: Difference, new: Difference) -> float:
@@ -237,8 +260,13 @@ def _rows(
             columns[key] = np.broadcast_to(getattr(readings.at, field), (rows,))
     for key, size in (option.gear.columns() if option.gear else {}).items():
         columns[key] = np.full(rows, size)
-    for name, fit in fits.items():
-        y = predict_readings(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
+    predicted = _predicted(
+        [
+            PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
+            for fit in fits.values()
+        ]
+    )
+    for name, y in zip(fits, predicted, strict=True):
         for i, channel in enumerate(readings.channels):
             columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
     found: list[dict[str, float | str]] = []

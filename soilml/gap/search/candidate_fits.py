@@ -71,24 +71,32 @@ class CandidateFit:
         return float(np.sum(x[shapes] ** 2 * precision[shapes]))
 
 
-def fit_candidates(
-    problem: FitProblem,
-    requests: Sequence[tuple[tuple[str, ...], Mapping[str, float], Floats]],
-    noise_start: Mapping[str, float] | None = None,
-) -> list[CandidateFit]:
+@dataclass(frozen=True)
+class CandidateRequest:
+    """A set of effects to be fitted.
+
+    `start` holds coordinates by path, and `amplitude` those of the discrepancy by channel, to start
+    with. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
+    """
+
+    names: tuple[str, ...]
+    start: Mapping[str, float]
+    amplitude: Floats
+    noise_start: Mapping[str, float] | None = None
+
+
+def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[CandidateFit]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
-    A request has the names of the effects, start coordinates by path, and the amplitudes of the
-    discrepancy by channel to start with. With `noise_start`, start coordinates of the soil, each
-    set is also fitted under noise alone first, and from there beside a discrepancy: beside a
-    large one, a fit can stay where the effect is not needed. Sets that the model refuses are left
-    out.
+    With `noise_start`, a set is also fitted under noise alone first, and from there beside a
+    discrepancy: beside a large one, a fit can stay where the effect is not needed. Sets that the
+    model refuses are left out.
     """
-    starts = [_started(problem, names, start) for names, start, _ in requests]
-    found = fit_marginal(problem, [(s, a) for s, (_, _, a) in zip(starts, requests, strict=True)])
+    starts = [_started(problem, r.names, r.start) for r in requests]
+    found = fit_marginal(problem, [(s, r.amplitude) for s, r in zip(starts, requests, strict=True)])
     alone: list[GapFit | None] = [None] * len(requests)
-    if noise_start is not None:
-        from_soil = [_started(problem, names, noise_start) for names, _, _ in requests]
+    if all(r.noise_start is not None for r in requests):
+        from_soil = [_started(problem, r.names, r.noise_start or {}) for r in requests]
         fits = fit_many(problem, from_soil)
         alone = [None if isinstance(fit, InputError) else fit for fit in fits]
         none = np.zeros(len(problem.readings.channels))
@@ -96,10 +104,12 @@ def fit_candidates(
             (replace(s, start=fit.start_values() if fit else s.start), none)
             for s, fit in zip(from_soil, alone, strict=True)
         ]
-        found = [_better(a, b) for a, b in zip(found, fit_marginal(problem, again), strict=True)]
+        lowest = min((one.evidence.value for one in found if one), default=np.inf)
+        beside = fit_marginal(problem, again, lowest)
+        found = [_better(a, b) for a, b in zip(found, beside, strict=True)]
     return [
-        CandidateFit(names, fit, fit, plain)
-        for (names, _, _), fit, plain in zip(requests, found, alone, strict=True)
+        CandidateFit(request.names, fit, fit, plain)
+        for request, fit, plain in zip(requests, found, alone, strict=True)
         if fit is not None
     ]
 
@@ -130,7 +140,8 @@ def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[
             started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))
             index.append(i)
     free: dict[int, MarginalFit | None] = {}
-    for i, marginal in zip(index, fit_marginal(problem, started), strict=True):
+    lowest = min((c.best.evidence.value for c in candidates), default=np.inf)
+    for i, marginal in zip(index, fit_marginal(problem, started, lowest), strict=True):
         free[i] = _better(free.get(i), marginal)
     fitted = list(candidates)
     for i, best in free.items():

@@ -21,6 +21,9 @@ MAX_ROUNDS = 3
 #: Change of an amplitude, in usual ones and relative to itself, below which a fit is final: the
 #: weights of the readings then hardly change.
 AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
+#: Evidence, in -2 ln p above the best, beyond which a fit is not repeated: repetition lowers it by
+#: 35 at most, by less than 10 for most fits.
+HOPELESS = 40.0
 
 
 @dataclass(frozen=True)
@@ -32,12 +35,15 @@ class MarginalFit:
 
 
 def fit_marginal(
-    problem: FitProblem, requests: Sequence[tuple[StartedFit, Floats]]
+    problem: FitProblem,
+    requests: Sequence[tuple[StartedFit, Floats]],
+    lowest: float = float("inf"),
 ) -> list[MarginalFit | None]:
     """Fits and their evidence; None where the model refuses the fit.
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
-    are repeated in turn until the amplitudes hardly change.
+    are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
+    above the lowest of them, and `lowest`, that of an earlier fit.
     """
     found: list[MarginalFit | None] = [None] * len(requests)
     waiting = dict(enumerate(requests))
@@ -55,9 +61,20 @@ def fit_marginal(
             if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
                 continue
             found[i] = MarginalFit(fit, evidence)
+            lowest = min(lowest, evidence.value)
             if _changed(amplitude, evidence.amplitude):
-                again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)
-        waiting = again
+                again[i] = (
+                    evidence,
+                    (
+                        replace(request, start=fit.start_values()),
+                        evidence.amplitude,
+                    ),
+                )
+        waiting = {
+            i: request
+            for i, (evidence, request) in again.items()
+            if evidence.value < lowest + HOPELESS
+        }
         if not waiting:
             break
     return found

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.gap.search.candidate_fits import (
     CandidateFit,
+    CandidateRequest,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
@@ -191,14 +192,19 @@ def _fit_level(
 
     Beside a large discrepancy, single effects are fitted under noise alone first.
     """
+    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    single = all(not base.names for base in sets.values())
     requests = []
     for names, base in sets.items():
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, none.amplitude)
-        requests.append((names, base.catalogue_law.fit.start_values(), smaller))
-    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
-    single = all(not base.names for base in sets.values())
-    fitted = fit_candidates(problem, requests, _off_bounds(soil) if hidden and single else None)
+        noise_start = None
+        if hidden and single:
+            alone = base.noise_only
+            noise_start = _off_bounds(soil) if alone is None else alone.start_values()
+        start = base.catalogue_law.fit.start_values()
+        requests.append(CandidateRequest(names, start, smaller, noise_start))
+    fitted = fit_candidates(problem, requests)
     if not fitted:
         return []
     lowest = min(none.objective, *(c.objective for c in fitted))

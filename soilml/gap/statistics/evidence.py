@@ -8,17 +8,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES
 from soilml.gap.statistics.coordinates import EffectCoordinate, FitCoordinate
 from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
 from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.statistics.linearised_fit import LinearisedFit, ProcessDivisions
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.numerics.prior import UNIFORM_PRECISION
 
 Floats = NDArray[np.float64]
 
-#: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
-#: about 1.6, which change the evidence by less than 1 near its maximum.
-AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
 #: Precision of the size of an effect whose prior is added afterwards, in reference sizes: so weak
 #: that it does not shrink the size, and strong enough for an effect without influence.
 WEAK_PRECISION = 0.1
@@ -28,11 +27,6 @@ SMALLEST_SIZE, LARGEST_SIZE = 0.01, 5.0
 #: at their maximum and estimated covariances overstate it. With it, the stated probabilities of
 #: 300 sets of `datagen.blind_sets` (seed 7, not the published benchmark's) met the frequencies.
 TEMPERING = 0.5
-#: Prior probability that a channel has no discrepancy at all.
-NO_DISCREPANCY = 0.5
-#: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and
-#: the scale of its amplitude, in usual ones: 20 % of a range.
-UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0
 #: Decrease of -2 ln p by a sweep below which the search for amplitudes ends.
 ENOUGH = 0.1
 #: Sweeps over the channels; the amplitudes of different channels depend little on each other.
@@ -73,8 +67,8 @@ class DiscrepancyModel:
         return np.linalg.qr(self.columns)
 
     @cached_property
-    def _gram(self) -> Floats:
-        return np.asarray(self.columns.T @ self.columns)
+    def _divisions(self) -> ProcessDivisions:
+        return ProcessDivisions(np.asarray(self.columns.T @ self.columns), self.process.channel)
 
     def whiten(self, amplitude: Floats) -> Floats:
         r"""Matrix (m, m) that whitens noise, scatter and a discrepancy of these amplitudes.
@@ -126,9 +120,9 @@ class DiscrepancyModel:
         for _ in range(SWEEPS):
             before = value
             for i in range(len(amplitude)):
-                trials, values = problem.along(amplitude, i)
+                values = problem.along(amplitude, i)
                 best = int(np.argmin(values))
-                value, amplitude = float(values[best]), trials[best]
+                value, amplitude[i] = float(values[best]), AMPLITUDES[best]
             if before - value < ENOUGH:
                 break
         expected = amplitude if extra is not None else _expected_amplitude(problem, amplitude)
@@ -139,55 +133,7 @@ class DiscrepancyModel:
         return Evidence(value, amplitude, step, expected)
 
 
-@dataclass(frozen=True)
-class _Linearised:
-    """A fit's neighbourhood as a linear model, reduced to products with the process."""
-
-    gram: Floats  # (q, q) of the process
-    cross: Floats  # (q, p + 1) of the process with Jacobian and residual
-    plain: Floats  # (p + 1, p + 1) of Jacobian and residual
-    precision: Floats  # (p,)
-    pull: Floats  # (p,) half the derivative of -2 ln prior density
-    movable: NDArray[np.bool_]  # (p,) not at a bound
-    constant: float  # -2 ln prior density of the coordinates
-    channel: NDArray[np.int64]  # (q,)
-
-    def values(self, amplitudes: Floats) -> Floats:
-        """Evidence (b,) at amplitudes (b, channels)."""
-        return self._solve(amplitudes)[0]
-
-    def along(self, amplitude: Floats, channel: int) -> tuple[Floats, Floats]:
-        """Amplitudes (b, channels) with each of `AMPLITUDES` in one channel, and evidence (b,)."""
-        trials = np.tile(amplitude, (len(AMPLITUDES), 1))
-        trials[:, channel] = AMPLITUDES
-        return trials, self.values(trials)
-
-    def step_and_precision(self, amplitude: Floats) -> tuple[Floats, Floats]:
-        """Step (p,) to the optimum at amplitudes (channels,), and marginal precisions (p,)."""
-        _, step, h = self._solve(amplitude[None, :])
-        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
-
-    def _solve(self, amplitudes: Floats) -> tuple[Floats, Floats, Floats]:
-        """Evidence (b,), steps (b, p) and curvature (b, p, p)."""
-        t = amplitudes[:, self.channel]  # (b, q)
-        m = np.eye(len(self.channel)) + t[:, :, None] * self.gram * t[:, None, :]
-        factor = np.linalg.cholesky(m)
-        reduced = np.linalg.solve(factor, t[:, :, None] * self.cross)
-        product = self.plain - np.swapaxes(reduced, 1, 2) @ reduced  # (b, p + 1, p + 1)
-        p = len(self.pull)
-        h = product[:, :p, :p] + np.diag(self.precision)
-        gradient = np.where(self.movable, product[:, :p, p] - self.pull, 0.0)
-        both = self.movable[:, None] & self.movable
-        inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
-        step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient
-        value = product[:, p, p] - (gradient * step).sum(axis=1)
-        value += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-        if p:
-            value += np.linalg.slogdet(h)[1]
-        return value + self.constant + amplitude_penalty(amplitudes), step, h
-
-
-def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _Linearised:
+def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> LinearisedFit:
     whiten = model.covariance.whiten
     added = np.zeros((len(fit.reading), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
@@ -198,23 +144,22 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> _
     lower = np.asarray([c.lower for c in fit.coordinates])
     upper = np.asarray([c.upper for c in fit.coordinates])
     movable = (fit.x > lower) & (fit.x < upper)
-    return _Linearised(
-        gram=model._gram,
+    return LinearisedFit(
+        divisions=model._divisions,
         cross=model.columns.T @ block,
         plain=block.T @ block,
         precision=np.concatenate([precision, np.full(k, WEAK_PRECISION)]),
         pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]),
         movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
         constant=sum(constant for _, _, constant in priors),
-        channel=model.process.channel,
     )
 
 
-def _expected_amplitude(problem: _Linearised, amplitude: Floats) -> Floats:
+def _expected_amplitude(problem: LinearisedFit, amplitude: Floats) -> Floats:
     """Root mean square of each amplitude over its probability, others at their optimum."""
     found = amplitude.copy()
     for i in range(len(amplitude)):
-        _, values = problem.along(amplitude, i)
+        values = problem.along(amplitude, i)
         weight = np.exp(-0.5 * TEMPERING * (values - values.min()))
         found[i] = np.sqrt(np.sum(weight * AMPLITUDES**2) / np.sum(weight))
     return found
@@ -243,28 +188,3 @@ def _size_prior(x: float, *, two_sided: bool) -> tuple[float, float, float]:
     span = float(np.log1p(LARGEST_SIZE / SMALLEST_SIZE)) * (2.0 if two_sided else 1.0)
     value = 2.0 * float(np.log(span * shifted)) - float(np.log(2.0 * np.pi))
     return shifted**-2, float(np.sign(x)) / shifted, value
-
-
-def _amplitude_masses() -> Floats:
-    """Prior probability of each of `AMPLITUDES`.
-
-    With probability `NO_DISCREPANCY` a channel has none. Otherwise its amplitude is exponentially
-    distributed with a mean of one usual amplitude, or, with probability `UNKNOWN_CAUSE`, that of a
-    cause which the catalogue lacks: half-Cauchy with the scale `UNKNOWN_SCALE`, whose heavy tail
-    does not reward effects that explain a part of it (Gelman, Bayesian Analysis 1(3), 2006).
-    """
-    positive = AMPLITUDES[1:]
-    edges = np.concatenate([[0.0], np.sqrt(positive[1:] * positive[:-1]), [np.inf]])
-    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
-    cumulative = (1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown
-    return np.concatenate([[NO_DISCREPANCY], (1.0 - NO_DISCREPANCY) * np.diff(cumulative)])
-
-
-#: -2 ln of the prior probability of each of `AMPLITUDES`.
-_AMPLITUDE_PENALTY = -2.0 * np.log(_amplitude_masses())
-
-
-def amplitude_penalty(amplitudes: Floats) -> Floats:
-    """-2 ln prior probability of amplitudes (b, channels) out of `AMPLITUDES`, by set, (b,)."""
-    nearest = np.abs(amplitudes[..., None] - AMPLITUDES).argmin(axis=-1)
-    return np.asarray(_AMPLITUDE_PENALTY[nearest].sum(axis=-1))

@@ -19,6 +19,7 @@ from soilml.gap.statistics.batched_predictions import (
     predict_many,
 )
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
+from soilml.gap.statistics.damped_steps import DampedSteps
 from soilml.gap.statistics.readings_by_gear import readings_by_gear
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.coarse_search import SinkageEstimate
@@ -36,7 +37,7 @@ INFEASIBLE_RESIDUAL = 1e2
 ENOUGH, SHARE = 0.01, 2e-3
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
-FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.01, 1.0, 100.0), 1e3
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 
 
@@ -209,58 +210,63 @@ class _Iterate:
 def _descent(request: FitRequest) -> _Descent:
     """One descent; see `descend_together`.
 
-    Trials start at the sinkage that the last iterate predicts. An iterate is solved by the full
-    search; it is no improvement where that finds an equilibrium before the one of the trial.
+    Each damping is tried by a step and by a second step with the same Jacobian, which follows a
+    curved valley. Trials start at the sinkage that the last iterate predicts. An iterate is solved
+    by the full search; it is no improvement where that finds an equilibrium before the one of the
+    trial.
     """
     coordinates, readings = tuple(request.coordinates), request.readings
-    lower = np.asarray([c.lower for c in coordinates])
-    upper = np.asarray([c.upper for c in coordinates])
-    weight = np.asarray([1.0 / c.std for c in coordinates])
+    steps = DampedSteps.of(coordinates)
     gears = readings_by_gear(request.case, coordinates, readings)
 
     def whitened_residual(y: Floats) -> Floats:
         white = (readings.reading - y) @ request.whiten.T
         return np.where(np.isfinite(white), white, INFEASIBLE_RESIDUAL)
 
-    def objectives(residual: Floats, x: Floats) -> Floats:
-        return np.asarray((residual**2).sum(axis=-1) + ((x * weight) ** 2).sum(axis=-1))
-
     def asked(x: Floats, sinkage: SinkageEstimate | None) -> PredictionRequest:
         return PredictionRequest(request.case, coordinates, x, readings, sinkage, gears)
+
+    def trial(last: _Iterate, x: Floats) -> _Question:
+        sinkage = replace(last.model.sinkage_at(x - last.x), nearest=True)
+        return _Question(asked(x, sinkage), linearise=False)
 
     def iterate(x: Floats, model: Linearisation) -> _Iterate:
         residual = whitened_residual(model.prediction)
         jacobian = request.whiten @ np.nan_to_num(model.jacobian)
-        return _Iterate(x, model, residual, jacobian, float(objectives(residual, x)))
+        return _Iterate(x, model, residual, jacobian, float(steps.objective(residual, x)))
 
-    x = np.clip(request.start, lower, upper)
+    x = steps.within(request.start)
     last = iterate(x, (yield _Question(asked(x[None, :], None), linearise=True)))
     damping, converged = FIRST_DAMPING, False
     for _ in range(MAX_ITERATIONS):
-        dampings = damping * np.asarray(DAMPING_FACTORS)
-        trials = _trial_points(last, lower, upper, weight, dampings)
-        if trials is None:
+        if steps.are_held(last.x, last.residual, last.jacobian):
             converged = True
             break
-        sinkage = replace(last.model.sinkage_at(trials - last.x), nearest=True)
-        predictions = yield _Question(asked(trials, sinkage), linearise=False)
-        trial_objectives = objectives(whitened_residual(predictions), trials)
-        best = int(np.argmin(trial_objectives))
-        improvement = last.objective - float(trial_objectives[best])
+        dampings = damping * np.asarray(DAMPING_FACTORS)
+        here = np.tile(last.x, (len(dampings), 1))
+        residual = np.tile(last.residual, (len(dampings), 1))
+        trials, objectives = [], []
+        for _ in range(2):
+            here = steps.from_points(here, residual, last.jacobian, dampings)
+            residual = whitened_residual((yield trial(last, here)))
+            trials.append(here)
+            objectives.append(steps.objective(residual, here))
+        best = int(np.argmin(objectives))
+        improvement = last.objective - float(np.ravel(objectives)[best])
         if improvement > 0.0:
-            x = trials[best]
+            x = np.concatenate(trials)[best]
             sinkage = last.model.sinkage_at((x - last.x)[None, :])
             new = iterate(x, (yield _Question(asked(x[None, :], sinkage), linearise=True)))
             improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
-            converged = float(np.abs(trials[-1] - last.x).max()) < 1e-3
+            converged = float(np.abs(trials[0][-1] - last.x).max()) < 1e-3
             damping *= DAMPING_INCREASE
             if converged or damping > MAX_DAMPING:
                 break
             continue
         last = new
-        damping = max(float(dampings[best]), MIN_DAMPING)
+        damping = max(float(dampings[best % len(dampings)]), MIN_DAMPING)
         if improvement < max(ENOUGH, SHARE * (last.objective - len(readings))):
             converged = True
             break
@@ -276,22 +282,3 @@ def _descent(request: FitRequest) -> _Descent:
         readings.reading,
         np.nan_to_num(last.model.jacobian),
     )
-
-
-def _trial_points(
-    last: _Iterate, lower: Floats, upper: Floats, weight: Floats, dampings: Floats
-) -> Floats | None:
-    """Where steps of each damping lead, (dampings, p); None where every bound holds the descent."""
-    descent = last.jacobian.T @ last.residual - weight**2 * last.x  # half the negative gradient
-    at_lower, at_upper = (last.x <= lower) & (descent < 0), (last.x >= upper) & (descent > 0)
-    free = ~(at_lower | at_upper)
-    if not free.any():
-        return None
-    jacobian = last.jacobian[:, free]
-    normal = jacobian.T @ jacobian + np.diag(weight[free] ** 2)
-    scale = np.diag(np.diag(normal) + 1e-9)
-    trials = np.tile(last.x, (len(dampings), 1))
-    trials[:, free] += np.linalg.solve(
-        normal + dampings[:, None, None] * scale, descent[free][:, None]
-    )[..., 0]
-    return np.clip(trials, lower, upper)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,21 @@ from soilml.gap.statistics.reml_covariance import (
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FOLDS = 4
 #: Fraction of the readings, those of highest load or of highest slip, in the held-out region.
 REGION_FRACTION = 0.3
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Readings in folds, of which some are predicted from all readings outside them."""
+
+    description: str
+    fold: NDArray[np.int64]  # (m,)
+    predicted: NDArray[np.int64]
 
 
 def gap_reduction(
@@ -51,36 +60,36 @@ def gap_reduction(
     return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
 
 
-def held_out_runs(
+def held_out(
     problem: FitProblem, soil: MarginalFit, after: MarginalFit, seed: int
-) -> GapReduction | None:
-    """Cross-validation by runs; None where there are fewer than three runs."""
-    runs = len(problem.readings.runs)
+) -> dict[str, GapReduction]:
+    """Cross-validation by runs, and extrapolation to the highest loads.
+
+    Runs are predicted by fits to the others, where there are at least three; the highest loads, or
+    the highest slips where the load hardly varies, from the rest, where at least three loads or
+    three slips were measured.
+    """
+    known = {}
+    if (runs := _run_folds(problem.readings, seed)) is not None:
+        known["held_out_runs"] = runs
+    if (region := held_out_region(problem.readings)) is not None:
+        name, out = region
+        description = f"{name}, predicted from the rest"
+        known["held_out_region"] = Folds(description, out.astype(np.int64), np.asarray([1]))
+    return dict(zip(known, _cross_validate(problem, soil, after, [*known.values()]), strict=True))
+
+
+def _run_folds(readings: StackedReadings, seed: int) -> Folds | None:
+    """The runs in at most `FOLDS` folds at random; None where there are fewer than three."""
+    runs = len(readings.runs)
     if runs < 3:
         return None
     fold_of_run = np.random.default_rng(seed).permutation(runs) % min(FOLDS, runs)
-    fold = fold_of_run[problem.readings.run[problem.readings.row]]
-    description = "every run predicted by fits to the others"
-    return _cross_validate(problem, soil, after, fold, np.unique(fold), description)
+    fold = fold_of_run[readings.run[readings.row]]
+    return Folds("every run predicted by fits to the others", fold, np.unique(fold))
 
 
-def held_out_region(
-    problem: FitProblem, soil: MarginalFit, after: MarginalFit
-) -> GapReduction | None:
-    """Extrapolation to the highest loads, or to the highest slips where the load hardly varies.
-
-    None where fewer than three loads and fewer than three slips were measured.
-    """
-    chosen = region_fold(problem.readings)
-    if chosen is None:
-        return None
-    name, out = chosen
-    description = f"{name}, predicted from the rest"
-    fold = out.astype(np.int64)
-    return _cross_validate(problem, soil, after, fold, np.asarray([1]), description)
-
-
-def region_fold(readings: StackedReadings) -> tuple[str, Mask] | None:
+def held_out_region(readings: StackedReadings) -> tuple[str, NDArray[np.bool_]] | None:
     """The region of the highest loads, or of the highest slips where the load hardly varies.
 
     Its name and its readings (m,); None where fewer than three loads and fewer than three slips
@@ -98,51 +107,52 @@ def region_fold(readings: StackedReadings) -> tuple[str, Mask] | None:
 
 
 def _cross_validate(
-    problem: FitProblem,
-    soil: MarginalFit,
-    after: MarginalFit,
-    fold: NDArray[np.int64],
-    predicted_folds: NDArray[np.int64],
-    description: str,
-) -> GapReduction | None:
+    problem: FitProblem, soil: MarginalFit, after: MarginalFit, all_folds: Sequence[Folds]
+) -> list[GapReduction]:
     """Predict each fold by refits of both models to all readings outside it."""
-    readings = problem.readings
-    before = _predict_folds(problem, soil, fold, predicted_folds)
-    new = before if after is soil else _predict_folds(problem, after, fold, predicted_folds)
-    selected = np.isin(fold, predicted_folds)
-    return gap_reduction(
-        readings.subset(selected),
-        problem.covariance.std[selected],
-        before[selected],
-        new[selected],
-        description,
-    )
+    models = [soil] if after is soil else [soil, after]
+    predicted = iter(_predict_folds(problem, [(m, d) for d in all_folds for m in models]))
+    reductions = []
+    for folds in all_folds:
+        before = next(predicted)
+        new = before if after is soil else next(predicted)
+        selected = np.isin(folds.fold, folds.predicted)
+        reductions.append(
+            gap_reduction(
+                problem.readings.subset(selected),
+                problem.covariance.std[selected],
+                before[selected],
+                new[selected],
+                folds.description,
+            )
+        )
+    return reductions
 
 
 def _predict_folds(
-    problem: FitProblem,
-    marginal: MarginalFit,
-    fold: NDArray[np.int64],
-    predicted_folds: NDArray[np.int64],
-) -> Floats:
-    """Prediction of each fold by the same model, refitted to all other readings, (m,).
+    problem: FitProblem, wanted: Sequence[tuple[MarginalFit, Folds]]
+) -> list[Floats]:
+    """Predictions (m,) of each fold by the same model, refitted to all other readings.
 
     The fits are made beside the same discrepancy, from its optimum. Readings of a fold without a
     fit, and those of other folds, are NaN.
     """
-    fit, readings = marginal.fit, problem.readings
-    matrix = problem.discrepancy.matrix(marginal.evidence.amplitude)
-    requests = []
-    for number in predicted_folds:
-        rest = fold != number
-        whiten = np.linalg.inv(np.linalg.cholesky(matrix[np.ix_(rest, rest)]))
-        requests.append(FitRequest(fit.case, fit.coordinates, readings.subset(rest), whiten, fit.x))
-    predicted = np.full(len(readings), np.nan)
-    for number, again in zip(predicted_folds, descend_together(requests), strict=True):
+    readings = problem.readings
+    requests, where = [], []
+    for i, (marginal, folds) in enumerate(wanted):
+        fit, matrix = marginal.fit, problem.discrepancy.matrix(marginal.evidence.amplitude)
+        for number in folds.predicted:
+            rest = folds.fold != number
+            whiten = np.linalg.inv(np.linalg.cholesky(matrix[np.ix_(rest, rest)]))
+            kept = readings.subset(rest)
+            requests.append(FitRequest(fit.case, fit.coordinates, kept, whiten, fit.x))
+            where.append((i, ~rest))
+    predicted = [np.full(len(readings), np.nan) for _ in wanted]
+    for (i, out), again in zip(where, descend_together(requests), strict=True):
         if isinstance(again, InputError):
             continue
         y = predict_readings(again.case, again.coordinates, again.x[None, :], readings)[0]
-        predicted[fold == number] = y[fold == number]
+        predicted[i][out] = y[out]
     return predicted
 
 

@@ -15,7 +15,7 @@ from soilml.gap.statistics.reml_covariance import (
     run_effect_columns,
 )
 from soilml.gap.statistics.repeats import repeat_disagreement
-from soilml.gap.verdict.cross_validation import region_fold
+from soilml.gap.verdict.cross_validation import held_out_region
 from soilml.quantities import column
 from soilml.report.numbers import decimal
 
@@ -84,7 +84,7 @@ def _region(problem: FitProblem, soil: GapFit) -> list[str]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
     from scipy.special import chdtrc
 
-    chosen = region_fold(problem.readings)
+    chosen = held_out_region(problem.readings)
     if chosen is None:
         return []
     name, out = chosen

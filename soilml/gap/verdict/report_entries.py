@@ -16,12 +16,13 @@ from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.iteration import Analysis
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import REJECTION_THRESHOLD
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES
 from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
-from soilml.gap.statistics.evidence import AMPLITUDES, Evidence
+from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.gap.statistics.repeats import overstated_noise_notes
-from soilml.gap.verdict.cross_validation import gap_reduction, held_out_region, held_out_runs
+from soilml.gap.verdict.cross_validation import gap_reduction, held_out
 from soilml.quantities import column
 
 #: Outliers that a note lists by name.
@@ -43,15 +44,9 @@ def gap_reductions(
     """
     problem = analysis.problem
     std = problem.covariance.std
-    description = "all rows fitted"
-    figures = {
-        "train": gap_reduction(
-            problem.readings, std, soil.fit.prediction, after.fit.prediction, description
-        ),
-        "held_out_runs": held_out_runs(problem, soil, after, seed),
-        "held_out_region": held_out_region(problem, soil, after),
-    }
-    return {name: entry for name, entry in figures.items() if entry is not None}
+    before, new = soil.fit.prediction, after.fit.prediction
+    fitted = gap_reduction(problem.readings, std, before, new, "all rows fitted")
+    return {"train": fitted, **held_out(problem, soil, after, seed)}
 
 
 def soil_marginal(analysis: Analysis) -> MarginalFit:

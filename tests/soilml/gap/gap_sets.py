@@ -13,7 +13,7 @@ from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
 from soilml.gap import gap
 from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.search.candidate_fits import fit_candidates
+from soilml.gap.search.candidate_fits import CandidateRequest, fit_candidates
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.coordinates import soil_coordinate
 from soilml.gap.statistics.reml_covariance import (
@@ -83,7 +83,7 @@ def fit_problem(case, table, run_effects=(0.0, 0.0)) -> FitProblem:
 def candidate(problem, names, start):
     """Effects fitted by their catalogue laws beside a discrepancy, from start coordinates."""
     none = np.zeros(len(problem.readings.channels))
-    (found,) = fit_candidates(problem, [(tuple(names), start, none)])
+    (found,) = fit_candidates(problem, [CandidateRequest(tuple(names), start, none)])
     return found
 
 

@@ -8,13 +8,9 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap.search.problem import StartedFit, fit_many
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
-from soilml.gap.statistics.evidence import (
-    AMPLITUDES,
-    LARGEST_SIZE,
-    _size_prior,
-    amplitude_penalty,
-)
+from soilml.gap.statistics.evidence import LARGEST_SIZE, _size_prior
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 

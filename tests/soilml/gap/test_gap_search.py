@@ -9,6 +9,7 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.gap.search.candidate_fits import (
     EFFECT_PENALTY,
     CandidateFit,
+    CandidateRequest,
     fit_candidates,
     fit_shapes,
 )
@@ -20,8 +21,7 @@ from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.verdict.cross_validation import (
     gap_reduction,
-    held_out_region,
-    held_out_runs,
+    held_out,
     predict_held_out,
 )
 from soilml.gap.verdict.law_difference import law_matters
@@ -52,7 +52,7 @@ def alone(soil):
 def fitted(problem, soil, *names):
     """A candidate by its catalogue law, with free shapes beside it."""
     none = np.zeros(len(problem.readings.channels))
-    found = fit_candidates(problem, [(names, soil.start_values(), none)])
+    found = fit_candidates(problem, [CandidateRequest(names, soil.start_values(), none)])
     return fit_shapes(problem, found)[0]
 
 
@@ -163,14 +163,15 @@ def test_the_true_model_leaves_nothing_of_readings_without_noise(dug):
     assert found.before == pytest.approx(9.0) and found.after == 0.0
     assert set(found.channels) == {"torque_Nm", "drawbar_pull_N", "sinkage_m"}
     soil = alone(problem.fit_soil([np.full(3, 0.5)]))
-    for made in (held_out_runs(problem, soil, soil, 0), held_out_region(problem, soil, soil)):
+    made_of = held_out(problem, soil, soil, 0)
+    assert set(made_of) == {"held_out_runs", "held_out_region"}
+    for made in made_of.values():
         assert made.before == made.after < 0.05
 
 
 def test_the_right_model_leaves_the_noise_and_the_soil_alone_more(dug, named):
     problem, soil = dug
-    runs = held_out_runs(problem, alone(soil), named.best, 0)
-    region = held_out_region(problem, alone(soil), named.best)
+    runs, region = held_out(problem, alone(soil), named.best, 0).values()
     train = gap_reduction(
         problem.readings, problem.covariance.std, soil.prediction, named.fit.prediction, "all"
     )
@@ -187,7 +188,8 @@ def test_the_held_out_region_lies_between_levels(scatter, region):
     loads = tuple(one_level) if scatter else (40.0, 41.0, 60.0, 61.0, 90.0, 91.0)
     problem = fit_problem(case, driven(case, noise=0.0, slips=6, loads=loads))
     soil = problem.fit_soil([np.full(3, 0.5)])
-    assert held_out_region(problem, alone(soil), alone(soil)).description.startswith(region)
+    found = held_out(problem, alone(soil), alone(soil), 0)["held_out_region"]
+    assert found.description.startswith(region)
 
 
 def test_rows_that_took_no_part_are_predicted_as_well(dug, named):
