@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.statistics.coordinates import linearise, predict_readings, soil_coordinate
+from soilml.gap.fitting.coordinates import linearise, predict_readings, soil_coordinate
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table

@@ -85,6 +85,8 @@ def _said(report: GapReport) -> dict[str, Any]:
         "probabilities": dict(getattr(report, "probabilities", {})),
         "suspects": [tuple(sorted(s.effects)) for s in getattr(report, "suspects", ())],
         "p_gap": report.p_gap,
+        "unclaimed": list(report.best_unclaimed),
+        "reasons": list(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
     }
 

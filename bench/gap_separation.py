@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
-from soilml.gap.statistics.coordinates import linearise, soil_coordinate
+from soilml.gap.fitting.coordinates import linearise, soil_coordinate
 from soilml.gap.statistics.reml_covariance import RUN_EFFECT_UNITS, run_effect_columns
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.identification.free_parameters import select_free

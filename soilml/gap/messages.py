@@ -33,8 +33,9 @@ def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
     reduction = _reduction(report.gap["train"])
     match report.status:
         case "no-gap":
+            declared = " and the declared discrepancy" if report.model.discrepancy else ""
             return (
-                "Model and measurements agree within the noise: mean squared residual "
+                f"Model and measurements agree within the noise{declared}: mean squared residual "
                 f"{decimal(report.gap['train'].before, 2)}, p = {decimal(report.p_gap, 2)}."
             )
         case "undecided":
@@ -94,8 +95,9 @@ def _suspected(report: GapReport) -> str:
     why = "; ".join(report.reasons or (NOT_DECISIVE,))
     first = " + ".join(report.suspects[0].effects)
     return (
-        f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first: "
-        f"{listed}. With {first}, {_reduction(report.gap['train'])}."
+        f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first, with "
+        f"their odds within the catalogue: {listed}. With {first}, "
+        f"{_reduction(report.gap['train'])}."
     )
 
 

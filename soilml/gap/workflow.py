@@ -232,10 +232,11 @@ def _build_report(
     after = shown if decision.claimed else none  # what model.toml contains
     alike = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     intervals = with_uncertain_discrepancy(problem, after)
+    left = discrepancy_amplitudes(problem, after) if smooth_gap else None
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=updated_case(intervals, discrepancy_amplitudes(problem, after)),
+        model=updated_case(intervals, left),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
         suspects=tuple(suspects(analysis, obstacles)) if smooth_gap else (),

@@ -14,16 +14,16 @@ from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
-from soilml.gap.report_parts import NextRun
-from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.batched_predictions import (
+from soilml.gap.fitting.batched_predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.coordinates import EffectCoordinate
-from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.gap.fitting.least_squares import GapFit
+from soilml.gap.report_parts import NextRun
+from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.search.problem import FitProblem
 from soilml.gap.verdict.cross_validation import covariance_at
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES

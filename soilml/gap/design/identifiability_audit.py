@@ -22,7 +22,7 @@ from soilml.gap.design.effect_identifiability import (
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.statistics.coordinates import SoilCoordinate, linearise, soil_coordinate
+from soilml.gap.fitting.coordinates import SoilCoordinate, linearise, soil_coordinate
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table

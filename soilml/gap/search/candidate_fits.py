@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.gap.fitting.coordinates import EffectCoordinate, shape_coordinates
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
 from soilml.gap.search.problem import FitProblem, StartedFit, fit_many
-from soilml.gap.statistics.coordinates import EffectCoordinate, shape_coordinates
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
 Floats = NDArray[np.float64]

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.fitting.coordinates import soil_coordinate
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.residual_test import ResidualTest
 from soilml.gap.search.stepwise import SearchResult, search
-from soilml.gap.statistics.coordinates import soil_coordinate
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.outliers import MAX_OUTLIER_FRACTION, outliers
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,

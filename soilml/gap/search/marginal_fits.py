@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.problem import FitProblem, StartedFit, fit_many
 from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.least_squares import GapFit
 
 Floats = NDArray[np.float64]
 

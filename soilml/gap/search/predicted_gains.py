@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.signatures import Signature
 from soilml.numerics.subspaces import project_out
 

@@ -13,19 +13,20 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.coordinates import (
+from soilml.gap.fitting.coordinates import (
     EffectCoordinate,
     FitCoordinate,
     SoilCoordinate,
     shape_coordinates,
     size_coordinate,
 )
+from soilml.gap.fitting.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.gap.statistics.evidence import DiscrepancyModel
-from soilml.gap.statistics.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.gap.statistics.signatures import current_size
 from soilml.physics.effects.base import Effect
+from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
@@ -61,6 +62,12 @@ class FitProblem:
         return DiscrepancyModel(
             self.covariance, discrepancy_process(self.readings, self.case.discrepancy)
         )
+
+    @cached_property
+    def declared_amplitude(self) -> Floats:
+        """Amplitude of the discrepancy that the case declares by channel, in usual ones: 1 or 0."""
+        declared = [column(name) in self.case.discrepancy for name in self.readings.channels]
+        return np.asarray(declared, dtype=np.float64)
 
     def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.candidate_fits import shape_directions
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.score_test import ScoreTest, score_test
 from soilml.gap.statistics.signatures import Signature
 from soilml.gap.statistics.smooth_basis import smooth_basis
@@ -31,12 +31,12 @@ class ResidualTest:
 def residual_test(
     problem: FitProblem, fit: GapFit, signatures: Sequence[Signature], seed: int
 ) -> ResidualTest:
-    """Test the residuals of a fit against noise and scatter, without any discrepancy.
+    """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
 
     All that the coordinates of the fit can explain is projected out, with second-order terms in
     the laws of its effects; see `soilml.gap.search.candidate_fits.shape_directions`.
     """
-    whiten = problem.covariance.whiten
+    whiten = problem.discrepancy.whiten(problem.declared_amplitude)
     fit = fit.whitened_by(whiten)
     smooth = smooth_basis(problem.readings)
     columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])

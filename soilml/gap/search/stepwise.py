@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.candidate_fits import (
     CandidateFit,
     CandidateRequest,
@@ -24,7 +25,6 @@ from soilml.gap.search.predicted_gains import (
 )
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.signatures import Untestable, effect_signatures
 
 Floats = NDArray[np.float64]

@@ -1,1 +1,1 @@
-"""Statistics of a gap analysis: generalised least squares, covariance, score tests, signatures."""
+"""Statistics of a gap analysis: covariance, discrepancy and evidence, score tests, signatures."""

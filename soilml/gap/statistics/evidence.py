@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.gap.fitting.coordinates import EffectCoordinate, FitCoordinate
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.coordinates import EffectCoordinate, FitCoordinate
 from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.linearised_fit import LinearisedFit, ProcessDivisions
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.numerics.prior import UNIFORM_PRECISION

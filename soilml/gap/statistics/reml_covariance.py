@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.coordinates import SoilCoordinate, linearise
+from soilml.gap.fitting.coordinates import SoilCoordinate, linearise
 from soilml.gap.statistics.restricted_likelihood import (
     RestrictedLikelihood,
     restricted_likelihood,

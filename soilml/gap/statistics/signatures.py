@@ -12,12 +12,12 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.candidate_effects import gears_differ, with_effect
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.batched_predictions import (
+from soilml.gap.fitting.batched_predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.coordinates import EffectCoordinate, size_coordinate
+from soilml.gap.fitting.coordinates import EffectCoordinate, size_coordinate
 from soilml.identification.data.levels import covariate_levels
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.report_parts import Discrepancy, EstimatedValue, NamedEffect
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.coordinates import EffectCoordinate, SoilCoordinate
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.score_test import score_test
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.statistics.smooth_basis import regions

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.gap.fitting.coordinates import predict_readings
+from soilml.gap.fitting.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.coordinates import predict_readings
-from soilml.gap.statistics.least_squares import FitRequest, GapFit, descend_together
 from soilml.gap.statistics.reml_covariance import (
     Covariance,
     assemble_covariance,

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.stepwise import SearchResult
-from soilml.gap.statistics.coordinates import EffectCoordinate
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.verdict.law_difference import law_matters
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
@@ -24,6 +24,12 @@ MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 3.0, 1.0
 MAX_SIZE_DEVIATION = 3.0
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
+#: Why an explanation that the evidence supports is not claimed.
+IMPLAUSIBLE_FAULT = "the fault of a sensor or of the rig would have to be implausibly large"
+OTHER_LAW = (
+    "the law of the first suspect would have to differ much from that of the catalogue, so that "
+    "its cause may be one that the catalogue lacks"
+)
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
 
@@ -73,8 +79,10 @@ def decide(
     best = accepted[0]
     if not suspects:  # many weak rivals share the probability that the soil alone lacks
         return Decision("unknown", (), None)
-    if reason := _why_not_claimed(best):
-        return Decision("unknown", (), None, reason)
+    if _implausible(best.fit):
+        return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
+    if _far_from_catalogue(best):
+        return Decision("suspected", (), best, OTHER_LAW)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:
@@ -100,18 +108,18 @@ def with_refused_outside(result: SearchResult) -> SearchResult:
 
     They need an implausible size, or another law than the catalogue's.
     """
-    refused = frozenset(c.names for c in result.candidates if c.names and _why_not_claimed(c))
+    refused = frozenset(
+        c.names
+        for c in result.candidates
+        if c.names and (_implausible(c.fit) or _far_from_catalogue(c))
+    )
     return replace(result, posterior=replace(result.posterior, outside=refused))
 
 
-def _why_not_claimed(best: CandidateFit) -> str:
-    """Why the likeliest explanation is not claimed in spite of its evidence; empty if it is."""
+def _far_from_catalogue(best: CandidateFit) -> bool:
+    """Whether an explanation needs another law than the catalogue's."""
     most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
-    if _implausible(best.fit):
-        return "the fault of a sensor or of the rig would have to be implausibly large"
-    if best.shape_deviation > most:
-        return "its law would have to differ too much from that of the catalogue"
-    return ""
+    return best.shape_deviation > most
 
 
 def _implausible(fit: GapFit) -> bool:
@@ -132,10 +140,12 @@ def reasons(
     match decision.status:
         case "undecided":
             return tuple(disagreements)
-        case "suspected" if disagreements:
-            worst = f"rows driven alike disagree: {disagreements[0]}"
-            return (*(obstacles or (NOT_DECISIVE,)), worst)
-        case "suspected" | "not-testable":
+        case "suspected":
+            why = (*obstacles, decision.reason) if decision.reason else tuple(obstacles)
+            if not disagreements:
+                return why
+            return (*(why or (NOT_DECISIVE,)), f"rows driven alike disagree: {disagreements[0]}")
+        case "not-testable":
             return tuple(obstacles)
     return (decision.reason,) if decision.reason else ()
 

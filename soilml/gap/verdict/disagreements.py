@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.gap.fitting.coordinates import linearise
+from soilml.gap.fitting.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.coordinates import linearise
-from soilml.gap.statistics.least_squares import GapFit, levenberg_marquardt
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
@@ -88,9 +88,9 @@ def _region(problem: FitProblem, soil: GapFit) -> list[str]:
     if chosen is None:
         return []
     name, out = chosen
-    covariance = problem.covariance
+    covariance = problem.discrepancy.matrix(problem.declared_amplitude)
     rest, inside = ~out, np.ix_(out, out)
-    whiten = np.linalg.inv(np.linalg.cholesky(covariance.matrix[np.ix_(rest, rest)]))
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance[np.ix_(rest, rest)]))
     try:
         part = problem.readings.subset(rest)
         fit = levenberg_marquardt(soil.case, soil.coordinates, part, whiten, soil.x)
@@ -103,7 +103,7 @@ def _region(problem: FitProblem, soil: GapFit) -> list[str]:
     residual = (problem.readings.reading - y)[out]
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
         return [f"a fit to the rows outside {name} has no equilibrium inside it"]
-    matrix = covariance.matrix[inside] + jacobian @ fit.covariance @ jacobian.T
+    matrix = covariance[inside] + jacobian @ fit.covariance @ jacobian.T
     square = float(residual @ np.linalg.solve(matrix, residual))
     if chdtrc(residual.size, square) >= REGION_LEVEL:
         return []

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.report_parts import RemainingDiscrepancy
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
 
@@ -26,10 +26,11 @@ LEAST_AMPLITUDE = 0.1
 def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> GapFit:
     """The fit with intervals under the expected amplitudes of the discrepancy.
 
-    The estimates are those of the most probable amplitudes. The amplitudes
-    are enlarged by `INTERVAL_FACTOR`.
+    The estimates are those of the most probable amplitudes. The amplitudes are enlarged by
+    `INTERVAL_FACTOR`, and at least the declared ones.
     """
-    return marginal.fit.whitened_by(problem.discrepancy.whiten(interval_amplitude(marginal)))
+    amplitude = np.maximum(interval_amplitude(marginal), problem.declared_amplitude)
+    return marginal.fit.whitened_by(problem.discrepancy.whiten(amplitude))
 
 
 def interval_amplitude(marginal: MarginalFit) -> Floats:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate, predict_readings
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.report_parts import (
     CandidateSummary,
     GapReduction,
@@ -17,9 +19,7 @@ from soilml.gap.search.iteration import Analysis
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import REJECTION_THRESHOLD
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate, predict_readings
 from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.gap.statistics.repeats import overstated_noise_notes
 from soilml.gap.verdict.cross_validation import gap_reduction, held_out

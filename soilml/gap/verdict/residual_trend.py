@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.least_squares import GapFit
 from soilml.gap.statistics.smooth_basis import smooth_basis
 from soilml.numerics.subspaces import column_space, project_out
 from soilml.quantities import column

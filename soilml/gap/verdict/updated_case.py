@@ -6,20 +6,21 @@ from dataclasses import replace
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
-from soilml.gap.statistics.coordinates import EffectCoordinate
-from soilml.gap.statistics.least_squares import GapFit
+from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.gap.fitting.least_squares import GapFit
 from soilml.numerics.prior import Prior
 
 #: Half width of the prior of an effect's size, in standard deviations.
 PRIOR_HALF_WIDTH = 3.0
 
 
-def updated_case(fit: GapFit, discrepancy: dict[str, float]) -> Case:
+def updated_case(fit: GapFit, discrepancy: dict[str, float] | None = None) -> Case:
     """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
 
     The size of each effect gets a uniform prior of three standard deviations to either side, so
     that its uncertainty is propagated where the model is used. `discrepancy` holds the standard
-    deviations of the smooth discrepancy by column, in the column's unit.
+    deviations of the smooth discrepancy by column, in the column's unit; None keeps what the case
+    declares.
     """
     case, values, stds = fit.fitted(), fit.values(), fit.stds()
     prior = dict(fit.case.prior)
@@ -32,8 +33,10 @@ def updated_case(fit: GapFit, discrepancy: dict[str, float]) -> Case:
         upper = min(bounds[c.path].upper, value + reach)
         if lower < upper:
             prior[c.path] = Prior(lower, upper)
-    declared = next(iter(fit.case.discrepancy.values()), Discrepancy())
-    remaining = {
-        name: replace(declared, share=0.0, constant=std) for name, std in discrepancy.items()
-    }
+    remaining = dict(fit.case.discrepancy)
+    if discrepancy is not None:
+        declared = next(iter(remaining.values()), Discrepancy())
+        remaining = {
+            name: replace(declared, share=0.0, constant=std) for name, std in discrepancy.items()
+        }
     return replace(case, prior=prior, noise=dict(fit.case.noise), discrepancy=remaining)

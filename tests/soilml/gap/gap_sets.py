@@ -13,9 +13,9 @@ from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
 from soilml.gap import gap
 from soilml.gap.data.stacked_readings import stack_readings
+from soilml.gap.fitting.coordinates import soil_coordinate
 from soilml.gap.search.candidate_fits import CandidateRequest, fit_candidates
 from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.coordinates import soil_coordinate
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,

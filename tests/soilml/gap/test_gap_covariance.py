@@ -5,7 +5,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.statistics.coordinates import linearise
+from soilml.gap.fitting.coordinates import linearise
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,

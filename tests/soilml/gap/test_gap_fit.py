@@ -7,8 +7,8 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.statistics.coordinates import linearise, predict_readings, size_coordinate
-from soilml.gap.statistics.least_squares import levenberg_marquardt
+from soilml.gap.fitting.coordinates import linearise, predict_readings, size_coordinate
+from soilml.gap.fitting.least_squares import levenberg_marquardt
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.statistics.smooth_basis import regions, smooth_basis
 from soilml.physics.effects import EFFECTS

@@ -14,13 +14,13 @@ from soilml.gap.data.candidate_effects import candidate_effects, with_effect
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.design.planned_readings import expected_readings, joined_readings
 from soilml.gap.design.run_options import run_options
-from soilml.gap.search.problem import exclude_each_other
-from soilml.gap.statistics.batched_predictions import (
+from soilml.gap.fitting.batched_predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.coordinates import size_coordinate, soil_coordinate
+from soilml.gap.fitting.coordinates import size_coordinate, soil_coordinate
+from soilml.gap.search.problem import exclude_each_other
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.identification.data.observations import read_observations
 from soilml.identification.discrepancy import discrepancy_columns

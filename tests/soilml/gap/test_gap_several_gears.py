@@ -12,7 +12,7 @@ from soilml.gap import gap
 from soilml.gap.data.candidate_effects import candidate_effects, with_effect
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.statistics.coordinates import (
+from soilml.gap.fitting.coordinates import (
     linearise,
     predict_readings,
     size_coordinate,

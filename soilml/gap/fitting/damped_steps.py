@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.statistics.coordinates import FitCoordinate
+from soilml.gap.fitting.coordinates import FitCoordinate
 
 Floats = NDArray[np.float64]
 

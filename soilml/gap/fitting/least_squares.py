@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.batched_predictions import (
+from soilml.gap.fitting.batched_predictions import (
     Linearisation,
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.statistics.coordinates import FitCoordinate, SoilCoordinate
-from soilml.gap.statistics.damped_steps import DampedSteps
-from soilml.gap.statistics.readings_by_gear import readings_by_gear
+from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate
+from soilml.gap.fitting.damped_steps import DampedSteps
+from soilml.gap.fitting.readings_by_gear import readings_by_gear
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.coarse_search import SinkageEstimate
 

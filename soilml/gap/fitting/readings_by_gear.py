@@ -14,7 +14,7 @@ from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.identification.data.operating_points import rows_by_gear
 
 if TYPE_CHECKING:
-    from soilml.gap.statistics.coordinates import FitCoordinate
+    from soilml.gap.fitting.coordinates import FitCoordinate
 
 Integers = NDArray[np.int64]
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.joined_cases import CaseSets, join_key, joined_load_case
-from soilml.gap.statistics.readings_by_gear import GearReadings, readings_by_gear
+from soilml.gap.fitting.joined_cases import CaseSets, join_key, joined_load_case
+from soilml.gap.fitting.readings_by_gear import GearReadings, readings_by_gear
 from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
@@ -22,7 +22,7 @@ from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
 
 if TYPE_CHECKING:
-    from soilml.gap.statistics.coordinates import FitCoordinate
+    from soilml.gap.fitting.coordinates import FitCoordinate
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")

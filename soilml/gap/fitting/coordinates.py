@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.statistics.batched_predictions import (
+from soilml.gap.fitting.batched_predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,

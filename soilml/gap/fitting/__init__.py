@@ -1,0 +1,1 @@
+"""Bounded least-squares fits of cases to readings, many in step."""
