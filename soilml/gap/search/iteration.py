@@ -143,8 +143,14 @@ def _reestimate_covariance(
     case = fit.fitted()
     if not signatures or len(signatures[0].column) != len(readings):
         signatures, _ = effect_signatures(case, readings, problem.effects_not_in(fit))
+    declared = problem.declared_amplitude[problem.discrepancy.process.channel] > 0.0
     space = np.column_stack(
-        [fit.derivatives, *[s.column for s in signatures], smooth_basis(readings)]
+        [
+            fit.derivatives,
+            *[s.column for s in signatures],
+            smooth_basis(readings),
+            problem.discrepancy.process.columns[:, declared],
+        ]
     )
     residual = readings.reading - fit.prediction
     columns = run_effect_columns(case, readings)

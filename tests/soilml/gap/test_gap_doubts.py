@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven
 
+from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap import gap
 from soilml.gap.html.page import page
 from soilml.gap.messages import verdict_sentence
 from soilml.gap.report_parts import GapReduction, Suspect
 from soilml.gap.results import GapReport
 from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
 
 TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
 
@@ -84,3 +86,51 @@ def test_a_suspect_that_enlarges_the_residuals_is_explained():
     assert "8.80 -> 10.1 (noise alone gives 1; it grows because" in verdict_sentence(report, ())
     figures = {"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")}
     assert "grows" not in verdict_sentence(replace(report, gap=figures), ())
+
+
+CHANNELS = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
+
+
+def waved(table, share=0.015):
+    """The table with a smooth wave of this share of the largest reading in each channel."""
+    columns = dict(table.columns)
+    for i, name in enumerate(CHANNELS):
+        phase = 7.0 * table["slip"] + 0.008 * table["load_N"] + i
+        columns[name] = columns[name] + share * np.abs(columns[name]).max() * np.sin(phase)
+    return Table(columns)
+
+
+@pytest.mark.slow
+def test_what_is_within_the_declared_discrepancy_is_no_gap():
+    case, table = case_of(), waved(driven(case_of(), seed=4))
+    assert gap(case, table).status not in ("no-gap", "undecided")
+    declared = {name: Discrepancy(share=0.02) for name in CHANNELS}
+    report = gap(replace(case, discrepancy=declared), table)
+    assert report.status == "no-gap"
+    assert "within the noise and the declared discrepancy" in report.sentence
+    assert report.model.discrepancy == declared
+    assert (
+        report.soil_after["cohesion"].std > 1.5 * gap(case, driven(case)).soil_after["cohesion"].std
+    )
+
+
+@pytest.mark.slow
+def test_an_effect_is_named_beside_a_declared_discrepancy_and_then_nothing_is_left():
+    case = case_of()
+    table = waved(driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=4))
+    first = gap(case, table)
+    assert first.status == "partly-named" and first.cause_set == (("slip-sinkage",),)
+    again = gap(first.model, table)
+    assert again.status == "no-gap"
+
+
+@pytest.mark.slow
+def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
+    case = case_of()
+    other = EFFECTS["slip-sinkage"](n1=0.4, by_slip=8.0)
+    report = gap(case, driven(case, [other], slips=12))
+    assert report.status == "suspected"
+    assert report.suspects[0].effects == ("slip-sinkage",)
+    assert "differ much from that of the catalogue" in report.sentence
+    assert report.model.model.effects == () and report.suspected_model is not None
+    assert report.gap["train"].after < 0.1 * report.gap["train"].before

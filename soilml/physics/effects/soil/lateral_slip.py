@@ -26,8 +26,9 @@ class LateralSlip(SlipLoadScaling):
     1 / (1 + s) takes the place of 1 - s, unless its law is "slip-sign". References: Yoshida and
     Ishigami, IROS 2004, eqs. for the lateral shear displacement; Ishigami et al., J. Field Robotics
     24(3), 2007. They let each direction reach its full strength by itself (tau_x from j_x alone,
-    tau_y from j_y alone); here both share one strength, and `share` 0 is the former. The side force
-    itself is no output.
+    tau_y from j_y alone); here both share one strength, and `share` 0 is the former. A `share`
+    above 1 stands for soil that the flank of the wheel pushes along. The side force itself is no
+    output.
     """
 
     name: ClassVar[str] = "lateral-slip"
@@ -40,7 +41,7 @@ class LateralSlip(SlipLoadScaling):
         isolate="the same runs with the wheel held straight, and at several slip angles",
         needs=("slip_angle",),
     )
-    share: Annotated[Real, Parameter("1", 0.0, 1.0, "times the sideways displacement")] = 0.0
+    share: Annotated[Real, Parameter("1", 0.0, 5.0, "times the sideways displacement")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:
         contact, modulus = stress.contact, load_case.soil.shear_modulus

@@ -1,0 +1,68 @@
+"""Steps of a bounded fit: parameters that move by ratios, bounds, and curved valleys."""
+
+import numpy as np
+import pytest
+from gap_sets import MODEL, case_of, driven, fit_problem
+
+from soilml.gap.fitting.coordinates import SoilCoordinate
+from soilml.gap.fitting.damped_steps import MOST_LOG_STEP, DampedSteps
+from soilml.numerics.prior import Prior
+
+
+def coordinate(lower: float, upper: float, *, log: bool = False) -> SoilCoordinate:
+    """A soil parameter with this uniform prior."""
+    return SoilCoordinate("kphi", "", 0.0, 1.0, Prior(lower, upper, log=log))
+
+
+def one_step(of: SoilCoordinate, x: float, residual: float) -> float:
+    """Where an undamped step leads whose length in the coordinate is the residual."""
+    steps = DampedSteps.of([of])
+    here, left = np.asarray([[x]]), np.asarray([[residual]])
+    return float(steps.from_points(here, left, np.eye(1), np.zeros(1))[0, 0])
+
+
+def test_a_wide_positive_parameter_moves_by_ratios():
+    wide = coordinate(1e5, 5e6)
+    value = wide.prior.at(np.asarray(0.2))
+    for step in (-0.1, 0.05):
+        moved = wide.prior.at(np.asarray(one_step(wide, 0.2, step)))
+        assert moved / value == pytest.approx(np.exp(step * 4.9e6 / value))
+    far = wide.prior.at(np.asarray(one_step(wide, 0.01, 0.5)))
+    assert far / wide.prior.at(np.asarray(0.01)) == pytest.approx(np.exp(MOST_LOG_STEP))
+
+
+def test_other_parameters_move_by_differences():
+    for other in (coordinate(0.0, 6e3), coordinate(0.3, 0.8), coordinate(1e5, 5e6, log=True)):
+        assert one_step(other, 0.4, 0.25) == pytest.approx(0.65)
+
+
+def test_steps_end_at_bounds_and_do_not_leave_them():
+    of = coordinate(0.0, 1.0)
+    assert one_step(of, 0.4, 9.0) == 1.0
+    assert one_step(of, 1.0, 0.5) == 1.0
+    steps, jacobian = DampedSteps.of([of]), np.eye(1)
+    assert steps.are_held(np.ones(1), np.ones(1), jacobian)
+    assert not steps.are_held(np.ones(1), -np.ones(1), jacobian)
+
+
+def test_a_step_counts_the_prior():
+    """The optimum of (r - x)^2 + (x / 0.5)^2, from r = 1 at x = 0, is at 0.2."""
+    steps = DampedSteps(
+        np.full(1, -5.0), np.full(1, 5.0), np.full(1, 1.0 / 0.5), np.full(1, np.inf)
+    )
+    moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
+    assert moved[0, 0] == pytest.approx(0.2)
+    assert steps.objective(np.asarray([1.0 - 0.2]), moved[0]) == pytest.approx(0.8)
+
+
+def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():
+    """Modulus and exponent of pressure-sinkage compensate each other at the usual sinkage."""
+    bearing = "kphi = [100000.0, 5000000.0]\nn = [0.4, 1.6]\n[noise]"
+    case = case_of(MODEL.replace("[noise]", bearing))
+    problem = fit_problem(case, driven(case, seed=1))
+    truth = [c.prior.fraction(float(getattr(case.soil, c.path))) for c in problem.soil]
+    best = problem.fit_soil([np.asarray(truth)])
+    for start in (np.full(5, 0.5), np.asarray([0.5, 0.5, 0.3, 0.06, 0.2])):
+        found = problem.fit_soil([start])
+        assert found.converged
+        assert found.objective == pytest.approx(best.objective, abs=0.2)
