@@ -29,8 +29,9 @@ class SinkageEstimate:
     """Where a search for equilibrium starts, arrays (batch,); NaN in rows that are not known.
 
     Where the load carried rises through the load more than once, the crossing next to the estimate
-    need not be the first, at which a gear comes to rest. With `nearest` it is accepted, as trials
-    of a descent may whose result is solved again; without, it is checked as in an ordinary search.
+    need not be the first, at which a gear comes to rest. With `nearest` it is accepted, and rows
+    that are not solved from the estimate are left so, as trials of a descent may whose result is
+    solved again; without, it is checked, and such rows are solved, as in an ordinary search.
     """
 
     log_sinkage: Array  # ln(z / m)

@@ -15,13 +15,14 @@ def equilibrium_near(load_case: LoadCase, estimate: SinkageEstimate) -> Force:
     """Forces at the equilibrium next to an estimate of the sinkage; arrays (batch,).
 
     They agree with those of the ordinary search to about 1e-7. Rows that secant steps do not solve,
-    or that may have an earlier equilibrium, are solved by that search.
+    or that may have an earlier equilibrium, are solved by that search; those of an estimate with
+    `nearest` are marked by their status instead.
     """
     xp = namespace(estimate.slope)
     force, slope = forces_near(load_case, estimate)
-    solved = force.status == 0
-    if not estimate.nearest:
-        solved = solved & ~earlier_equilibrium_possible(load_case, force, slope)
+    if estimate.nearest:
+        return force
+    solved = (force.status == 0) & ~earlier_equilibrium_possible(load_case, force, slope)
     unsolved = xp.nonzero(~solved)[0]
     if not unsolved.shape[0]:
         return force

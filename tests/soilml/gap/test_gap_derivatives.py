@@ -127,6 +127,11 @@ def test_trials_near_an_equilibrium_reach_it(problem, name, distance, nearest):
     (at,), (searched,) = linearise_many([request]), predict_many([request])
     estimate = SinkageEstimate(at.log_sinkage[None, :] + distance, at.slope[None, :], nearest)
     (near,) = predict_many([replace(request, estimate=estimate)])
+    if nearest and not distance <= 0.1:  # a trial that is too far off is left without readings
+        solved = np.isfinite(near)
+        assert not solved.all()
+        np.testing.assert_allclose(near[solved], searched[solved], rtol=1e-6)
+        return
     np.testing.assert_allclose(near, searched, rtol=1e-6)
 
 
