@@ -93,7 +93,7 @@ def _suspected(report: GapReport) -> str:
         f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
     )
     why = "; ".join(report.reasons or (NOT_DECISIVE,))
-    first = " + ".join(report.suspects[0].effects)
+    first = " + ".join(report.best_unclaimed or report.suspects[0].effects)
     return (
         f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first, with "
         f"their odds within the catalogue: {listed}. With {first}, "

@@ -27,8 +27,8 @@ NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
 #: Why an explanation that the evidence supports is not claimed.
 IMPLAUSIBLE_FAULT = "the fault of a sensor or of the rig would have to be implausibly large"
 OTHER_LAW = (
-    "the law of the first suspect would have to differ much from that of the catalogue, so that "
-    "its cause may be one that the catalogue lacks"
+    "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
+    "one that the catalogue lacks"
 )
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
@@ -70,19 +70,21 @@ def decide(
     likeliest, none = result.likeliest, result.none
     suspects = bool(likeliest and none and likeliest.objective < none.objective)
     if naming_obstacles:
-        return (
-            Decision("suspected", (), likeliest) if suspects else Decision("not-testable", (), None)
-        )
+        if not suspects:
+            return Decision("not-testable", (), None)
+        return Decision("suspected", (), _first_suspect(result))
     accepted = result.accepted
     if not accepted or () in {c.names for c in accepted}:
-        return Decision("suspected", (), likeliest) if suspects else Decision("unknown", (), None)
+        if not suspects:
+            return Decision("unknown", (), None)
+        return Decision("suspected", (), _first_suspect(result))
     best = accepted[0]
     if not suspects:  # many weak rivals share the probability that the soil alone lacks
         return Decision("unknown", (), None)
     if _implausible(best.fit):
         return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
     if _far_from_catalogue(best):
-        return Decision("suspected", (), best, OTHER_LAW)
+        return Decision("suspected", (), best, OTHER_LAW.format(" + ".join(best.names)))
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:
@@ -90,6 +92,16 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def _first_suspect(result: SearchResult) -> CandidateFit | None:
+    """The candidate that is listed first: the likeliest, sets that contain it counted towards it.
+
+    An effect that was not fitted in full is passed over.
+    """
+    fitted = {c.names: c for c in result.candidates}
+    listed = (fitted[names] for names, _ in result.posterior.ranked() if names in fitted)
+    return next(listed, result.likeliest)
 
 
 def is_left_open(result: SearchResult) -> bool:

@@ -1,6 +1,7 @@
 """What a report says of readings that disagree with each other or with their declared noise."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from soilml.gap.html.page import page
 from soilml.gap.messages import verdict_sentence
 from soilml.gap.report_parts import GapReduction, Suspect
 from soilml.gap.results import GapReport
+from soilml.gap.search.posterior import Posterior
+from soilml.gap.verdict.decision import decide, unclaimed_effects
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 
@@ -134,3 +137,33 @@ def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
     assert "differ much from that of the catalogue" in report.sentence
     assert report.model.model.effects == () and report.suspected_model is not None
     assert report.gap["train"].after < 0.1 * report.gap["train"].before
+
+
+def test_figures_are_those_of_the_suspect_that_is_listed_first():
+    """Here the largest evidence is that of two effects, and a rival with its additions leads."""
+    weights = {(): -5.0, ("b", "c"): -1.0, ("a",): -1.1, ("a", "d"): -1.3}
+    sets = [
+        SimpleNamespace(names=names, objective=-4.0 * weight, amplitude=np.ones(1))
+        for names, weight in weights.items()
+    ]
+    ordered = sorted(sets, key=lambda one: one.objective)
+    result = SimpleNamespace(
+        has_gap=True,
+        candidates=ordered,
+        likeliest=ordered[0],
+        none=sets[0],
+        posterior=Posterior(weights),
+        accepted=ordered[:1],
+    )
+    assert result.likeliest.names == ("b", "c")
+    decision = decide(None, result, ["one load only"], [])
+    assert decision.status == "suspected" and decision.shown.names == ("a",)
+    report = GapReport(
+        "suspected",
+        "",
+        case_of(),
+        suspects=(Suspect(("b", "c"), 0.1, ""), Suspect(("a",), 0.0, "")),
+        best_unclaimed=unclaimed_effects(decision, result),
+        gap={"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")},
+    )
+    assert "With a, mean squared residual 8.80 -> 1.0" in verdict_sentence(report, ())
