@@ -20,6 +20,7 @@ from soilml.identification.bevameter.soil_section import (
 )
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
+from soilml.numerics.rounding import significant
 
 
 def bevameter(
@@ -80,7 +81,8 @@ def bevameter(
         values, priors, notes = shear_section(shear_fit, case)
         soil, prior = soil | values, prior | priors
         remarks += [*shear_remarks(shear_fit), *notes]
-    return BevameterResult(plate_fit, shear_fit, within_bounds(soil), prior, tuple(remarks))
+    soil = within_bounds({name: significant(value) for name, value in soil.items()})
+    return BevameterResult(plate_fit, shear_fit, soil, prior, tuple(remarks))
 
 
 __all__ = ["BevameterResult", "PressureSinkageFit", "ShearFit", "bevameter"]

@@ -9,6 +9,7 @@ from soilml.config.case import Case
 from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.numerics.prior import Prior
+from soilml.numerics.rounding import significant
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 
@@ -115,4 +116,5 @@ def _prior(name: str, value: float, span: tuple[float, float]) -> Prior:
     lower, upper = min(span[0], value - least), max(span[1], value + least)
     lower = min(max(lower, bounds.lower), bounds.upper - least)
     upper = max(min(upper, bounds.upper), lower + least)
-    return Prior(lower, upper, log=0.0 < LOG_FACTOR * lower <= upper)
+    log = 0.0 < LOG_FACTOR * lower <= upper
+    return Prior(significant(lower), significant(upper), log=log)
