@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
+T = TypeVar("T")
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
 MAX_DISCRIMINATION = 10.0
@@ -61,22 +63,23 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
     effects = [
         problem.effects[name] for name in _effects_of(fits.values()) if name in problem.effects
     ]
-    present = _differences(fits, problem.readings, problem.covariance.whiten)
+    present = _differences(fits, problem.readings, problem.covariance.whiten, first.prediction)
     proposals: list[NextRun] = []
     for option in run_options(problem.readings, first.fitted(), effects):
         changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
         one, *others = changed.values()
         try:
             readings = expected_readings(option.at, problem.readings, one.fitted(), option.kind)
-            if _is_plain_repeat(option, readings, changed):
+            y = _predictions(option, readings, changed)
+            if _is_plain_repeat(readings, y):
                 continue
             whiten = covariance_at(problem, one, readings).whiten
-            new = _differences(changed, readings, whiten)
+            new = _differences(changed, readings, whiten, y[0, 0])
             sigmas = [
                 _discrimination(rival, old, _all_columns(rival, added, other))
                 for rival, other, old, added in zip(rivals, others, present, new, strict=True)
             ]
-            rows = _rows(readings, changed, option)
+            rows = _rows(readings, dict(zip(changed, y[0], strict=True)), option)
         except (InputError, np.linalg.LinAlgError):
             continue
         if np.isfinite(sigmas).all():
@@ -112,12 +115,11 @@ def _all_columns(fit: GapFit, difference: Difference, changed: GapFit) -> Differ
     return difference[0], jacobian
 
 
-def _is_plain_repeat(
+def _predictions(
     option: RunOption, readings: StackedReadings, fits: Mapping[str, GapFit]
-) -> bool:
-    """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
-    if option.plain is None:
-        return False
+) -> Floats:
+    """Predictions (1 or 2, fits, m) of a run, and of the run driven as usual where that differs."""
+    ways = [option.at] if option.plain is None else [option.at, option.plain]
     requests = [
         PredictionRequest(
             fit.case,
@@ -125,21 +127,23 @@ def _is_plain_repeat(
             fit.x[None, :],
             replace(readings, at=with_default_covariates(at, fit.case)),
         )
-        for at in (option.at, option.plain)
+        for at in ways
         for fit in fits.values()
     ]
-    y = np.split(_predicted(requests), 2)
-    return not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
+    predicted = np.concatenate([_known(found) for found in predict_many(requests)])
+    return predicted.reshape(len(ways), len(fits), len(readings))
 
 
-def _predicted(requests: Sequence[PredictionRequest]) -> Floats:
-    """Predictions (requests, m) of fits for the same readings."""
-    predictions = []
-    for found in predict_many(requests):
-        if isinstance(found, InputError):
-            raise found
-        predictions.append(found)
-    return np.concatenate(predictions)
+def _is_plain_repeat(readings: StackedReadings, y: Floats) -> bool:
+    """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
+    return len(y) > 1 and not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
+
+
+def _known(answer: T | InputError) -> T:
+    """The answer of the model; an `InputError` in its place is raised."""
+    if isinstance(answer, InputError):
+        raise answer
+    return answer
 
 
 def _without_equal_rows(runs: Sequence[NextRun]) -> list[NextRun]:
@@ -203,20 +207,15 @@ def _mean_capped(sigmas: Sequence[float]) -> float:
 
 
 def _differences(
-    fits: Mapping[str, GapFit], readings: StackedReadings, whiten: Floats
+    fits: Mapping[str, GapFit], readings: StackedReadings, whiten: Floats, expected: Floats
 ) -> list[Difference]:
-    """How the first explanation differs from each of the others on some rows."""
-    requests = [
+    """How the first explanation, which predicts `expected`, differs from each of the others."""
+    _, *rivals = (
         PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
         for fit in fits.values()
-    ]
-    expected = _predicted(requests[:1])[0]
-    differences = []
-    for rival in linearise_many(requests[1:]):
-        if isinstance(rival, InputError):
-            raise rival
-        differences.append((whiten @ (expected - rival.prediction), whiten @ rival.jacobian))
-    return differences
+    )
+    linear = [_known(found) for found in linearise_many(rivals)]
+    return [(whiten @ (expected - one.prediction), whiten @ one.jacobian) for one in linear]
 
 
 def _discrimination(rival: GapFit, present: Difference, new: Difference) -> float:
@@ -247,7 +246,7 @@ def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, flo
 
 
 def _rows(
-    readings: StackedReadings, fits: Mapping[str, GapFit], option: RunOption
+    readings: StackedReadings, predicted: Mapping[str, Floats], option: RunOption
 ) -> tuple[dict[str, float | str], ...]:
     """Operating points and gear of a run with the prediction of each explanation."""
     rows = len(readings.run)
@@ -260,13 +259,7 @@ def _rows(
             columns[key] = np.broadcast_to(getattr(readings.at, field), (rows,))
     for key, size in (option.gear.columns() if option.gear else {}).items():
         columns[key] = np.full(rows, size)
-    predicted = _predicted(
-        [
-            PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
-            for fit in fits.values()
-        ]
-    )
-    for name, y in zip(fits, predicted, strict=True):
+    for name, y in predicted.items():
         for i, channel in enumerate(readings.channels):
             columns[f"{column(channel)} if {name}"] = y[readings.channel == i]
     found: list[dict[str, float | str]] = []
