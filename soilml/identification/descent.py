@@ -14,6 +14,7 @@ from soilml.errors import FitError, MissingLibraryError
 from soilml.identification.data.observations import Observations
 from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.predictions import (
+    Linearisation,
     linearise,
     noise_at_prediction,
     predict_channels,
@@ -30,11 +31,13 @@ Floats = NDArray[np.float64]
 #: How many of the best of the Sobol points of the prior are descended from.
 STARTS = 4
 #: Tolerance of a descent; and of those from several starts, which only tell optima apart.
-TOLERANCE, START_TOLERANCE = 1e-10, 1e-7
-#: Predictions of the starts that are held at a time: 8 MB, and the model's own arrays beside them.
-MOST_PREDICTIONS = 1_000_000
+TOLERANCE, START_TOLERANCE = 1e-10, 1e-5
+#: Readings of each channel by which the points are compared.
+ROWS_OF_STARTS = 16
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
+#: A descent that comes this close to an optimum of equal cost ends there.
+NEARLY_SAME = 3e-2
 #: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
 #: likelihood.
 EQUAL_COST = 0.02
@@ -44,12 +47,13 @@ NO_EQUILIBRIUM = 1e3
 
 @dataclass(frozen=True)
 class Optimum:
-    """A local optimum."""
+    """A local optimum, or a trial on the way to it."""
 
     u: Floats  # (p,) fractions of the priors
     residual: Floats  # (k,) of unit covariance
     jacobian: Floats  # (k, p)
     prior_cost: float  # squared deviations from normal priors
+    about: Linearisation  # of the readings
 
     @property
     def cost(self) -> float:
@@ -105,10 +109,26 @@ class LeastSquaresProblem:
         residual = prediction + self.shared.offset - self.reading
         return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
 
-    def linearised(self, u: Floats) -> tuple[Floats, Floats]:
-        """Whitened residuals (k,) and Jacobian (k, p)."""
-        prediction, jacobian = linearise(self.case, self.data, self.free, u)
-        return self.whitened(prediction), self.whitener(np.nan_to_num(jacobian).T).T
+    def linearised(self, u: Floats, near: Linearisation | None) -> Optimum:
+        """The problem at u (p,), found from a linearisation `near` it where there is one."""
+        about = linearise(self.case, self.data, self.free, u, near)
+        jacobian = self.whitener(np.nan_to_num(about.jacobian).T).T
+        from_prior = self.normal_deviation(u)[0]
+        prior_cost = float(from_prior @ from_prior)
+        return Optimum(u, self.whitened(about.prediction), jacobian, prior_cost, about)
+
+    def of_rows(self, rows: NDArray[np.int64]) -> LeastSquaresProblem:
+        """The problem of some of the rows alone."""
+        chosen = np.isin(np.arange(len(self.data.slip)), rows)
+        kept = np.concatenate([chosen[np.isfinite(c.reading)] for c in self.data.channels])
+        return replace(
+            self,
+            data=self.data.of_rows(np.flatnonzero(chosen)),
+            reading=self.reading[kept],
+            std=self.std[kept],
+            columns=self.columns[kept],
+            shared=SharedErrors(self.shared.offset[kept], self.shared.columns[kept]),
+        )
 
     def with_noise_at(self, optimum: Optimum) -> LeastSquaresProblem:
         """The same problem, noise taken at the optimum's predictions or from its residuals.
@@ -116,7 +136,7 @@ class LeastSquaresProblem:
         Errors that all rows share are linearised there.
         """
         case, data, free = self.case, self.data, self.free
-        prediction = self.predict(optimum.u[None, :])
+        prediction = optimum.about.prediction[None, :]
         declared = noise_at_prediction(case, data, prediction)[0]
         slip_std, load_std = data.slip_std, data.load_std
         from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
@@ -129,29 +149,37 @@ class LeastSquaresProblem:
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:
     """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
-    free = problem.free
-    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    starts = np.vstack([nominal, sobol_points(len(free))])
-    few = max(1, MOST_PREDICTIONS // problem.reading.size)  # sets of predictions held at a time
-    blocks = [starts[i : i + few] for i in range(0, len(starts), few)]
-    costs, feasible = [], False
-    for block in blocks:
-        prediction = problem.predict(block)
-        feasible = feasible or not np.isnan(prediction).any(axis=1).all()
-        costs.append((problem.whitened(prediction) ** 2).sum(axis=1))
-    if not feasible:
+    starts, order = _ranked_starts(problem)
+    found: list[Optimum] = []
+    for i in dict.fromkeys([*order[:STARTS], 0]):  # the nominal point too
+        # two descents that end at the same optimum are enough
+        known = found[0] if len(found) == 1 else None
+        optimum = descend(problem, starts[i], tolerance=START_TOLERANCE, known=known)
+        if known is not None and np.abs(known.u - optimum.u).max() < SAME_OPTIMUM:
+            break
+        found.append(optimum)
+    if not any(np.isfinite(o.about.prediction).all() for o in found) and not any(
+        np.isfinite(problem.predict(start[None, :])).all() for start in starts
+    ):
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
         )
-    order = np.argsort(np.concatenate(costs), kind="stable")
-    found: list[Optimum] = []
-    for i in dict.fromkeys([int(i) for i in order[:STARTS]] + [0]):  # the nominal point too
-        found.append(descend(problem, starts[i], tolerance=START_TOLERANCE))
-        if len(found) == 2 and np.abs(found[0].u - found[1].u).max() < SAME_OPTIMUM:
-            break
     lowest = min(optimum.cost + optimum.prior_cost for optimum in found)
     equal = [o for o in found if o.cost + o.prior_cost <= lowest + EQUAL_COST]
     return min(equal, key=lambda optimum: float(np.sum((optimum.u - 0.5) ** 2)))
+
+
+def _ranked_starts(problem: LeastSquaresProblem) -> tuple[Floats, list[int]]:
+    """Points (n, p) of the prior, the nominal one first, and their order by rising cost.
+
+    Few rows tell good starts from bad ones.
+    """
+    free = problem.free
+    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
+    starts = np.vstack([nominal, sobol_points(len(free))])
+    part = problem.of_rows(spread_rows(problem.data))
+    costs = (part.whitened(part.predict(starts)) ** 2).sum(axis=1)
+    return starts, [int(i) for i in np.argsort(costs, kind="stable")]
 
 
 def descend(
@@ -160,10 +188,14 @@ def descend(
     *,
     with_prior: bool = False,
     tolerance: float = TOLERANCE,
+    known: Optimum | None = None,
+    near: Linearisation | None = None,
 ) -> Optimum:
     """The local optimum from a start, normal priors included.
 
-    It ends where cost, step and gradient change by less than the tolerance, relative.
+    It ends where cost, step and gradient change by less than the tolerance, relative; and with
+    `known`, if it comes as close to that optimum as tells that it would end there. A linearisation
+    `near` the start saves the search for equilibrium there.
 
     With `with_prior`, uniform priors are included too, as Gaussian ones of the same variance about
     their middle.
@@ -173,13 +205,18 @@ def descend(
     except ImportError:
         raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
 
-    latest: dict[bytes, tuple[Floats, Floats]] = {}  # scipy asks for residual and Jacobian apart
+    # scipy asks for residual and Jacobian apart, and a rejected step returns to the point before
+    latest: dict[bytes, Optimum] = {}
 
-    def linearised(u: Floats) -> tuple[Floats, Floats]:
+    def linearised(u: Floats) -> Optimum:
         key = u.tobytes()
         if key not in latest:
-            latest.clear()
-            latest[key] = problem.linearised(u)
+            before = next(reversed(latest.values())).about if latest else near
+            latest[key] = problem.linearised(u.copy(), before)
+            while len(latest) > 2:
+                del latest[next(iter(latest))]
+            if known is not None and _leads_to(known, latest[key]):
+                raise _SameOptimumError(known)
         return latest[key]
 
     uniform_root = np.where(problem.normal, 0.0, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0))
@@ -189,18 +226,52 @@ def descend(
         z, rate = problem.normal_deviation(u)
         return z + uniform_root * (u - 0.5), rate + uniform_root
 
-    found = least_squares(
-        lambda u: np.append(linearised(u)[0], prior(u)[0]),
-        np.clip(start, 1e-6, 1.0 - 1e-6),
-        jac=lambda u: np.vstack([linearised(u)[1], np.diag(prior(u)[1])]),
-        bounds=(0.0, 1.0),
-        ftol=tolerance,
-        xtol=10.0 * tolerance,
-        gtol=tolerance,
-    )
-    residual, jacobian = linearised(found.x)
-    from_prior = problem.normal_deviation(found.x)[0]
-    return Optimum(found.x, residual, jacobian, float(from_prior @ from_prior))
+    try:
+        found = least_squares(
+            lambda u: np.append(linearised(u).residual, prior(u)[0]),
+            np.clip(start, 1e-6, 1.0 - 1e-6),
+            jac=lambda u: np.vstack([linearised(u).jacobian, np.diag(prior(u)[1])]),
+            bounds=(0.0, 1.0),
+            ftol=tolerance,
+            xtol=10.0 * tolerance,
+            gtol=tolerance,
+        )
+    except _SameOptimumError as same:
+        return same.optimum
+    return linearised(found.x)
+
+
+class _SameOptimumError(Exception):
+    """A descent has come close to an optimum that is known."""
+
+    def __init__(self, optimum: Optimum) -> None:
+        super().__init__()
+        self.optimum = optimum
+
+
+def _leads_to(known: Optimum, trial: Optimum) -> bool:
+    """Whether a descent at a trial ends at a known optimum.
+
+    It does where it is close, and the cost is the known optimum's quadratic; fewer readings than
+    parameters leave a valley of equal cost, whose points count as different.
+    """
+    distance = trial.u - known.u
+    if np.abs(distance).max() > NEARLY_SAME or len(trial.residual) < len(trial.u):
+        return False
+    excess = trial.cost + trial.prior_cost - known.cost - known.prior_cost
+    quadratic = float(np.sum((known.jacobian @ distance) ** 2))
+    return abs(excess - quadratic) < EQUAL_COST
+
+
+def spread_rows(data: Observations) -> NDArray[np.int64]:
+    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
+    rows = []
+    for channel in data.channels:
+        measured = np.flatnonzero(np.isfinite(channel.reading))
+        in_order = measured[np.lexsort((data.slip[measured], data.load[measured]))]
+        few = np.linspace(0, len(in_order) - 1, min(ROWS_OF_STARTS, len(in_order)))
+        rows.append(in_order[few.round().astype(int)])
+    return np.unique(np.concatenate(rows))
 
 
 def _residual_noise(data: Observations, reading: Floats, residual: Floats, p: int) -> Floats:

@@ -90,10 +90,10 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         optimum = global_optimum(problem)
     for _ in range(NOISE_ROUNDS if undeclared or data.shared_errors else 1):
         problem = problem.with_noise_at(optimum)
-        optimum = descend(problem, optimum.u)
+        optimum = descend(problem, optimum.u, near=optimum.about)
     with_prior = optimum
     if np.any(at_prior_bound(optimum.u)):
-        with_prior = descend(problem, optimum.u, with_prior=True)
+        with_prior = descend(problem, optimum.u, with_prior=True, near=optimum.about)
     return _fit(problem, optimum, with_prior, undeclared=undeclared)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,28 +13,37 @@ from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
 from soilml.identification.data.operating_points import rows_by_gear
 from soilml.identification.free_parameters import FreeParameter
+from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.linear_response import linear_response
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]
-Predictor = Callable[[Case, Sequence[FreeParameter], Floats, Operating], dict[str, Floats]]
+#: Positions of rows among all.
+Rows = NDArray[np.int64] | slice
+Predictor = Callable[[Case, Sequence[FreeParameter], Floats, Operating, Rows], dict[str, Floats]]
 
 #: Step of differences, as a fraction of the prior: rounding errors of a reading at given sinkage
 #: (1e-14 of it) and curvature then both stay below 1e-5 of a derivative.
 STEP = 1e-6
+#: Names, beside the channels, of what else a response tells of each row.
+LOG_SINKAGE, SLOPE = "log_sinkage", "slope"
 
 
 def predict_channels(
     case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
 ) -> dict[str, Floats]:
     """Each channel (sets, rows) for parameter sets `u` (sets, p) as fractions of their priors."""
-    if case.gears:
-        return _by_gear(predict_channels, case, free, u, at)
-    changed = _changed(case, free, u)
-    force = changed.model(changed.soil, at)
-    return _channels(force, np.shape(force.torque), len(u))
+
+    def predict(
+        case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating, rows: Rows
+    ) -> dict[str, Floats]:
+        changed = _changed(case, free, u)
+        force = changed.model(changed.soil, at)
+        return _channels(force, np.shape(force.torque), len(u))
+
+    return _by_gear(predict, case, free, u, at)
 
 
 def _changed(case: Case, free: Sequence[FreeParameter], u: Floats) -> Case:
@@ -44,10 +53,12 @@ def _changed(case: Case, free: Sequence[FreeParameter], u: Floats) -> Case:
 
 def _channels(force: Force, shape: tuple[int, ...], sets: int) -> dict[str, Floats]:
     """Each channel (sets, rows) of forces whose shape is (sets, rows), (1, rows) or (rows,)."""
-    return {
-        name: np.broadcast_to(np.reshape(getattr(force, name), shape), (sets, shape[-1]))
-        for name in CHANNELS
-    }
+    return {name: _each_set(getattr(force, name), shape, sets) for name in CHANNELS}
+
+
+def _each_set(values: Floats, shape: tuple[int, ...], sets: int) -> Floats:
+    """Values of the model (sets, rows), which may be the same for all sets."""
+    return np.broadcast_to(np.reshape(values, shape), (sets, shape[-1]))
 
 
 def forces(case: Case, at: Operating) -> Force:
@@ -69,13 +80,16 @@ def forces(case: Case, at: Operating) -> Force:
 def _by_gear(
     predict: Predictor, case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
 ) -> dict[str, Floats]:
-    """The same for rows of several gears, with one call for each gear."""
-    total = {name: np.full((len(u), np.shape(at.slip)[0]), np.nan) for name in CHANNELS}
+    """What is predicted for each row (sets, rows), with one call for each gear of the case."""
+    if not case.gears:
+        return predict(case, free, u, at, slice(None))
+    total: dict[str, Floats] = {}
     for part in rows_by_gear(case, at):
         kept = [i for i, f in enumerate(free) if f.path in part.paths]
         own = [replace(free[i], path=part.paths[free[i].path]) for i in kept]
-        for name, values in predict(part.case, own, u[:, kept], part.at).items():
-            total[name][:, part.rows] = values
+        for name, values in predict(part.case, own, u[:, kept], part.at, part.rows).items():
+            empty = np.full((len(u), np.shape(at.slip)[0]), np.nan)
+            total.setdefault(name, empty)[:, part.rows] = values
     return total
 
 
@@ -115,31 +129,94 @@ def noise_at_prediction(case: Case, data: Observations, prediction: Floats) -> F
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
-def linearise(
-    case: Case, data: Observations, free: Sequence[FreeParameter], u: Floats
-) -> tuple[Floats, Floats]:
-    """Predictions (k,) at `u` (p,) and their Jacobian (k, p), by the implicit function theorem.
+@dataclass(frozen=True)
+class Linearisation:
+    """Readings to first order about fractions `u` (p,) of the priors, and the sinkage of each row.
 
-    One search for equilibrium, and one evaluation for each parameter at the sinkage found; see
-    `soilml.physics.linear_response`. The steps point away from a bound.
+    Attributes
+    ----------
+    u
+        Fractions (p,).
+    prediction, jacobian
+        Readings (k,) and their derivatives (k, p).
+    log_sinkage, rate
+        ln(z / m) of the rows (n,), and its derivatives (p, n); NaN without equilibrium.
+    slope
+        d ln W / d ln z, (n,).
     """
-    step = np.where(u + STEP <= 1.0, STEP, -STEP)
-    sets = np.concatenate([u[None, :], u + np.diag(step)])
-    y = stack_channels(data, _response_of_channels(case, free, sets, data.at))
-    return y[0], np.asarray(((y[1:] - y[0]) / step[:, None]).T)
+
+    u: Floats
+    prediction: Floats
+    jacobian: Floats
+    log_sinkage: Floats
+    rate: Floats
+    slope: Floats
+
+    def sinkage_at(self, u: Floats) -> SinkageEstimate:
+        """Where the search for equilibrium may start at other fractions (p,)."""
+        return SinkageEstimate(self.log_sinkage + (u - self.u) @ self.rate, self.slope)
+
+
+def linearise(
+    case: Case,
+    data: Observations,
+    free: Sequence[FreeParameter],
+    u: Floats,
+    near: Linearisation | None = None,
+) -> Linearisation:
+    """Predictions at `u` (p,) and their Jacobian, by the implicit function theorem.
+
+    One search for equilibrium, which starts from a linearisation `near` `u` if there is one, and
+    one evaluation for each parameter at the sinkage found; see `soilml.physics.linear_response`.
+    The steps point away from a bound.
+    """
+    step = np.where(u + STEP <= 1.0, STEP, -STEP)[:, None]
+    sets = np.concatenate([u[None, :], u + np.diag(step[:, 0])])
+    estimate = None if near is None else near.sinkage_at(u)
+
+    def response(
+        case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating, rows: Rows
+    ) -> dict[str, Floats]:
+        return _response_of_channels(case, free, u, at, _of_rows(estimate, rows))
+
+    found = _by_gear(response, case, free, sets, data.at)
+    y, log_sinkage = stack_channels(data, found), found[LOG_SINKAGE]
+    return Linearisation(
+        u,
+        y[0],
+        np.asarray(((y[1:] - y[0]) / step).T),
+        log_sinkage[0],
+        (log_sinkage[1:] - log_sinkage[0]) / step,
+        found[SLOPE][0],
+    )
+
+
+def _of_rows(estimate: SinkageEstimate | None, rows: Rows) -> SinkageEstimate | None:
+    if estimate is None:
+        return None
+    return SinkageEstimate(estimate.log_sinkage[rows], estimate.slope[rows])
 
 
 def _response_of_channels(
-    case: Case, free: Sequence[FreeParameter], u: Floats, at: Operating
+    case: Case,
+    free: Sequence[FreeParameter],
+    u: Floats,
+    at: Operating,
+    estimate: SinkageEstimate | None,
 ) -> dict[str, Floats]:
-    """Each channel (sets, rows), linear in the distance of `u` (sets, p) from its first row."""
-    if case.gears:
-        return _by_gear(_response_of_channels, case, free, u, at)
+    """Each channel (sets, rows), linear in the distance of `u` (sets, p) from its first row.
+
+    And so the logarithm of sinkage, and the slope of the load there.
+    """
     changed = _changed(case, free, u)
     load_case, shape = changed.model.load_case(changed.soil, at)
     # without a free parameter that acts here, all sets are the first one
     base = np.tile(np.arange(shape[-1]), shape[0] if len(shape) == 2 else 1)
-    return _channels(linear_response(load_case, base).reading, shape, len(u))
+    response = linear_response(load_case, base, estimate)
+    sinkage = {LOG_SINKAGE: response.sinkage.log_sinkage, SLOPE: response.sinkage.slope}
+    return _channels(response.reading, shape, len(u)) | {
+        name: _each_set(values, shape, len(u)) for name, values in sinkage.items()
+    }
 
 
 def propagated_input_noise(

@@ -84,7 +84,7 @@ def surface_sample(
     rng = np.random.default_rng(seed)
     points, predictions = [], []
     samples, surrogate, reach = start, None, REACH
-    for _ in range(MOST_ROUNDS):
+    for later in reversed(range(MOST_ROUNDS)):  # rounds that may follow
         if samples is None:
             u = latin_hypercube(POINTS_IN_CUBE * p, p, rng)
         else:
@@ -105,7 +105,12 @@ def surface_sample(
                 if region.share_at_faces(final) <= MOST_AT_FACES:
                     return final
                 reach *= FARTHER
-        found = _approached(SurrogateDensity(density, region, surface), errors, rng)
+        if later == 0:
+            return None
+        # the last round can only test the polynomials: before it they must serve for the density
+        least_power = 1.0 if later == 1 else LEAST_POWER
+        approach = SurrogateDensity(density, region, surface)
+        found = _approached(approach, errors, least_power, rng)
         if found is None:
             return None
         surrogate, samples = found
@@ -127,11 +132,14 @@ def _fitted(u: Floats, y: Floats, region: Region) -> tuple[PolynomialSurface, Fl
 
 
 def _approached(
-    surrogate: SurrogateDensity, errors: Floats, rng: np.random.Generator
+    surrogate: SurrogateDensity, errors: Floats, least_power: float, rng: np.random.Generator
 ) -> tuple[SurrogateDensity, ImportanceSample] | None:
-    """The largest power of the density that the surface is accurate enough for, and samples."""
+    """The largest power of the density that the surface is accurate enough for, and samples.
+
+    None where it is below the least power.
+    """
     power = 1.0
-    while power > LEAST_POWER:
+    while power >= least_power:
         surrogate = replace(surrogate, power=power)
         samples = surrogate.sample(INTERIM_SIZE)
         if not np.isfinite(samples.evidence):

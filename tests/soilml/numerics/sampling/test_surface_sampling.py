@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from soilml.numerics.sampling import surface_sampling
 from soilml.numerics.sampling.importance_sampling import importance_sample
 from soilml.numerics.sampling.polynomial_surface import Scaling, fit_surface, monomials, term_count
 from soilml.numerics.sampling.surface_sampling import surface_sample
@@ -131,3 +132,18 @@ def test_a_scaling_gives_unit_covariance_and_can_be_undone():
     assert weights @ z == pytest.approx(np.zeros(3), abs=1e-9)
     assert (z.T * weights) @ z == pytest.approx(np.eye(3), abs=1e-6)
     assert scaling.back(z) == pytest.approx(u, abs=1e-9)
+
+
+def test_the_last_round_only_tests_and_the_one_before_asks_for_the_density_itself(monkeypatch):
+    powers = []
+    approach = surface_sampling._approached
+
+    def noted(surrogate, errors, least_power, rng):
+        powers.append(least_power)
+        return approach(surrogate, errors, least_power, rng)
+
+    monkeypatch.setattr(surface_sampling, "_approached", noted)
+    assert surface_sample(Bent(1e-3, kink=2.0), 2) is None
+    assert len(powers) == surface_sampling.MOST_ROUNDS - 1
+    assert powers[-1] == 1.0
+    assert set(powers[:-1]) == {surface_sampling.LEAST_POWER}
