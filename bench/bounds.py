@@ -38,8 +38,10 @@ CASES = (
     ("simulate", "simulate m.toml --slip 0.05:0.6:1000 --load 30:120:1000 --out o.csv", 0),
     ("generate", "generate wheel o.parquet --rows 1000000 --workers 1", 0),
     ("estimate, rows", f"estimate {ROOT}/exported/wheel_lssvm.onnx runs.csv --out o.csv", 10**6),
-    ("identify, one fit", "identify m.toml runs.csv --out o.json", 10**5),
-    ("identify, refused", "identify m.toml runs.csv --out o.json", 10**6),
+    ("identify", "identify m.toml runs.csv --out o.json", 10**5),
+    ("identify, many", "identify m.toml runs.csv --out o.json", 10**6),
+    ("posterior", "identify m.toml runs.csv --method posterior --out o.json", 10**5),
+    ("posterior, many", "identify m.toml runs.csv --method posterior --out o.json", 10**6),
     ("gap", "gap m.toml runs.csv --out found", 1200),
     ("gap, refused", "gap m.toml runs.csv --out found", 12000),
 )  # fmt: skip

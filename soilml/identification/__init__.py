@@ -18,6 +18,7 @@ from soilml.identification.discrepancy import ignored_discrepancy, included_disc
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.linear import linear
+from soilml.identification.many_rows.condensed_rows import condensed
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
@@ -35,10 +36,11 @@ METHODS: dict[str, Method] = {
     "newton": newton,
     "posterior": posterior,
 }
-#: Rows of one fit; more neither fit into 1 GB nor end within minutes, and would add nothing.
-MOST_ROWS = 100_000
 #: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
+#: Most rows of one fit by a closed form, whose equations are all held at a time. Other methods
+#: condense rows that were driven alike, and take any table.
+MOST_ROWS = 100_000
 
 
 @solvable("the identification")
@@ -80,8 +82,8 @@ def identify(
     InputError
         For a method or a parameter that does not exist, or a method that is not for this gear.
     FitError
-        Where the rows do not determine a fit, or are more than `MOST_ROWS`; the message states what
-        is missing, or what to leave out.
+        Where the rows do not determine a fit, or are more than `MOST_ROWS` for a closed form; the
+        message states what is missing, or what to do instead.
     TableError
         Where the table names another wheel than the case's.
 
@@ -113,11 +115,10 @@ def identify(
             f"the {method} method is for rigid wheels, not for a {case.model.gear.name}; take "
             "nonlinear"
         )
-    if len(table) > MOST_ROWS:
-        every = -(-len(table) // MOST_ROWS)
+    if method in CLOSED_FORM and len(table) > MOST_ROWS:
         raise FitError(
-            f"{table.source}: {len(table)} rows in one fit; at most {MOST_ROWS} are possible: "
-            f"average rows that were driven alike, keep every {every}th, or fit each run by itself"
+            f"{table.source}: {len(table)} rows in one fit; the {method} method takes at most "
+            f"{MOST_ROWS}: take nonlinear, or fit each run by itself"
         )
     if as_usual and method in CLOSED_FORM:
         raise InputError(
@@ -127,6 +128,8 @@ def identify(
     if as_usual:
         errors = usual_errors(case, data.load, [f.path for f in selected])
         data = replace(data, shared_errors=errors)
+    if method not in CLOSED_FORM:
+        data = condensed(case, data, selected)
     fit = METHODS[method](case, data, selected)
     texts = [*_method_limits(fit, data, free), *_about_discrepancy(case, fit, data), *data.notes]
     return replace(fit, warnings=(*fit.warnings, *texts))

@@ -102,10 +102,10 @@ def _fit(
 ) -> Fit:
     """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
     data, free = problem.data, problem.free
-    p, k = len(free), len(optimum.residual)
-    freedom = k - p
-    misfit = optimum.cost / freedom if freedom > 0 else float("nan")
-    per_reading = misfit if freedom > 0 else optimum.cost / k
+    p, k = len(free), data.reading_count
+    freedom, squares = k - p, optimum.cost + data.squares_within
+    misfit = squares / freedom if freedom > 0 else float("nan")
+    per_reading = misfit if freedom > 0 else squares / k
     # mean plus two standard deviations of chi-squared over its degrees of freedom
     limit = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else SIGNIFICANT_COST / k
     excess = bool(not undeclared and per_reading > limit)
@@ -122,7 +122,7 @@ def _fit(
         values=values,
         covariance=covariance * np.outer(rate, rate),
         warnings=(),
-        rows_used=len(data.slip),
+        rows_used=data.row_count,
         remaining_fraction={
             f.path: float(np.sqrt(f.prior.fraction_precision) * linear_std[i])
             for i, f in enumerate(free)

@@ -122,7 +122,7 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         values=mean,
         covariance=covariance,
         warnings=_sampling_warnings(sample),
-        rows_used=len(data.slip),
+        rows_used=data.row_count,
         remaining_fraction={
             f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)
         },
@@ -184,6 +184,7 @@ def sample_posterior(
             "prior; use --method nonlinear, or narrow [soil.prior]"
         )
     cost = density.squared_residuals(sample.u[[int(np.argmax(sample.weights))]])
+    cost += data.squares_within
     return sample, cost / max(data.reading_count - len(free), 1)
 
 

@@ -36,6 +36,24 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class Condensed:
+    """What condensed rows stand for.
+
+    Attributes
+    ----------
+    rows, readings
+        Numbers of measured rows, and of their readings.
+    squares
+        Sum of the squared distances of the readings from those of their condensed rows, in standard
+        deviations of their noise.
+    """
+
+    rows: int
+    readings: int
+    squares: float
+
+
+@dataclass(frozen=True)
 class Observations:
     """Rows (n,): operating points with their noise, and the readings of the channels.
 
@@ -53,6 +71,8 @@ class Observations:
         Warnings about the table.
     shared_errors
         Standard deviations of the errors that all rows share, by name, as [bias] declares them.
+    condensed
+        What the rows stand for, where many were condensed.
     """
 
     at: Operating
@@ -62,6 +82,7 @@ class Observations:
     excluded_channels: tuple[str, ...]
     notes: tuple[str, ...] = ()
     shared_errors: Mapping[str, float] = field(default_factory=dict)
+    condensed: Condensed | None = None
 
     @property
     def slip(self) -> Floats:
@@ -74,15 +95,28 @@ class Observations:
         return np.asarray(self.at.load)
 
     @property
+    def row_count(self) -> int:
+        """Number of measured rows."""
+        return len(self.slip) if self.condensed is None else self.condensed.rows
+
+    @property
     def reading_count(self) -> int:
-        """Number of readings k of all channels."""
+        """Number of measured readings of all channels."""
+        if self.condensed is not None:
+            return self.condensed.readings
         return sum(int(np.isfinite(c.reading).sum()) for c in self.channels)
+
+    @property
+    def squares_within(self) -> float:
+        """Squared residuals, in standard deviations, that condensed rows no longer show."""
+        return 0.0 if self.condensed is None else self.condensed.squares
 
     def of_rows(self, rows: NDArray[np.int64]) -> Observations:
         """Some of the rows."""
         return replace(
             self,
             at=operating_points_of_rows(self.at, rows),
+            condensed=None,
             slip_std=self.slip_std[rows],
             load_std=self.load_std[rows],
             channels=tuple(

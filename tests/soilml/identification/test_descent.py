@@ -26,10 +26,10 @@ def with_model(tmp_path, text=THREE_CHANNEL_MODEL):
     return read_case(path)
 
 
-def measured(case, rng, rows, channels=CHANNELS, gear=None):
+def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):
     """Readings with the noise of the case, of a soil drawn from its priors."""
     true = case.with_values({n: float(p.at(rng.random())) for n, p in case.prior.items()})
-    slip, load = rng.uniform(-0.05, 0.6, rows), rng.choice([35.0, 60.0, 85.0, 110.0], rows)
+    slip, load = rng.uniform(least_slip, 0.6, rows), rng.choice([35.0, 60.0, 85.0, 110.0], rows)
     columns = {"slip": slip, "load_N": load}
     models = {None: true.model, **true.gears}
     for key in channels:
@@ -117,13 +117,13 @@ def test_few_rows_for_the_starts_hold_all_channels_and_the_heaviest_load(tmp_pat
 def test_the_optimum_is_the_lowest_of_descents_from_all_points(tmp_path):
     case = with_model(tmp_path)
     case = replace(case, prior=case.prior | {"n": Prior(0.5, 1.4)})
-    for seed in range(6):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         channels = list(CHANNELS)[: 1 + seed % 3]
         problem = problem_of(case, measured(case, rng, 24, channels))
         found = descent.global_optimum(problem)
         starts, _ = descent._ranked_starts(problem)
-        lowest = min(descent.descend(problem, start).cost for start in starts[::4])
+        lowest = min(descent.descend(problem, start).cost for start in starts[::13])
         assert found.cost <= lowest + descent.EQUAL_COST
 
 

@@ -1,0 +1,138 @@
+"""Tables of many rows: rows that were driven alike become one, with the same answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_descent import measured, two_gears, with_model
+
+from soilml import identification, identify
+from soilml.config.measurement_noise import Noise
+from soilml.errors import FitError
+from soilml.identification.data.observations import read_observations
+from soilml.identification.free_parameters import select_free
+from soilml.identification.many_rows import condensed_rows
+from soilml.identification.many_rows.cells import cells_of
+from soilml.io.table import Table
+
+ROWS = 2400
+
+
+@pytest.fixture
+def case(tmp_path):
+    return with_model(tmp_path)
+
+
+@pytest.fixture
+def condensing(monkeypatch):
+    """Tables are condensed from a thousand rows on, into few."""
+    monkeypatch.setattr(condensed_rows, "MOST_ROWS", 1000)
+    monkeypatch.setattr(condensed_rows, "CELLS", 400)
+    monkeypatch.setattr(condensed_rows, "FIRST_ROWS", 300)
+
+
+def both(monkeypatch, case, table, **options):
+    """The fit of condensed rows, and that of all."""
+    condensed = identify(case, table, **options)
+    monkeypatch.setattr(condensed_rows, "MOST_ROWS", len(table))
+    return condensed, identify(case, table, **options)
+
+
+@pytest.mark.parametrize("kind", ["plain", "gears", "gaps", "undeclared", "slip noise"])
+def test_least_squares_of_condensed_rows_are_those_of_all(case, condensing, monkeypatch, kind):
+    rng, gear = np.random.default_rng(11), None
+    if kind == "gears":
+        case, gear = two_gears(case), np.asarray(["narrow", "wide"] * (ROWS // 2))
+    table = measured(case, rng, ROWS, gear=gear, least_slip=0.05)
+    if kind == "gaps":
+        blank = rng.random(ROWS) < 0.5
+        columns = {name: table[name] for name in table.columns}
+        table = Table(columns | {"sinkage_m": np.where(blank, np.nan, table["sinkage_m"])})
+    if kind == "undeclared":
+        case = replace(case, noise={})
+    if kind == "slip noise":
+        case = replace(case, noise=case.noise | {"slip": Noise(constant=0.005)})
+    few, all_rows = both(monkeypatch, case, table)
+    assert np.abs(few.values - all_rows.values).max() > 0.0  # not the same computation
+    assert np.abs((few.values - all_rows.values) / all_rows.std).max() < 0.05
+    assert few.std == pytest.approx(all_rows.std, rel=0.02)
+    assert few.misfit == pytest.approx(all_rows.misfit, rel=0.02)
+    assert few.warnings == all_rows.warnings
+    assert few.rows_used == ROWS
+
+
+def test_rows_of_very_different_weight_are_not_one(case, condensing, monkeypatch):
+    # a relative noise is small where the torque changes its sign, at little slip
+    table = measured(case, np.random.default_rng(11), ROWS, least_slip=-0.05)
+    few, all_rows = both(monkeypatch, case, table)
+    assert few.std == pytest.approx(all_rows.std, rel=0.02)
+    assert np.abs((few.values - all_rows.values) / all_rows.std).max() < 0.3
+
+
+def test_the_posterior_of_condensed_rows_is_that_of_least_squares(case, condensing):
+    table = measured(case, np.random.default_rng(12), ROWS)
+    sampled, fit = identify(case, table, method="posterior"), identify(case, table)
+    assert np.abs((sampled.values - fit.values) / fit.std).max() < 0.15
+    assert sampled.std == pytest.approx(fit.std, rel=0.1)
+    assert sampled.misfit == pytest.approx(fit.misfit, rel=1e-3)
+    assert sampled.rows_used == ROWS
+
+
+def test_residuals_within_the_cells_count_as_misfit(case, condensing):
+    table = measured(case, np.random.default_rng(13), ROWS)
+    louder = table["torque_Nm"] * (1.0 + 0.06 * np.random.default_rng(14).standard_normal(ROWS))
+    columns = {name: table[name] for name in ("slip", "load_N")} | {"torque_Nm": louder}
+    fit = identify(case, Table(columns))
+    assert fit.misfit == pytest.approx((0.06**2 + 0.02**2) / 0.02**2, rel=0.1)
+    assert any("times the declared noise" in text for text in fit.warnings)
+
+
+def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condensing):
+    table = measured(case, np.random.default_rng(15), ROWS)
+    data = read_observations(case, table)
+    few = condensed_rows.condensed(case, data, select_free(case, None))
+    assert len(few.slip) == condensed_rows.CELLS
+    assert few.reading_count == data.reading_count == 3 * ROWS
+    for channel, own in zip(few.channels, data.channels, strict=True):
+        assert (channel.std**-2.0).sum() == pytest.approx((own.std**-2.0).sum(), rel=0.01)
+
+
+def test_rows_without_equilibrium_stay(case, condensing):
+    table = measured(case, np.random.default_rng(16), ROWS)
+    load = np.where(np.arange(ROWS) == 5, 1e6, table["load_N"])
+    columns = {name: table[name] for name in table.columns} | {"load_N": load}
+    data = read_observations(case, Table(columns))
+    known = case.with_values({"cohesion": 500.0})
+    cell = np.arange(ROWS) // 20
+    few = condensed_rows._condensed_at(known, data, condensed_rows._residuals(known, data), cell)
+    assert len(few.slip) == ROWS // 20 + 1
+    assert few.load[-1] == 1e6
+    assert few.channels[0].reading[-1] == data.channels[0].reading[5]
+
+
+def test_few_rows_are_left_as_they_are(case):
+    data = read_observations(case, measured(case, np.random.default_rng(17), 20))
+    assert condensed_rows.condensed(case, data, select_free(case, None)) is data
+
+
+def test_closed_forms_refuse_more_rows_than_they_hold(case, monkeypatch):
+    monkeypatch.setattr(identification, "MOST_ROWS", 19)
+    table = measured(case, np.random.default_rng(18), 20)
+    for method in identification.CLOSED_FORM:
+        with pytest.raises(FitError, match=r"20 rows in one fit; .* at most 19: take nonlinear"):
+            identify(case, table, method=method)
+
+
+def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
+    rng = np.random.default_rng(0)
+    points = np.stack([rng.random(5000), rng.choice([0.0, 3.0], 5000)], axis=1)
+    groups = (np.arange(5000) % 2).astype(np.int64)
+    cell = cells_of(points, groups, 64)
+    assert np.unique(cell).tolist() == list(range(64))
+    for number in range(64):
+        own = cell == number
+        assert len(np.unique(groups[own])) == 1
+        assert len(np.unique(points[own, 1])) == 1  # two levels are not mixed
+        assert np.ptp(points[own, 0]) < 4.0 / 16.0
+    equal = cells_of(np.repeat([[0.1, 0.2], [0.3, 0.4]], 10, axis=0), np.zeros(20, np.int64), 64)
+    assert len(np.unique(equal)) == 2
