@@ -1,5 +1,6 @@
 """The rigid wheel against adaptive quadrature, and as sentences of physics."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -256,3 +257,14 @@ def test_any_shape_broadcasts_and_chunks_do_not_matter(gear, monkeypatch):
     monkeypatch.setattr("soilml.physics.model.CHUNK", 3)
     np.testing.assert_allclose(model(SAND, at).torque, together.torque, rtol=1e-12)
     assert model(SAND, Operating(slip=np.zeros(0), load=60.0)).torque.shape[-1] == 0
+
+
+def test_bearing_comes_from_both_moduli_over_the_width_of_the_wheel():
+    at = Operating(slip=np.asarray([0.2]), load=60.0)
+    shares = {
+        share: WHEEL(replace(SAND, kphi=1e6 * (1.0 - share), kc=1e6 * share * 0.12), at)
+        for share in (0.0, 0.5, 0.9)
+    }
+    for force in shares.values():  # also where kc / b is the larger part
+        assert force.status == 0
+        assert force.sinkage == pytest.approx(shares[0.0].sinkage, rel=1e-9)

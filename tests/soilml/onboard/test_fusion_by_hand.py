@@ -1,0 +1,114 @@
+"""Rules of fusion against their equations, evaluated by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_joint_errors import Sensors
+
+from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.fusion.joint_errors import (
+    DISAGREEMENT,
+    LEAST_AVERAGES,
+    JointErrors,
+    joint_errors,
+)
+from soilml.onboard.fusion.narrower_prior import _without_prior, within_box
+from soilml.onboard.fusion.truncated_normal import truncated_normal
+
+ONE = np.ones(2)
+RULE = JointErrors(
+    correlation=np.eye(2),
+    alone=None,
+    centre=0.3,
+    gain=0.8,
+    std_scale=1.5,
+    middles=np.asarray([0.0, 1.0]),
+    low=np.asarray([-1.0, -2.0]),
+    high=np.asarray([1.5, 3.5]),
+    repeats=16.0,
+    repeat_std=2.0,
+    repeat_interval=3.0,
+)
+
+
+def test_estimates_that_agree_have_the_std_of_their_mean():
+    mean, std = np.asarray([[0.5], [0.5]]), np.full((2, 1), 0.1)
+    centre, spread, disagreement = RULE.fuse(mean, std, ONE)
+    assert disagreement == pytest.approx([0.0])
+    assert centre == pytest.approx([0.3 + 0.8 * (0.5 - 0.3)])
+    assert spread == pytest.approx([1.5 * 0.1 / np.sqrt(2.0)])
+
+
+def test_the_std_grows_with_the_disagreement_over_its_limit():
+    apart = 4.0 * DISAGREEMENT * 0.1 * np.sqrt(2.0)
+    mean, std = np.asarray([[0.5], [0.5 + apart]]), np.full((2, 1), 0.1)
+    _, spread, disagreement = RULE.fuse(mean, std, ONE)
+    assert disagreement == pytest.approx([4.0 * DISAGREEMENT])
+    assert spread == pytest.approx([4.0 * 1.5 * 0.1 / np.sqrt(2.0)])
+
+
+@pytest.mark.parametrize(
+    ("count", "factor", "reach"), [(1.0, 1.0, 1.0), (4.0, 1.5, 2.0), (64.0, 2.0, 3.0)]
+)
+def test_factors_of_repetition_are_interpolated_in_the_logarithm(count, factor, reach):
+    mean, std = np.asarray([[0.5], [0.5]]), np.full((2, 1), 0.1)
+    _, spread, _ = RULE.fuse(mean, std, ONE, count)
+    assert spread == pytest.approx([factor * 1.5 * 0.1 / np.sqrt(2.0)])
+    low, high = RULE.interval(np.asarray([0.5]), np.asarray([0.1]), count)
+    assert low == pytest.approx([0.5 - 1.5 * reach * 0.1])
+    assert high == pytest.approx([0.5 + 2.5 * reach * 0.1])
+
+
+def test_repetition_needs_enough_averages_of_the_same_number_of_readings():
+    first, second = Sensors().files()
+    (rule,) = joint_errors((first, second))
+    assert rule.repeats == 8.0
+
+    def changed(file, key, **values):
+        return replace(file, key=key, **values)
+
+    other = changed(second, "other", repeats=np.asarray([1, 5]))
+    (rule,) = joint_errors((first, other))
+    assert rule.repeats == 1.0
+    few = changed(second, "few", average_rows=second.average_rows + 700 - LEAST_AVERAGES + 1)
+    (rule,) = joint_errors((first, few))
+    assert rule.repeats == 1.0
+
+
+def test_the_share_that_repeated_readings_have_in_common_is_that_of_their_errors():
+    for soil in (0.2, 0.7):
+        file = Sensors(common=0.1, soil=soil).files()[0]
+        assert file.common_share() == pytest.approx([soil], abs=1e-9)
+    alone = replace(file, repeats=np.asarray([1]), repeat_std=np.ones((1, 1)))
+    assert alone.common_share() == pytest.approx([1.0])
+
+
+def test_numbers_are_written_with_four_digits():
+    entry = Sensors().files()[0].entry()
+    assert isinstance(HeldOutErrors.of(entry), HeldOutErrors)
+    for row in entry["mean"][:50]:
+        assert float(f"{row[0]:.4g}") == row[0]
+
+
+def test_a_box_scales_the_std_as_the_estimate_differs_from_a_normal_one():
+    mean, covariance = np.asarray([0.12]), np.asarray([[0.07**2]])
+    prior, box = (np.zeros(1), np.ones(1)), (np.zeros(1), np.asarray([0.3]))
+    interval = np.asarray([[0.02], [0.25]])
+    found = within_box(mean, covariance, interval, prior, box)
+    normal = _without_prior(mean, covariance, *prior)
+    before, after = truncated_normal(*normal, *prior), truncated_normal(*normal, *box)
+    assert before.std != pytest.approx([0.07], rel=0.02)  # the estimate is not a cut normal one
+    assert found.std == pytest.approx(after.std * 0.07 / before.std)
+    left = after.std / before.std
+    assert found.mean == pytest.approx(after.mean + left * (mean - before.mean))
+    assert found.high == pytest.approx(after.high + left * (0.25 - before.high))
+    assert found.mass == pytest.approx(after.mass / before.mass)
+
+
+def test_what_readings_tell_without_the_prior_is_the_difference_of_precisions():
+    mean, std, width = np.asarray([0.4, 3.0]), np.asarray([0.1, 0.5]), np.asarray([1.0, 4.0])
+    found, covariance = _without_prior(mean, np.diag(std**2), np.zeros(2), width)
+    precision = 1.0 / std**2 - 12.0 / width**2
+    assert np.diag(covariance) == pytest.approx(1.0 / precision)
+    assert found == pytest.approx((mean / std**2 - 0.5 * width * 12.0 / width**2) / precision)
