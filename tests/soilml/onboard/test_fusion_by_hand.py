@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_joint_errors import Sensors
 
+from soilml.numerics.estimate_fusion import best_linear
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.fusion.joint_errors import (
     DISAGREEMENT,
@@ -112,3 +113,23 @@ def test_what_readings_tell_without_the_prior_is_the_difference_of_precisions():
     precision = 1.0 / std**2 - 12.0 / width**2
     assert np.diag(covariance) == pytest.approx(1.0 / precision)
     assert found == pytest.approx((mean / std**2 - 0.5 * width * 12.0 / width**2) / precision)
+
+
+def test_averages_that_are_worse_than_readings_share_no_more_than_everything():
+    file = replace(Sensors().files()[0], repeat_std=np.asarray([[1.0], [1.1]]))
+    assert file.common_share() == pytest.approx([1.0])
+    file = replace(file, repeat_std=np.asarray([[1.0], [0.1]]))
+    assert file.common_share() == pytest.approx([0.0])
+
+
+def test_gain_and_ends_of_the_interval_are_those_of_the_held_out_rows():
+    files = Sensors().files()
+    (rule,) = joint_errors(tuple(files))
+    assert rule.alone is None
+    truth = files[0].truth[:, 0]
+    mean = np.stack([file.mean[:, 0] for file in files])
+    std = np.stack([file.std[:, 0] for file in files])
+    away = best_linear(mean, std, rule.correlation).mean - truth.mean()
+    assert rule.gain == pytest.approx(away @ (truth - truth.mean()) / (away @ away))
+    assert np.all((rule.low < -1.2) & (rule.low > -2.4))  # normal errors: near 1.645
+    assert np.all((rule.high > 1.2) & (rule.high < 2.4))
