@@ -41,7 +41,6 @@ CASES = (
     ("identify", "identify m.toml runs.csv --out o.json", 10**5),
     ("identify, many", "identify m.toml runs.csv --out o.json", 10**6),
     ("posterior", "identify m.toml runs.csv --method posterior --out o.json", 10**5),
-    ("posterior, many", "identify m.toml runs.csv --method posterior --out o.json", 10**6),
     ("gap", "gap m.toml runs.csv --out found", 1200),
     ("gap, refused", "gap m.toml runs.csv --out found", 12000),
 )  # fmt: skip
