@@ -20,7 +20,7 @@ from soilml.identification.predictions import (
     propagated_input_noise,
     stack_channels,
 )
-from soilml.identification.shared_errors.columns import SharedErrors, linearised_errors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.numerics.noise_and_process import Whitener
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.sobol_points import sobol_points
@@ -62,26 +62,27 @@ class LeastSquaresProblem:
 
     case: Case
     data: Observations
-    free: Sequence[FreeParameter]
+    free: Sequence[FreeParameter]  # those of the soil, then errors
+    errors: int  # how many of them are errors that all rows share
     reading: Floats  # (k,)
     std: Floats  # (k,)
     columns: Floats  # (k, q) of the model discrepancy
-    shared: SharedErrors
+    shared: Floats  # (k, e) of errors that all rows share
 
     @cached_property
     def whitener(self) -> Whitener:
         """Inverse root of the covariance of noise, discrepancy and shared errors."""
-        return Whitener.of(self.std, np.hstack([self.columns, self.shared.columns]))
+        return Whitener.of(self.std, np.hstack([self.columns, self.shared]))
 
     @cached_property
-    def normal(self) -> NDArray[np.bool_]:
-        """Which parameters have a normal prior, (p,)."""
-        return np.asarray([f.prior.normal_std is not None for f in self.free])
+    def normal_std(self) -> Floats:
+        """Standard deviation of each normal prior, (p,); infinite where the prior is uniform."""
+        return np.asarray([f.normal_std or f.prior.normal_std or np.inf for f in self.free])
 
     @cached_property
     def prior_precision(self) -> Floats:
         """Precision (p,) of each prior, in fractions."""
-        return np.asarray([f.prior.fraction_precision for f in self.free])
+        return np.asarray([f.fraction_precision for f in self.free])
 
     def normal_deviation(self, u: Floats) -> tuple[Floats, Floats]:
         """Values over the standard deviations of normal priors, and derivatives by u; (p,) each.
@@ -89,8 +90,7 @@ class LeastSquaresProblem:
         Zero where the prior is uniform.
         """
         values, rates = values_at(self.free, u)
-        scale = np.asarray([1.0 / (f.prior.normal_std or np.inf) for f in self.free])
-        return values * scale, rates * scale
+        return values / self.normal_std, rates / self.normal_std
 
     def predict(self, u: Floats) -> Floats:
         """Predictions (sets, k) at u (sets, p)."""
@@ -102,7 +102,7 @@ class LeastSquaresProblem:
 
     def residual(self, prediction: Floats) -> Floats:
         """Residuals in the units of the readings."""
-        residual = prediction + self.shared.offset - self.reading
+        residual = prediction - self.reading
         return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
 
     def linearised(self, u: Floats) -> tuple[Floats, Floats]:
@@ -113,7 +113,7 @@ class LeastSquaresProblem:
     def with_noise_at(self, optimum: Optimum) -> LeastSquaresProblem:
         """The same problem, noise taken at the optimum's predictions or from its residuals.
 
-        Errors that all rows share are linearised there.
+        Errors of sensors that all rows share are in proportion to the same predictions.
         """
         case, data, free = self.case, self.data, self.free
         prediction = self.predict(optimum.u[None, :])
@@ -121,17 +121,23 @@ class LeastSquaresProblem:
         slip_std, load_std = data.slip_std, data.load_std
         from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
         total = np.hypot(declared, stack_channels(data, from_inputs)[0])
-        estimated = _residual_noise(data, self.reading, self.residual(prediction)[0], len(free))
+        estimated = _residual_noise(
+            data, self.reading, self.residual(prediction)[0], len(free) - self.errors
+        )
         std = np.where(np.isfinite(total), total, estimated)
-        shared = linearised_errors(case, free, optimum.u, data, std, self.columns)
-        return replace(self, std=std, shared=shared)
+        shared = sensor_columns(data, np.nan_to_num(prediction))
+        return replace(self, std=std, shared=self.shared if shared is None else shared[0])
 
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:
-    """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
-    free = problem.free
+    """The lowest optimum; among equally low ones the nearest to the middle of the prior.
+
+    Descents start without errors that all rows share.
+    """
+    free, errors = problem.free, problem.errors
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    starts = np.vstack([nominal, sobol_points(len(free))])
+    soils = sobol_points(len(free) - errors)
+    starts = np.vstack([nominal, np.hstack([soils, np.full((len(soils), errors), 0.5)])])
     few = max(1, MOST_PREDICTIONS // problem.reading.size)  # sets of predictions held at a time
     blocks = [starts[i : i + few] for i in range(0, len(starts), few)]
     costs, feasible = [], False
@@ -182,7 +188,8 @@ def descend(
             latest[key] = problem.linearised(u)
         return latest[key]
 
-    uniform_root = np.where(problem.normal, 0.0, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0))
+    uniform = np.isinf(problem.normal_std)
+    uniform_root = np.where(uniform, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0), 0.0)
 
     def prior(u: Floats) -> tuple[Floats, Floats]:
         """Deviations (p,) from the priors in standard deviations, and their derivatives (p,)."""
