@@ -125,8 +125,9 @@ class LeastSquaresProblem:
             data, self.reading, self.residual(prediction)[0], len(free) - self.errors
         )
         std = np.where(np.isfinite(total), total, estimated)
-        shared = sensor_columns(data, np.nan_to_num(prediction))
-        return replace(self, std=std, shared=self.shared if shared is None else shared[0])
+        sensors = sensor_columns(data, prediction)
+        shared = self.shared if sensors is None else sensors[0]
+        return replace(self, std=std, shared=shared)
 
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:

@@ -17,12 +17,13 @@ from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.predictions import stacked_readings
 from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Rounds in which the fit is repeated with noise estimated from its residuals, and with shared
-#: errors linearised at its optimum.
+#: Rounds in which the fit is repeated with noise estimated from its residuals, and with errors of
+#: sensors in proportion to its predictions.
 NOISE_ROUNDS = 3
 #: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
 INITIAL_NOISE = 0.05
@@ -82,9 +83,6 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         )
     problem = least_squares_problem(case, data, free)
     optimum = global_optimum(problem)
-    if data.shared_errors:  # the optimum without them may be far from the one with them
-        problem = problem.with_noise_at(optimum)
-        optimum = global_optimum(problem)
     for _ in range(NOISE_ROUNDS if undeclared or data.shared_errors else 1):
         problem = problem.with_noise_at(optimum)
         optimum = descend(problem, optimum.u)
@@ -100,6 +98,7 @@ def least_squares_problem(
     """The problem with noise as declared, and errors that all rows share as parameters."""
     reading, declared = stacked_readings(data)
     case, unknown = with_modelled_errors(case, data, free)
+    shared = sensor_columns(data, reading[None, :])
     return LeastSquaresProblem(
         case=case,
         data=data,
@@ -108,7 +107,7 @@ def least_squares_problem(
         reading=reading,
         std=np.where(np.isfinite(declared), declared, _initial_noise(data)),
         columns=stacked_columns(discrepancy_columns(case, data)),
-        shared=np.zeros((reading.size, 0)),
+        shared=np.zeros((reading.size, 0)) if shared is None else shared[0],
     )
 
 

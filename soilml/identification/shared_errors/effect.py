@@ -31,8 +31,8 @@ class ModelledErrors(Effect):
         \ln \frac{k}{k'} = e_k + e_{ks} |s| + e_{kW} \ln\frac{W}{W_0}
 
     A contact error of e ends the contact of a wheel at e times the angle that `exit-angle` of usual
-    size ends it at. The contact of a negative one ends ahead of the axle, and tends to the angle of
-    the largest stress.
+    size ends it at: ahead of the axle for a negative one, up to the angle of the largest stress,
+    which is approached smoothly.
     """
 
     name: ClassVar[str] = "modelled-errors"
@@ -74,5 +74,6 @@ class ModelledErrors(Effect):
         moved = -self.contact * entry_angle(kappa * geometry.sinkage, geometry.radius)
         room = geometry.peak - geometry.exit
         room = xp.maximum(room, xp.full_like(room, TINY))
-        ahead = room * (1.0 - xp.exp(-xp.maximum(moved, xp.zeros_like(moved)) / room))
+        forward = xp.maximum(moved, xp.zeros_like(moved))
+        ahead = forward / xp.sqrt(xp.sqrt(1.0 + (forward / room) ** 4))
         return replace(geometry, exit=geometry.exit + xp.where(moved < 0.0, moved, ahead))

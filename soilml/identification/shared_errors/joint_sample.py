@@ -15,9 +15,9 @@ Floats = NDArray[np.float64]
 
 #: Samples of the normal distribution, and their spread over that of the linearised posterior.
 SAMPLES, WIDER = 2048, 1.2
-#: Readings from which on polynomials take the place of the model, and rounds after which they must
-#: be accurate enough for the density itself.
-FEWEST_READINGS, TEMPERED_ROUNDS = 8, 2
+#: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
+#: and rounds after which they must be accurate enough for the density itself.
+FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
 #: Standard deviations from the middle at which the region ends in which the model is sampled.
 REACH = 6.0
 #: Most rows where the model is sampled, which bounds the time.
@@ -37,14 +37,13 @@ def joint_sample(density: PosteriorDensity, problem: LeastSquaresProblem) -> Imp
     """
     start = normal_start(problem, density.noise_scale)
     density.linearise_at_mean(start)
-    if len(density.reading) - density.errors >= FEWEST_READINGS:
-        p = len(density.free)
+    rows, p = len(density.data.slip), len(density.free)
+    if rows >= FEWEST_ROWS:
         found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS)
         if found is not None and density.linearise_at_mean(found):
             found = surface_sample(density, p, found)
         if found is not None:
             return found
-    rows = len(density.data.slip)
     if rows > MOST_SAMPLED_ROWS:
         chosen = np.random.default_rng(0).permutation(rows)[:MOST_SAMPLED_ROWS]
         density = density.of_rows(np.sort(chosen))
@@ -57,8 +56,8 @@ def normal_start(problem: LeastSquaresProblem, noise_scale: float) -> Importance
     That of the linearised posterior, with normal priors of the same variances. Raises `FitError`
     as `joint_sample` does.
     """
-    problem = problem.with_noise_at(global_optimum(problem))
-    optimum = descend(problem, global_optimum(problem).u, with_prior=True)
+    optimum = global_optimum(problem)
+    optimum = descend(problem.with_noise_at(optimum), optimum.u, with_prior=True)
     precision = optimum.jacobian.T @ optimum.jacobian / noise_scale**2
     root = np.linalg.cholesky(np.linalg.inv(precision + np.diag(problem.prior_precision)))
     normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.u)))

@@ -20,6 +20,7 @@ def sensor_columns(data: Observations, prediction: Floats) -> Floats | None:
     integrated out without approximation: their covariance is that of the columns. None without such
     errors of a measured channel.
     """
+    prediction = np.nan_to_num(prediction)
     errors, parts, stop = data.shared_errors, [], 0
     for channel in data.channels:
         measured = np.isfinite(channel.reading)
