@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from datagen.blind_sets.mechanism import Mechanism
 from datagen.blind_sets.wheel_state import ContactArc, WheelState
@@ -33,7 +34,7 @@ KAPPA, FARTHEST_END = 0.15, 0.8
 
 @dataclass(frozen=True)
 class DrawnErrors:
-    """Errors of each soil, arrays (sets, 1)."""
+    """Errors of each soil, arrays (sets, 1); or of each row, (rows,)."""
 
     slip_offset: Floats
     load_gain: Floats
@@ -54,14 +55,22 @@ class DrawnErrors:
         names = [f.name for f in fields(DrawnErrors)]
         return DrawnErrors(**{n: size * STD[n] * rng.standard_normal((sets, 1)) for n in names})
 
+    def of_rows(self, soil: NDArray[np.int64]) -> DrawnErrors:
+        """Errors of rows (rows,) on soils of these numbers; those of sensors are of the first."""
+        values = {f.name: getattr(self, f.name)[:, 0] for f in fields(self)}
+        of_model = ("bearing", "bearing_by_slip", "bearing_by_load", "contact")
+        return DrawnErrors(
+            **{n: v[soil if n in of_model else np.zeros_like(soil)] for n, v in values.items()}
+        )
+
     def factor_of_bearing(self, slip: Floats, load: Floats) -> Floats:
-        """True bearing pressure over that assumed, (sets, rows)."""
+        """True bearing pressure over that assumed, of the shape of slip."""
         by_load = self.bearing_by_load * np.log(load / np.median(load))
         return np.asarray(np.exp(self.bearing + self.bearing_by_slip * slip + by_load))
 
-    def mechanism(self, rows: int) -> Mechanism:
-        """The contact, for arrays (sets rows,)."""
-        share = np.repeat(self.contact[:, 0], rows)
+    def mechanism(self, slip: Floats) -> Mechanism:
+        """The contact, for rows of the shape of slip, one after another."""
+        share = np.broadcast_to(self.contact, slip.shape).reshape(-1)
 
         def arc(arc: ContactArc, state: WheelState, size: float) -> ContactArc:
             end = -size * share * np.arccos(1.0 - KAPPA * arc.sinkage / state.radius)
@@ -70,7 +79,7 @@ class DrawnErrors:
         return Mechanism(name="contact", size="share", reference=1.0, unit="1", arc=arc)
 
     def of_readings(self, true: dict[str, Floats], load: Floats) -> dict[str, Floats]:
-        """What sensors read without noise, (sets, rows)."""
+        """What sensors read without noise, of the shape of load."""
         pull = self.pull_error * load + self.pull_offset * np.median(load)
         return {
             "torque": (1.0 + self.torque_gain) * true["torque"],

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.catalogue import MECHANISMS
@@ -98,7 +97,7 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
     name, size = world.mechanism or ("", 0.0)
     active = [(MECHANISMS["A"][name], size)] if name else []
     if world.usual:
-        active.append((errors.mechanism(rows), 1.0))
+        active.append((errors.mechanism(slip), 1.0))
     found = solve_equilibrium(state, tuple(active))
     forces = {
         "torque": (1.0 + world.torque_gain) * found.torque.reshape(slip.shape),

@@ -25,7 +25,7 @@ def sensor_columns(data: Observations, prediction: Floats) -> Floats | None:
     for channel in data.channels:
         measured = np.isfinite(channel.reading)
         start, stop = stop, stop + int(measured.sum())
-        factors = {
+        factors: dict[str, tuple[str, Floats | float]] = {
             "torque_gain": ("torque", prediction[:, start:stop]),
             "torque_bias": ("torque", 1.0),
             "sinkage": ("sinkage", prediction[:, start:stop]),

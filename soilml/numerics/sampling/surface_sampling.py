@@ -79,7 +79,8 @@ def surface_sample(
     Returns
     -------
     ImportanceSample or None
-        None where no polynomial is accurate enough, or soon enough, or where predictions are missing in the region.
+        None where no polynomial is accurate enough, or not soon enough, or where predictions are
+        missing in the region.
 
     References
     ----------

@@ -95,8 +95,7 @@ def test_errors_far_from_zero_leave_what_integration_of_the_model_gives(case, me
     grid = np.meshgrid(np.linspace(10.0, 5990.0, 300), np.linspace(-1.6, 1.6, 80), indexing="ij")
     cohesion, e = (axis.ravel() for axis in grid)
     squares = [
-        (((y - rows[key]) / std[key]) ** 2).sum(axis=1)
-        for key, y in predicted(cohesion, e).items()
+        (((y - rows[key]) / std[key]) ** 2).sum(axis=1) for key, y in predicted(cohesion, e).items()
     ]
     log = -0.5 * (sum(squares) + (e / 0.4) ** 2)
     weights = np.exp(log - log.max())
