@@ -70,8 +70,8 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Its mean has the least expected squared error of all estimators on data from this model, prior
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
-    integrated out: its covariance is added to that of the noise, and so is that of offsets and gains
-    of the sensors that all rows share. Shared errors that the model is solved with (of slip, load,
+    integrated out: its covariance is added to that of the noise, and so is that of offsets and
+    gains of the sensors that all rows share. Shared errors that the model is solved with (of slip, load,
     bearing and contact) are sampled together with the soil, and left out of the result. A parameter
     that the rows do not determine has its prior as posterior.
 
