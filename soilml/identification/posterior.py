@@ -71,9 +71,9 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
     integrated out: its covariance is added to that of the noise, and so is that of offsets and
-    gains of the sensors that all rows share. Shared errors that the model is solved with (of slip, load,
-    bearing and contact) are sampled together with the soil, and left out of the result. A parameter
-    that the rows do not determine has its prior as posterior.
+    gains of the sensors that all rows share. Shared errors that the model is solved with (of slip,
+    load, bearing and contact) are sampled together with the soil, and left out of the result. A
+    parameter that the rows do not determine has its prior as posterior.
 
     From eight readings on, polynomials of the parameters take the place of the model in the region
     of the posterior. They are used if they change the log density there by at most 0.1 (one
