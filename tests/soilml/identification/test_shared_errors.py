@@ -50,7 +50,7 @@ def measured(case, rng, channels=("torque_Nm",), slip_offset=0.0, bearing=1.0, t
 
 @pytest.mark.parametrize("method", ["nonlinear", "posterior"])
 def test_a_bias_gives_what_an_effect_with_a_normal_prior_gives(case, method):
-    """The offset of slip integrated in closed form, and estimated with the soil."""
+    """An error of the sensor that is left out of the result, and one that is part of it."""
     table = measured(case, np.random.default_rng(1), slip_offset=0.02)
     fit = identify(replace(case, bias={"slip": Noise(constant=0.015)}), table, method=method)
     effect = replace(
@@ -64,7 +64,8 @@ def test_a_bias_gives_what_an_effect_with_a_normal_prior_gives(case, method):
     assert (fit.values - expected) / std == pytest.approx(0.0, abs=0.3)
     assert fit.std == pytest.approx(std, rel=0.2)
     exact = identify(case, table, method=method)
-    assert (fit.std > exact.std).all()
+    assert (fit.std > 0.95 * exact.std).all()  # at another soil, whose sensitivities differ
+    assert fit.std[2] > 1.3 * exact.std[2]
     assert any("slip 0.015" in text for text in fit.warnings)
 
 
