@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
+from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.catalogue import active_mechanisms
 from datagen.blind_sets.reference_wheel import solve_equilibrium
@@ -69,7 +70,13 @@ class Day:
         return {name: float(values[i]) for name, values in self.readings.items()}
 
 
-def simulate_day(seed: int, drift: str = "friction", mechanism: str = "", size: float = 0.0) -> Day:
+def simulate_day(
+    seed: int,
+    drift: str = "friction",
+    mechanism: str = "",
+    size: float = 0.0,
+    usual_errors: float = 0.0,
+) -> Day:
     """A day on three soils with glitches, a stuck sensor and a pause, which ends with a drift.
 
     Parameters
@@ -80,6 +87,9 @@ def simulate_day(seed: int, drift: str = "friction", mechanism: str = "", size: 
         ``friction``: the friction angle falls; ``zero``: the zero of the torque sensor rises.
     mechanism, size : str and float
         Key of an effect that the model of the files lacks, and its size; none by default.
+    usual_errors : float
+        Size, over the usual one, of random errors of the sensors on this day and of the model on
+        each soil.
     """
     rng = np.random.default_rng(seed)
     count = 3 * ROWS_PER_SOIL + ROWS_PAUSED + ROWS_DRIFTING
@@ -95,13 +105,19 @@ def simulate_day(seed: int, drift: str = "friction", mechanism: str = "", size: 
         # from the upper half of the friction angles, so that it stays inside of the prior
         soils[of_row == 2, 1] = max(three[2, 1], SOILS[1, 0] - FRICTION_DRIFT)
         soils[:, 1] += FRICTION_DRIFT * ramp
-    torque = wheel_torque(slip, load, soils, mechanism, size)
+    errors = DrawnErrors.drawn(3, seed, usual_errors)
+    torque = wheel_torque(slip, load, soils, errors.of_rows(of_row), mechanism, size)
     changes = []
     for row in (ROWS_PER_SOIL, 2 * ROWS_PER_SOIL):
         here = slice(row, row + ROWS_PER_SOIL)
         before = np.broadcast_to(soils[row - 1], (ROWS_PER_SOIL, 3))
-        ratio = torque[here] / wheel_torque(slip[here], load[here], before, mechanism, size)
+        of_before = errors.of_rows(np.full(ROWS_PER_SOIL, of_row[row - 1]))
+        other = wheel_torque(slip[here], load[here], before, of_before, mechanism, size)
+        ratio = torque[here] / other
         changes.append((row, float(np.sqrt(np.mean((ratio - 1.0) ** 2)))))
+    sensors = errors.of_rows(of_row)
+    torque = torque * (1.0 + sensors.torque_gain)
+    slip, load = slip + sensors.slip_offset, load * (1.0 + sensors.load_gain)
     torque = torque * (1.0 + TORQUE_NOISE * rng.standard_normal(count))
     torque += ZERO_DRIFT * ramp * (drift == "zero")
     slip = np.clip(slip + SLIP_STD * rng.standard_normal(count), 0.01, 0.99)
@@ -120,15 +136,28 @@ def simulate_day(seed: int, drift: str = "friction", mechanism: str = "", size: 
 
 
 def wheel_torque(
-    slip: Floats, load: Floats, soils: Floats, mechanism: str = "", size: float = 0.0
+    slip: Floats,
+    load: Floats,
+    soils: Floats,
+    errors: DrawnErrors,
+    mechanism: str = "",
+    size: float = 0.0,
 ) -> Floats:
-    """Torque (n,) of the reference wheel on dry sand of other strength, without noise."""
+    """Torque (n,) of the reference wheel on dry sand of other strength, without noise.
+
+    `errors` of the rows are those of the model that is assumed.
+    """
     wheel = {"radius": 0.15, "width": 0.12, "speed": 0.1, "pass_number": 1.0, "slip_angle": 0.0}
     sand = {"kc": 990.0, "kphi": 1528430.0, "n": 1.1, "a0": 0.4, "a1": 0.15, "unit_weight": 15e3}
     known = {name: np.full(len(slip), value) for name, value in (wheel | sand).items()}
     strength = dict(zip(("cohesion", "friction_angle", "shear_modulus"), soils.T, strict=True))
-    active = tuple((m, size) for m in active_mechanisms("A", mechanism)) if mechanism else ()
-    return solve_equilibrium(WheelState(slip=slip, load=load, **known, **strength), active).torque
+    bearing = errors.factor_of_bearing(slip, load)
+    known |= {name: bearing * known[name] for name in ("kc", "kphi")}
+    active = [(m, size) for m in active_mechanisms("A", mechanism)] if mechanism else []
+    if errors.contact.any():
+        active.append((errors.mechanism(slip), 1.0))
+    state = WheelState(slip=slip, load=load, **known, **strength)
+    return solve_equilibrium(state, tuple(active)).torque
 
 
 def _add_glitch(slip: Floats, torque: Floats, row: int, number: int) -> None:

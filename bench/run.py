@@ -167,7 +167,9 @@ PARTS = (
         f"within {streams.WITHIN} rows; median and largest delay in rows. Drift: how many were "
         "flagged; median and largest delay. Last column: of the rows in a drift whose mean is off "
         "by more than so many standard deviations, the share that carries a flag, and their "
-        "number.",
+        "number. `model_error` 1: the file with the usual errors of its model, and without them "
+        "otherwise. All usual errors: those of sensors are drawn for each day, those of bearing "
+        "and contact for each soil.",
         lambda folder: streams.table(ROOT / "exported" / "wheel.onnx"),
     ),
     Part("loo", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()),

@@ -22,11 +22,12 @@ SETTLED = 20
 WITHIN = 40
 #: Sizes of a change, as rms relative change of torque, by which delays are listed.
 SIZES = (0.0, 0.1, 0.2, np.inf)
-#: Lines of the table: drift at the end of the day, mechanism that the files do not model, its size.
+#: Lines of the table: mechanism that the files do not model, its size, and size of usual errors.
 WORLDS = (
-    ("as modelled", "", 0.0),
-    ("slip-sinkage 0.3", "slip-sinkage", 0.3),
-    ("grousers of 10 mm", "grousers", 0.01),
+    ("as modelled", "", 0.0, 0.0),
+    ("slip-sinkage 0.3", "slip-sinkage", 0.3, 0.0),
+    ("grousers of 10 mm", "grousers", 0.01, 0.0),
+    ("all usual errors", "", 0.0, 1.0),
 )
 #: Deviation in standard deviations of a soil that the estimate is wrong about.
 FAR = 3.0
@@ -150,6 +151,7 @@ def table(file: Path, days: int = DAYS) -> str:
     """The table of BENCHMARKS.md."""
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
     estimator = Estimator.load(file).on(noise=noise)
+    usual = estimator.on(model_error=1.0)
     edges = ("below 10 %", "10 to 20 %", "above 20 %")
     heads = (
         "world and method",
@@ -165,11 +167,13 @@ def table(file: Path, days: int = DAYS) -> str:
         f"flagged beyond {FAR:g} std",
     )
     lines = [f"| {' | '.join(heads)} |", "|---|" + "---:|" * (len(heads) - 1)]
-    for name, mechanism, size in WORLDS:
+    for name, mechanism, size, errors in WORLDS:
         driven = [
-            simulate_day(seed, ("friction", "zero")[seed % 2], mechanism, size)
+            simulate_day(seed, ("friction", "zero")[seed % 2], mechanism, size, errors)
             for seed in range(100, 100 + days)
         ]
         lines.append(_line(f"{name}, tracker", tracked(estimator, driven)))
+        lines.append(_line(f"{name}, tracker, `model_error` 1", tracked(usual, driven)))
         lines.append(_line(f"{name}, plain steps", stepped(estimator, driven)))
+        lines.append(_line(f"{name}, plain steps, `model_error` 1", stepped(usual, driven)))
     return "\n".join(lines)

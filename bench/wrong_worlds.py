@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.catalogue import MECHANISMS
 from datagen.blind_sets.reference_wheel import solve_equilibrium
@@ -36,6 +37,7 @@ class World:
     torque_gain: float = 0.0
     slip_std: float = 0.0
     load_std: float = 0.0  # share of the load
+    usual: float = 0.0  # size of errors of all kinds, drawn for each soil, over the usual one
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ WORLDS = (
     World("exit angle, kappa 0.25", mechanism=("exit-angle", 0.25)),
     World("lugs of 10 mm", mechanism=("grousers", 0.01)),
     World("bearing pressure x 2", bearing=2.0),
+    World("all usual errors at once", usual=1.0),
 )
 #: Worlds whose noise of slip or load is declared.
 NOISE_OF_SLIP = tuple(World(f"slip std {s:g}", slip_std=s) for s in (0.01, 0.02, 0.04, 0.06))
@@ -73,16 +76,18 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
     truth = np.stack([case.prior[name].at(rng.random(sets)) for name in SHEAR], axis=1)
     slip = recipe.slip.at(rng.random((sets, rows)))
     load = rng.choice(LOADS, (sets, rows))
+    errors = DrawnErrors.drawn(sets, seed, world.usual)
     gear: Any = case.model.gear
     fixed = {name: getattr(case.soil, name) for name in ("n", "a0", "a1", "unit_weight")}
-    fixed |= {name: world.bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
     fixed |= {"radius": gear.radius, "width": gear.width}
     fixed |= {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
     of_soil = {name: truth[:, i, None] for i, name in enumerate(SHEAR)}
     driven = {
-        "slip": np.maximum(slip - world.slip_offset, LEAST_SLIP),
-        "load": load / (1.0 + world.load_gain),
+        "slip": np.maximum(slip - world.slip_offset - errors.slip_offset, LEAST_SLIP),
+        "load": load / (1.0 + world.load_gain + errors.load_gain),
     }
+    bearing = world.bearing * errors.factor_of_bearing(driven["slip"], driven["load"])
+    of_soil |= {name: bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
     state = WheelState(
         **{
             name: np.broadcast_to(np.asarray(value, float), slip.shape).reshape(-1)
@@ -90,13 +95,16 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         }
     )
     name, size = world.mechanism or ("", 0.0)
-    active = ((MECHANISMS["A"][name], size),) if name else ()
-    found = solve_equilibrium(state, active)
-    true = {
+    active = [(MECHANISMS["A"][name], size)] if name else []
+    if world.usual:
+        active.append((errors.mechanism(slip), 1.0))
+    found = solve_equilibrium(state, tuple(active))
+    forces = {
         "torque": (1.0 + world.torque_gain) * found.torque.reshape(slip.shape),
         "sinkage": found.sinkage.reshape(slip.shape),
         "drawbar_pull": found.pull.reshape(slip.shape),
     }
+    true = errors.of_readings(forces, load)
     readings = {
         key: value + case.noise[column(key)].std(value) * rng.standard_normal(slip.shape)
         for key, value in true.items()

@@ -21,7 +21,7 @@ from soilml.identification.predictions import (
     propagated_input_noise,
     stack_channels,
 )
-from soilml.identification.shared_errors.columns import SharedErrors, linearised_errors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.numerics.noise_and_process import Whitener
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.sobol_points import sobol_points
@@ -66,26 +66,27 @@ class LeastSquaresProblem:
 
     case: Case
     data: Observations
-    free: Sequence[FreeParameter]
+    free: Sequence[FreeParameter]  # those of the soil, then errors
+    errors: int  # how many of them are errors that all rows share
     reading: Floats  # (k,)
     std: Floats  # (k,)
     columns: Floats  # (k, q) of the model discrepancy
-    shared: SharedErrors
+    shared: Floats  # (k, e) of errors that all rows share
 
     @cached_property
     def whitener(self) -> Whitener:
         """Inverse root of the covariance of noise, discrepancy and shared errors."""
-        return Whitener.of(self.std, np.hstack([self.columns, self.shared.columns]))
+        return Whitener.of(self.std, np.hstack([self.columns, self.shared]))
 
     @cached_property
-    def normal(self) -> NDArray[np.bool_]:
-        """Which parameters have a normal prior, (p,)."""
-        return np.asarray([f.prior.normal_std is not None for f in self.free])
+    def normal_std(self) -> Floats:
+        """Standard deviation of each normal prior, (p,); infinite where the prior is uniform."""
+        return np.asarray([f.normal_std or f.prior.normal_std or np.inf for f in self.free])
 
     @cached_property
     def prior_precision(self) -> Floats:
         """Precision (p,) of each prior, in fractions."""
-        return np.asarray([f.prior.fraction_precision for f in self.free])
+        return np.asarray([f.fraction_precision for f in self.free])
 
     def normal_deviation(self, u: Floats) -> tuple[Floats, Floats]:
         """Values over the standard deviations of normal priors, and derivatives by u; (p,) each.
@@ -93,8 +94,7 @@ class LeastSquaresProblem:
         Zero where the prior is uniform.
         """
         values, rates = values_at(self.free, u)
-        scale = np.asarray([1.0 / (f.prior.normal_std or np.inf) for f in self.free])
-        return values * scale, rates * scale
+        return values / self.normal_std, rates / self.normal_std
 
     def predict(self, u: Floats) -> Floats:
         """Predictions (sets, k) at u (sets, p)."""
@@ -106,7 +106,7 @@ class LeastSquaresProblem:
 
     def residual(self, prediction: Floats) -> Floats:
         """Residuals in the units of the readings."""
-        residual = prediction + self.shared.offset - self.reading
+        residual = prediction - self.reading
         return np.where(np.isnan(residual), NO_EQUILIBRIUM * self.std, residual)
 
     def linearised(self, u: Floats, near: Linearisation | None) -> Optimum:
@@ -127,13 +127,13 @@ class LeastSquaresProblem:
             reading=self.reading[kept],
             std=self.std[kept],
             columns=self.columns[kept],
-            shared=SharedErrors(self.shared.offset[kept], self.shared.columns[kept]),
+            shared=self.shared[kept],
         )
 
     def with_noise_at(self, optimum: Optimum) -> LeastSquaresProblem:
         """The same problem, noise taken at the optimum's predictions or from its residuals.
 
-        Errors that all rows share are linearised there.
+        Errors of sensors that all rows share are in proportion to the same predictions.
         """
         case, data, free = self.case, self.data, self.free
         prediction = optimum.about.prediction[None, :]
@@ -141,14 +141,20 @@ class LeastSquaresProblem:
         slip_std, load_std = data.slip_std, data.load_std
         from_inputs = propagated_input_noise(case, free, optimum.u, data.at, slip_std, load_std)
         total = np.hypot(declared, stack_channels(data, from_inputs)[0])
-        estimated = _residual_noise(data, self.reading, self.residual(prediction)[0], len(free))
+        estimated = _residual_noise(
+            data, self.reading, self.residual(prediction)[0], len(free) - self.errors
+        )
         std = np.where(np.isfinite(total), total, estimated)
-        shared = linearised_errors(case, free, optimum.u, data, std, self.columns)
+        sensors = sensor_columns(data, prediction)
+        shared = self.shared if sensors is None else sensors[0]
         return replace(self, std=std, shared=shared)
 
 
 def global_optimum(problem: LeastSquaresProblem) -> Optimum:
-    """The lowest optimum; among equally low ones the nearest to the middle of the prior."""
+    """The lowest optimum; among equally low ones the nearest to the middle of the prior.
+
+    Descents start without errors that all rows share.
+    """
     starts, order = _ranked_starts(problem)
     found: list[Optimum] = []
     for i in dict.fromkeys([*order[:STARTS], 0]):  # the nominal point too
@@ -176,7 +182,9 @@ def _ranked_starts(problem: LeastSquaresProblem) -> tuple[Floats, list[int]]:
     """
     free = problem.free
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    starts = np.vstack([nominal, sobol_points(len(free))])
+    soils = sobol_points(len(free) - problem.errors)
+    without = np.full((len(soils), problem.errors), 0.5)
+    starts = np.vstack([nominal, np.hstack([soils, without])])
     part = problem.of_rows(spread_rows(problem.data))
     costs = (part.whitened(part.predict(starts)) ** 2).sum(axis=1)
     return starts, [int(i) for i in np.argsort(costs, kind="stable")]
@@ -219,7 +227,8 @@ def descend(
                 raise _SameOptimumError(known)
         return latest[key]
 
-    uniform_root = np.where(problem.normal, 0.0, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0))
+    uniform = np.isinf(problem.normal_std)
+    uniform_root = np.where(uniform, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0), 0.0)
 
     def prior(u: Floats) -> tuple[Floats, Floats]:
         """Deviations (p,) from the priors in standard deviations, and their derivatives (p,)."""

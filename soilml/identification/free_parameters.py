@@ -43,6 +43,9 @@ class FreeParameter:
         The value that the case gives it.
     assumed
         Whether the case has no prior for it.
+    normal_std
+        Standard deviation of a normal density about zero that is to be multiplied with that of the
+        prior; None where there is none.
     """
 
     path: str
@@ -50,6 +53,14 @@ class FreeParameter:
     prior: Prior
     nominal: float
     assumed: bool
+    normal_std: float | None = None
+
+    @property
+    def fraction_precision(self) -> float:
+        """Precision of the normal distribution, in fractions, that stands for prior and density."""
+        if self.normal_std is None:
+            return self.prior.fraction_precision
+        return ((self.prior.upper - self.prior.lower) / self.normal_std) ** 2
 
 
 def select_free(case: Case, names: Sequence[str] | None) -> list[FreeParameter]:

@@ -16,13 +16,14 @@ from soilml.identification.discrepancy import discrepancy_columns, stacked_colum
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, values_at
 from soilml.identification.predictions import stacked_readings
-from soilml.identification.shared_errors.columns import SharedErrors
+from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
-#: Rounds in which the fit is repeated with noise estimated from its residuals, and with shared
-#: errors linearised at its optimum.
+#: Rounds in which the fit is repeated with noise estimated from its residuals, and with errors of
+#: sensors in proportion to its predictions.
 NOISE_ROUNDS = 3
 #: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
 INITIAL_NOISE = 0.05
@@ -39,7 +40,8 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     relative to the prediction: relative to the reading it would bias the fit low, by about twice
     its square, since readings with negative errors would have the larger weights. With a model
     discrepancy, or errors that all rows share, residuals are weighted by the inverse covariance of
-    noise, discrepancy and these errors.
+    noise, discrepancy and these errors. Errors that the model is solved with (of slip, load,
+    bearing and contact) are estimated with the soil, and left out of the result.
 
     Normal priors take part in the sum. The covariance is that of the linearised problem with a
     Gaussian prior of the uniform one's variance, enlarged by the squared distance between the
@@ -79,31 +81,51 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
             f"{data.reading_count} readings cannot determine {len(free)} parameters and their own "
             "noise; declare it in [noise]"
         )
-    reading, declared = stacked_readings(data)
-    std = np.where(np.isfinite(declared), declared, _initial_noise(data))
-    columns = stacked_columns(discrepancy_columns(case, data))
-    shared = SharedErrors.none(reading.size)
-    problem = LeastSquaresProblem(case, data, free, reading, std, columns, shared)
+    problem = least_squares_problem(case, data, free)
     optimum = global_optimum(problem)
-    if data.shared_errors:  # the optimum without them may be far from the one with them
-        problem = problem.with_noise_at(optimum)
-        optimum = global_optimum(problem)
     for _ in range(NOISE_ROUNDS if undeclared or data.shared_errors else 1):
         problem = problem.with_noise_at(optimum)
         optimum = descend(problem, optimum.u, near=optimum.about)
     with_prior = optimum
-    if np.any(at_prior_bound(optimum.u)):
+    if np.any(at_prior_bound(optimum.u[: len(free)])):
         with_prior = descend(problem, optimum.u, with_prior=True, near=optimum.about)
-    return _fit(problem, optimum, with_prior, undeclared=undeclared)
+    return _fit(case, free, problem, optimum, with_prior, undeclared=undeclared)
+
+
+def least_squares_problem(
+    case: Case, data: Observations, free: Sequence[FreeParameter]
+) -> LeastSquaresProblem:
+    """The problem with noise as declared, and errors that all rows share as parameters."""
+    reading, declared = stacked_readings(data)
+    case, unknown = with_modelled_errors(case, data, free)
+    shared = sensor_columns(data, reading[None, :])
+    return LeastSquaresProblem(
+        case=case,
+        data=data,
+        free=unknown,
+        errors=len(unknown) - len(free),
+        reading=reading,
+        std=np.where(np.isfinite(declared), declared, _initial_noise(data)),
+        columns=stacked_columns(discrepancy_columns(case, data)),
+        shared=np.zeros((reading.size, 0)) if shared is None else shared[0],
+    )
 
 
 def _fit(
-    problem: LeastSquaresProblem, optimum: Optimum, with_prior: Optimum, *, undeclared: bool
+    case: Case,
+    free: Sequence[FreeParameter],
+    problem: LeastSquaresProblem,
+    optimum: Optimum,
+    with_prior: Optimum,
+    *,
+    undeclared: bool,
 ) -> Fit:
     """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
-    data, free = problem.data, problem.free
+    data = problem.data
     p, k = len(free), data.reading_count
     freedom, squares = k - p, optimum.cost + data.squares_within
+    if problem.errors:
+        squares += float(np.sum(errors_at(problem.free, optimum.u[None, :]) ** 2))
     misfit = squares / freedom if freedom > 0 else float("nan")
     per_reading = misfit if freedom > 0 else squares / k
     # mean plus two standard deviations of chi-squared over its degrees of freedom
@@ -112,9 +134,14 @@ def _fit(
     precision = problem.prior_precision
     noise_variance = per_reading if excess else 1.0
     covariance, linear_std = _covariance(
-        optimum, with_prior, noise_variance, precision, np.where(problem.normal, 0.0, precision)
+        optimum,
+        with_prior,
+        noise_variance,
+        precision,
+        np.where(np.isinf(problem.normal_std), precision, 0.0),
     )
-    values, rate = values_at(free, optimum.u)
+    covariance = covariance[:p, :p]
+    values, rate = values_at(free, optimum.u[:p])
     fit = Fit(
         method="nonlinear",
         names=tuple(f.path for f in free),
@@ -132,10 +159,10 @@ def _fit(
     )
     return with_warnings(
         fit,
-        problem.case,
+        case,
         data,
         free,
-        optimum.u,
+        optimum.u[:p],
         excess_residuals=excess,
         undeclared=undeclared,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from soilml.identification.data.observations import Observations
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.shared_errors.joint_sample import joint_sample
 from soilml.numerics.chi_squared import chi_squared_quantile
 from soilml.numerics.sampling.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
@@ -38,8 +40,6 @@ Z_999 = 3.09
 FEWEST_READINGS = 8
 #: Rows from which on a part of them, of the second number, is sampled first.
 MANY_ROWS, FIRST_ROWS = 512, 256
-#: Rounds in which errors that all rows share are linearised where the posterior is.
-SHARED_ROUNDS = 2
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0
 
@@ -70,8 +70,10 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Its mean has the least expected squared error of all estimators on data from this model, prior
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
-    integrated out: its covariance is added to that of the noise, and so is that of errors that all
-    rows share. A parameter that the rows do not determine has its prior as posterior.
+    integrated out: its covariance is added to that of the noise, and so is that of offsets and
+    gains of the sensors that all rows share. Shared errors that the model is solved with (of slip,
+    load, bearing and contact) are sampled together with the soil, and left out of the result. A
+    parameter that the rows do not determine has its prior as posterior.
 
     From eight readings on, polynomials of the parameters take the place of the model in the region
     of the posterior. They are used if they change the log density there by at most 0.1 (one
@@ -146,11 +148,16 @@ def posterior_samples(
     """
     sample, misfit = sample_posterior(case, data, free)
     if misfit <= misfit_limit(data.reading_count - len(free)):
-        return PosteriorSamples(sample, misfit, 1.0)
+        return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
     noise_scale = float(np.sqrt(misfit))
     start = sample if noise_scale < SIMILAR_NOISE else None
     sample, _ = sample_posterior(case, data, free, noise_scale, start)
-    return PosteriorSamples(sample, misfit, noise_scale)
+    return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
+
+
+def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
+    """The same samples of the first p parameters alone."""
+    return replace(sample, u=sample.u[:, :p])
 
 
 def sample_posterior(
@@ -160,7 +167,7 @@ def sample_posterior(
     noise_scale: float = 1.0,
     start: ImportanceSample | None = None,
 ) -> tuple[ImportanceSample, float]:
-    """Weighted fractions of the priors, and the misfit.
+    """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
 
     Noise and discrepancy are multiplied by `noise_scale`. Samples of a similar posterior, `start`,
     show the region.
@@ -170,7 +177,12 @@ def sample_posterior(
     `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, data, free, noise_scale)
-    sample = _from_surface(density, start)
+    if density.errors:
+        sample: ImportanceSample | None = joint_sample(
+            density, least_squares_problem(case, data, free)
+        )
+    else:
+        sample = _from_surface(density, start)
     if sample is None:
         sample = importance_sample(density, len(free))
     if not np.isfinite(sample.evidence):
@@ -204,9 +216,8 @@ def _from_surface(
     sample = surface_sample(density, p, start)
     if sample is None and start is not None:  # it may have shown the wrong region
         sample = surface_sample(density, p)
-    for _ in range(SHARED_ROUNDS if data.shared_errors else 1):
-        if sample is not None and density.linearise_at_mean(sample):
-            sample = surface_sample(density, p, sample)
+    if sample is not None and density.linearise_at_mean(sample):
+        sample = surface_sample(density, p, sample)
     return sample
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ from soilml.identification.predictions import (
     stack_channels,
     stacked_readings,
 )
-from soilml.identification.shared_errors.columns import SharedErrors, linearised_errors
+from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
 from soilml.numerics.sampling.importance_sampling import ImportanceSample
 from soilml.quantities import column
@@ -31,7 +33,12 @@ MOST_EVALUATIONS = 200_000
 
 
 class PosteriorDensity:
-    """Log posterior density (sets,), up to a constant, of fractions of the priors (sets, p)."""
+    """Log posterior density (sets,), up to a constant, of fractions of the priors (sets, p).
+
+    Errors that all rows share and that the model is solved with are parameters too, behind those of
+    the soil; each is taken as a reading of zero, in standard deviations. Other errors that all rows
+    share are integrated out.
+    """
 
     def __init__(
         self,
@@ -46,16 +53,15 @@ class PosteriorDensity:
                 f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
                 "[noise]"
             )
-        self.case, self.data, self.free, self.noise_scale = case, data, free, noise_scale
-        self.reading = stacked_readings(data)[0]
+        self.case, self.free = with_modelled_errors(case, data, free)
+        self.data, self.noise_scale = data, noise_scale
+        #: how many of the parameters are errors
+        self.errors = len(self.free) - len(free)
+        self.reading = np.append(stacked_readings(data)[0], np.zeros(self.errors))
         self.columns = discrepancy_columns(case, data)
         self.noisy_input = bool(np.any(data.slip_std > 0.0) or np.any(data.load_std > 0.0))
-        #: whether noise of slip and load, or errors that all rows share, change the readings
-        self.linearises = self.noisy_input or bool(data.shared_errors)
-        #: noise that slip and load cause, (k,), and shared errors; linearised at the best of the
-        #: first samples
+        #: noise that slip and load cause, (k,); linearised at the best of the first samples
         self.input_std: Floats | None = None
-        self.shared = SharedErrors.none(self.reading.size)
 
     def __call__(self, u: Floats) -> Floats:
         """Log density (sets,) of parameter sets `u` (sets, p)."""
@@ -67,7 +73,12 @@ class PosteriorDensity:
 
     def of_rows(self, rows: NDArray[np.int64]) -> PosteriorDensity:
         """The density of some of the rows alone."""
-        return PosteriorDensity(self.case, self.data.of_rows(rows), self.free, self.noise_scale)
+        part = copy(self)
+        part.data = self.data.of_rows(rows)
+        part.reading = np.append(stacked_readings(part.data)[0], np.zeros(self.errors))
+        part.columns = discrepancy_columns(self.case, part.data)
+        part.input_std = None
+        return part
 
     def squared_residuals(self, u: Floats) -> float:
         """Sum of squared residuals in declared standard deviations, of one parameter set (1, p)."""
@@ -78,19 +89,16 @@ class PosteriorDensity:
         """Readings (sets, k) that parameter sets `u` (sets, p) predict."""
         size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
         y = np.concatenate([self._predict(u[i : i + size]) for i in range(0, len(u), size)])
-        if self.linearises and self.input_std is None:
+        if self.noisy_input and self.input_std is None:
             squares = self._squares_and_log_determinant(y, self._std(y))[0]
             self._linearise(u[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))])
         return y
 
     def linearise_at_mean(self, sample: ImportanceSample) -> bool:
-        """Linearise noise of slip and load, and shared errors, at the mean of samples.
-
-        False where there are none.
-        """
-        if self.linearises:
+        """Linearise noise of slip and load at the mean of samples; False where there is none."""
+        if self.noisy_input:
             self._linearise(sample.mean(sample.u))
-        return self.linearises
+        return self.noisy_input
 
     def of_predictions(self, y: Floats) -> Floats:
         """Log posterior density (sets,) of parameters that predict these readings (sets, k)."""
@@ -101,13 +109,17 @@ class PosteriorDensity:
 
     def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
         """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
-        groups, shared = self.columns, self.shared.columns
-        if shared.shape[1]:  # they act on several channels
-            groups = (np.hstack([stacked_columns(self.columns), shared]),)
-        residual = y + (self.shared.offset - self.reading)
+        groups, shared = self.columns, sensor_columns(self.data, y)
+        if shared is not None:  # they act on several channels
+            process = stacked_columns(self.columns)
+            process = np.broadcast_to(process, (len(shared), *process.shape))
+            groups = (np.concatenate([process, shared], axis=-1),)
+        if self.errors:
+            groups = (*groups, np.zeros((self.errors, 0)))
+        residual = y - self.reading
         squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
         for columns in groups:
-            start, stop = stop, stop + len(columns)
+            start, stop = stop, stop + columns.shape[-2]
             own = squared_residuals_and_log_determinant(
                 residual[:, start:stop], std[:, start:stop], columns
             )
@@ -117,16 +129,17 @@ class PosteriorDensity:
     def _std(self, y: Floats) -> Floats:
         """Standard deviations (sets, k) of the readings where these are predicted."""
         std = noise_at_prediction(self.case, self.data, y)
-        return std if self.input_std is None else np.asarray(np.hypot(std, self.input_std))
+        if self.input_std is not None:
+            std = np.asarray(np.hypot(std, self.input_std))
+        return np.hstack([std, np.ones((len(y), self.errors))]) if self.errors else std
 
     def _predict(self, u: Floats) -> Floats:
-        return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
+        channels = predict_channels(self.case, self.free, u, self.data.at)
+        y = stack_channels(self.data, channels)
+        return np.hstack([y, errors_at(self.free, u)]) if self.errors else y
 
     def _linearise(self, u: Floats) -> None:
-        """Take changes of the readings with slip, load and shared errors at fractions (p,)."""
+        """Take changes of the readings with slip and load at fractions (p,)."""
         case, free, data = self.case, self.free, self.data
         noise = propagated_input_noise(case, free, u, data.at, data.slip_std, data.load_std)
         self.input_std = np.asarray(stack_channels(data, noise)[0])
-        std = self._std(self._predict(u[None, :]))[0]
-        process = stacked_columns(self.columns)
-        self.shared = linearised_errors(case, free, u, data, std, process)

@@ -54,7 +54,7 @@ def squared_residuals_and_log_determinant(
     ----------
     residual, std : array (n, k)
         Residuals, and standard deviations of the noise; each of the n sets has its own.
-    columns : array (k, q)
+    columns : array (k, q) or (n, k, q)
         C, the columns of the process.
 
     References
@@ -66,11 +66,11 @@ def squared_residuals_and_log_determinant(
         std = std[:1]
     scaled = residual / std
     log_determinant = np.broadcast_to(np.log(std).sum(axis=1), len(residual))
-    if columns.shape[1] == 0:
+    if columns.shape[-1] == 0:
         return (scaled**2).sum(axis=1), log_determinant
     basis = columns / std[..., None]
     transposed = np.swapaxes(basis, 1, 2)
-    inner = transposed @ basis + np.eye(columns.shape[1])
+    inner = transposed @ basis + np.eye(columns.shape[-1])
     weights = np.linalg.solve(inner, transposed @ scaled[..., None])
     left = scaled - (basis @ weights)[..., 0]
     squared = (left**2).sum(axis=1) + (weights[..., 0] ** 2).sum(axis=1)

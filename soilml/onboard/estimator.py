@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NoReturn, final
 
 import numpy as np
@@ -224,7 +225,7 @@ class Estimator:
         """The memory of a soil before its first reading; see `step`."""
         return self._configured_sets.start(self.memory_id)
 
-    @property
+    @cached_property
     def memory_id(self) -> str:
         """Identity of its memories: file, wheel, bearing, prior and sensors' common errors."""
         of_set = {} if self.sets is None else self.sets.context_values | self.sets.common_errors

@@ -50,6 +50,8 @@ Feed = dict[str, NDArray[Any]]
 ROWS_PER_CALL = 256
 #: Standard deviations that may be zero.
 MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
+#: Everything that is read of a row.
+KNOWN = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)
 #: Stands for the smallest positive standard deviation: zero and negative values are refused.
 POSITIVE_STD = 1e-300
 
@@ -154,14 +156,17 @@ class SetPosterior:
         InputError
             If a reading is missing, not finite, out of its physical range, or not an input.
         """
-        known = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)
         for name in measured:
-            if name not in known:
-                raise InputError(f"{name!r} is not read by this model; it reads {', '.join(known)}")
+            if name not in KNOWN:
+                raise InputError(f"{name!r} is not read by this model; it reads {', '.join(KNOWN)}")
         required = {name: measured[name] for name in measured if name in REQUIRED_READINGS}
         flat, shape = flatten_readings(REQUIRED_READINGS, required)
         rows = dict(zip(REQUIRED_READINGS, flat, strict=True))
         for name in OPTIONAL_READINGS:
+            if name not in measured and f"{name}_std" not in measured:
+                rows[name] = np.full_like(flat[0], ABSENT_READING)
+                rows[f"{name}_std"] = np.full_like(flat[0], ABSENT_STD)
+                continue
             value = _broadcast(name, measured.get(name, np.nan), shape)
             absent = np.isnan(value)
             std = self._std(f"{name}_std", name, value, measured, shape)
@@ -171,9 +176,11 @@ class SetPosterior:
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
         for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
             std = self._std(name, source, rows[source], measured, shape)
-            check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
-            rows |= {name: std} if self.common_errors else {}
-        for name in rows.keys() - {*REQUIRED_READINGS, *OPTIONAL_READINGS}:
+            if self.common_errors:
+                rows[name] = std
+            else:
+                check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
+        for name in measured.keys() & rows.keys() - READABLE.keys():  # others are positive
             least = 0.0 if name in MAY_BE_ZERO else POSITIVE_STD
             if not (rows[name] >= least).all():
                 needed = "zero or more" if name in MAY_BE_ZERO else "above zero"
@@ -234,6 +241,8 @@ class SetPosterior:
 
 def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
     """Rows without those that repeat another in every reading: copies carry no information."""
+    if len(rows["slip"]) < 2:
+        return dict(rows)
     table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
     first: dict[bytes, int] = {}
     for i, row in enumerate(table):

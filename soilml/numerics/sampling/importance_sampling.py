@@ -65,6 +65,7 @@ def importance_sample(
     p: int,
     seed: int = 0,
     least_effective_size: float = LEAST_EFFECTIVE_SIZE,
+    middle_std: float | None = None,
 ) -> ImportanceSample:
     r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
@@ -88,6 +89,10 @@ def importance_sample(
         Of the random numbers.
     least_effective_size
         Effective sample size at which sampling ends.
+    middle_std
+        Standard deviation of a density about the middle of the cube that is similar to this one.
+        The first round is then drawn from it: in many dimensions hardly any point of a Latin
+        hypercube is where the density is.
 
     References
     ----------
@@ -95,26 +100,35 @@ def importance_sample(
     importance sampling).
     """
     rng = np.random.default_rng(seed)
-    u = latin_hypercube(FIRST_ROUND, p, rng)
-    logs = log_density(u)
     mixtures: list[_Mixture] = []
+    if middle_std is None:
+        u, uniform = latin_hypercube(FIRST_ROUND, p, rng), float(FIRST_ROUND)
+    else:
+        factor = middle_std * np.eye(p)
+        mixtures.append(_Mixture(np.full((1, p), 0.5), factor[None], np.ones(1)))
+        u, uniform = _inside(mixtures[0].draw(LATER_ROUND, rng)), 0.0
+    logs = log_density(u)
     # proposals: sum over rounds of n_k q_k at each sample
-    proposals = np.full(len(u), float(FIRST_ROUND))
+    proposals = uniform + sum((LATER_ROUND * m.density(u) for m in mixtures), np.zeros(len(u)))
     sample = _weighted(u, logs, proposals)
     for _ in range(MOST_ROUNDS):
         if sample.effective_size >= least_effective_size or not np.isfinite(logs).any():
             break
         mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
-        trial = mixture.draw(LATER_ROUND, rng)
-        new = trial[np.all((trial > 0.0) & (trial < 1.0), axis=1)]
+        new = _inside(mixture.draw(LATER_ROUND, rng))
         earlier = sum((LATER_ROUND * m.density(new) for m in mixtures), np.zeros(len(new)))
-        at_new = float(FIRST_ROUND) + earlier + LATER_ROUND * mixture.density(new)
+        at_new = uniform + earlier + LATER_ROUND * mixture.density(new)
         proposals = np.append(proposals + LATER_ROUND * mixture.density(u), at_new)
         u = np.vstack([u, new])
         logs = np.append(logs, log_density(new))
         mixtures.append(mixture)
         sample = _weighted(u, logs, proposals)
     return sample
+
+
+def _inside(u: Floats) -> Floats:
+    """The points (n, p) in the cube."""
+    return u[np.all((u > 0.0) & (u < 1.0), axis=1)]
 
 
 def _weighted(u: Floats, logs: Floats, proposals: Floats) -> ImportanceSample:

@@ -49,7 +49,11 @@ MOST_UNPREDICTED = 0.01
 
 
 def surface_sample(
-    density: ModelDensity, p: int, start: ImportanceSample | None = None, seed: int = 0
+    density: ModelDensity,
+    p: int,
+    start: ImportanceSample | None = None,
+    seed: int = 0,
+    tempered_rounds: int = MOST_ROUNDS,
 ) -> ImportanceSample | None:
     """Weighted samples of a density over the unit cube, from few evaluations of its model.
 
@@ -69,11 +73,14 @@ def surface_sample(
         Samples of a density that is similar and wider.
     seed
         Of the random numbers.
+    tempered_rounds
+        Rounds after which polynomials must be accurate enough for the density, not a power of it.
 
     Returns
     -------
     ImportanceSample or None
-        None where no polynomial is accurate enough, or where predictions are missing in the region.
+        None where no polynomial is accurate enough, or not soon enough, or where predictions are
+        missing in the region.
 
     References
     ----------
@@ -84,7 +91,8 @@ def surface_sample(
     rng = np.random.default_rng(seed)
     points, predictions = [], []
     samples, surrogate, reach = start, None, REACH
-    for later in reversed(range(MOST_ROUNDS)):  # rounds that may follow
+    for turn in range(1, MOST_ROUNDS + 1):
+        later = MOST_ROUNDS - turn  # rounds that may follow
         if samples is None:
             u = latin_hypercube(POINTS_IN_CUBE * p, p, rng)
         else:
@@ -114,6 +122,8 @@ def surface_sample(
         if found is None:
             return None
         surrogate, samples = found
+        if turn >= tempered_rounds and surrogate.power < 1.0:
+            return None
     return None
 
 

@@ -17,6 +17,11 @@ Floats = NDArray[np.float64]
 
 #: A region ends so many standard deviations from its middle, unless the density goes on beyond.
 REACH = 4.5
+#: Farthest from the middle that polynomials are used, in standard deviations: the corners of a box
+#: of many dimensions are far beyond the points that they were fitted to.
+FARTHEST = 8.0
+#: Dimensions from which on the first samples are drawn about the middle.
+MANY_DIMENSIONS = 5
 #: Most predictions that are held at once: few enough to stay in a processor's cache.
 BLOCK = 100_000
 #: Trials of the error of the log density.
@@ -96,12 +101,19 @@ class SurrogateDensity:
         def log_density(fractions: Floats) -> Floats:
             u = self.region.points(fractions)
             inside = np.all((u > 0.0) & (u < 1.0), axis=1)
+            inside &= self.region.distance(u) < FARTHEST
             logs = np.full(len(u), -np.inf)
             logs[inside] = self(u[inside])
             return logs
 
         p = len(self.region.scaling.centre)
-        found = importance_sample(log_density, p, least_effective_size=least_effective_size)
+        many = p >= MANY_DIMENSIONS
+        found = importance_sample(
+            log_density,
+            p,
+            least_effective_size=least_effective_size,
+            middle_std=0.5 / self.region.half_width if many else None,
+        )
         kept = found.weights > 0.0
         return ImportanceSample(
             self.region.points(found.u[kept]),

@@ -10,9 +10,8 @@ from soilml import Operating, identify, read_case
 from soilml.identification import descent
 from soilml.identification.data.observations import read_observations
 from soilml.identification.free_parameters import select_free
-from soilml.identification.nonlinear import stacked_columns
-from soilml.identification.predictions import linearise, stacked_readings
-from soilml.identification.shared_errors.columns import SharedErrors
+from soilml.identification.nonlinear import least_squares_problem
+from soilml.identification.predictions import linearise
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics import sinkage_search
@@ -43,11 +42,7 @@ def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):
 
 
 def problem_of(case, table):
-    data, free = read_observations(case, table), select_free(case, None)
-    reading, std = stacked_readings(data)
-    none = SharedErrors.none(reading.size)
-    columns = stacked_columns([np.zeros((reading.size, 0))])
-    return descent.LeastSquaresProblem(case, data, free, reading, std, columns, none)
+    return least_squares_problem(case, read_observations(case, table), select_free(case, None))
 
 
 def two_gears(case):

@@ -1,0 +1,86 @@
+"""Samples of soil and shared errors together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.identification.descent import LeastSquaresProblem, descend, global_optimum
+from soilml.identification.posterior_density import PosteriorDensity
+from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.sampling.surface_sampling import surface_sample
+from soilml.numerics.sampling.surrogate_density import Region
+
+Floats = NDArray[np.float64]
+
+#: Samples of the normal distribution, and their spread over that of the linearised posterior.
+SAMPLES, WIDER = 2048, 1.2
+#: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
+#: and rounds after which they must be accurate enough for the density itself.
+FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
+#: Standard deviations from the middle at which the region ends in which the model is sampled.
+REACH = 6.0
+#: Most rows where the model is sampled, which bounds the time.
+MOST_SAMPLED_ROWS = 128
+#: Effective sample size at which sampling of the model ends.
+ENOUGH = 1250.0
+
+
+def joint_sample(density: PosteriorDensity, problem: LeastSquaresProblem) -> ImportanceSample:
+    """Weighted fractions (n, p) of the priors of soil and errors.
+
+    The region is that of the linearised posterior at the most probable parameters. Polynomials take
+    the place of the model where they soon turn out to be accurate there; otherwise the model is
+    sampled, of many rows at some that are chosen at random.
+
+    Raises `FitError` where the model has no equilibrium at the measured loads.
+    """
+    start = normal_start(problem, density.noise_scale)
+    density.linearise_at_mean(start)
+    rows, p = len(density.data.slip), len(density.free)
+    if rows >= FEWEST_ROWS:
+        found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS)
+        if found is not None and density.linearise_at_mean(found):
+            found = surface_sample(density, p, found)
+        if found is not None:
+            return found
+    if rows > MOST_SAMPLED_ROWS:
+        chosen = np.random.default_rng(0).permutation(rows)[:MOST_SAMPLED_ROWS]
+        density = density.of_rows(np.sort(chosen))
+    return _of_model(density, start)
+
+
+def normal_start(problem: LeastSquaresProblem, noise_scale: float) -> ImportanceSample:
+    """Samples of a normal distribution about the most probable parameters, with equal weights.
+
+    That of the linearised posterior, with normal priors of the same variances. Raises `FitError`
+    as `joint_sample` does.
+    """
+    optimum = global_optimum(problem)
+    optimum = descend(problem.with_noise_at(optimum), optimum.u, with_prior=True)
+    precision = optimum.jacobian.T @ optimum.jacobian / noise_scale**2
+    root = np.linalg.cholesky(np.linalg.inv(precision + np.diag(problem.prior_precision)))
+    normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.u)))
+    u = optimum.u + WIDER * normal @ root.T
+    u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
+    return ImportanceSample(u, np.full(SAMPLES, 1.0 / SAMPLES), 0.0)
+
+
+def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceSample:
+    """Samples of the density itself, in a box about those of a similar one."""
+    region = Region.of(start, REACH)
+
+    def log_density(fractions: Floats) -> Floats:
+        u = region.points(fractions)
+        inside = np.all((u > 0.0) & (u < 1.0), axis=1)
+        logs = np.full(len(u), -np.inf)
+        logs[inside] = density(u[inside])
+        return logs
+
+    p = len(density.free)
+    found = importance_sample(
+        log_density, p, least_effective_size=ENOUGH, middle_std=0.5 / region.half_width
+    )
+    kept = found.weights > 0.0
+    u, weights = region.points(found.u[kept]), found.weights[kept]
+    return ImportanceSample(u, weights, found.evidence + region.log_volume)
