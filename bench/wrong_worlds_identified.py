@@ -24,7 +24,7 @@ from soilml.quantities import SHEAR, column
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, rows of each set, and the seed of both.
-SETS, ROWS, SEED = 40, 16, 1
+SETS, ROWS, SEED = 30, 16, 5
 
 
 def scores(
