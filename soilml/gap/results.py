@@ -25,7 +25,7 @@ STATUSES = {
     "partly-named": "the evidence supports these effects; a smooth remainder is left unexplained",
     "class": "several explanations account for the gap; these runs cannot distinguish them",
     "form-open": "one effect accounts for the gap, with a law that differs from the catalogue's",
-    "suspected": "ranked suspects: the runs do not suffice to name a cause",
+    "suspected": "ranked suspects: no cause can be named",
     "unknown": "there is a gap, and no effect of the catalogue explains it",
     "undecided": "measurements disagree with each other more than their noise allows",
     "not-testable": "there is a gap, but these runs cannot identify its cause",

@@ -2,6 +2,7 @@
 
 import csv
 import importlib
+import sys
 from importlib import resources
 
 import pytest
@@ -43,7 +44,7 @@ def test_an_input_is_not_counted_as_a_result():
 
 
 def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(monkeypatch, capsys):
-    monkeypatch.setattr("soilml.cli.execution.papers.is_terminal", lambda: True)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     assert main(["papers", "nagatani2009"]) == 0
     short = capsys.readouterr()
     assert main(["papers", "nagatani2009", "--all"]) == 0

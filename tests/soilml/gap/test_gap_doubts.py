@@ -130,7 +130,7 @@ def test_an_effect_is_named_beside_a_declared_discrepancy_and_then_nothing_is_le
 @pytest.mark.slow
 def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
     case = case_of()
-    other = EFFECTS["slip-sinkage"](n1=0.4, by_slip=8.0)
+    other = EFFECTS["slip-sinkage"](n1=0.2, by_slip=7.0)
     report = gap(case, driven(case, [other], slips=12))
     assert report.status == "suspected"
     assert report.suspects[0].effects == ("slip-sinkage",)
