@@ -129,8 +129,7 @@ PARTS = (
         "and with the usual errors of the model as well (`model_error` 1). Score: mean of the "
         "interval score over parameters and sets, in standard deviations of the prior; the prior "
         "has about 3.3. Last table: the two answers of `identify --method posterior`, without and "
-        f"with usual errors of sensors and model, to {wrong_worlds_identified.SETS} sets that were "
-        "made in the same way.",
+        f"with usual errors, to {wrong_worlds_identified.SETS} sets made in the same way.",
         lambda folder: f"{model_errors.tables()}\n\n{wrong_worlds_identified.section()}",
     ),
     Part(

@@ -63,18 +63,12 @@ def fit_marginal(
             found[i] = MarginalFit(fit, evidence)
             lowest = min(lowest, evidence.value)
             if _changed(amplitude, evidence.amplitude):
-                again[i] = (
-                    evidence,
-                    (
-                        replace(request, start=fit.start_values()),
-                        evidence.amplitude,
-                    ),
-                )
-        waiting = {
-            i: request
-            for i, (evidence, request) in again.items()
-            if evidence.value < lowest + HOPELESS
-        }
+                again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)
+        waiting = {}
+        for i, repeated in again.items():
+            marginal = found[i]
+            if marginal is not None and marginal.evidence.value < lowest + HOPELESS:
+                waiting[i] = repeated
         if not waiting:
             break
     return found
