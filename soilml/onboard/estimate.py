@@ -204,7 +204,7 @@ class Estimate:
                 parts[key][i] = value
         if not parts:
             raise InputError("no reading given; needed is one or more")
-        own = {key: value.reshape(*shape, *value.shape[1:]) for key, value in parts.items()}
+        own = {key: value.reshape((*shape, *value.shape[1:])) for key, value in parts.items()}
         return replace(estimate, **own)
 
     @property

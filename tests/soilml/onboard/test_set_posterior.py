@@ -209,6 +209,14 @@ def test_an_unknown_context_input_is_refused(any_wheel, estimator):
         estimator.on(wheel_radius=0.2)
 
 
+def test_a_single_reading_is_a_set_of_one(any_wheel):
+    mine, reading = any_wheel.on(**ANY_WHEEL), {"slip": 0.3, "torque": 2.0, "load": 60.0}
+    alone, two = mine(**reading), mine(**reading | {"slip": [0.3, 0.5]})
+    assert alone.mean.shape == (3,)
+    assert_similar(alone, mine.run(**reading), tolerance=1e-4)
+    np.testing.assert_allclose(two.mean[0], alone.mean, rtol=1e-4)
+
+
 def test_estimates_scale_with_the_prior(any_wheel):
     small, large = any_wheel.on(**ANY_WHEEL), any_wheel.on(**ANY_WHEEL | {"cohesion_max": 4500.0})
     assert large.prior.std[0] == pytest.approx(1.5 * small.prior.std[0])
