@@ -16,6 +16,7 @@ from soilml.identification.data.observations import declared_std
 from soilml.identification.data.operating_points import gear_numbers, operating_points
 from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.io.table import Table
+from soilml.physics.effects.slip_load_scaling import REFERENCE_LOAD, log_relative_slip
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
@@ -60,6 +61,14 @@ class StackedReadings:
     def load(self) -> Floats:
         """Load of each reading, (m,), N."""
         return np.asarray(self.at.load)[self.row]
+
+    @property
+    def law_terms(self) -> tuple[Floats, Floats]:
+        """Logarithms of slip and load, each (m,), whose coefficients are the shapes of laws.
+
+        They are zero at the slip and load where the size of an effect is its parameter's value.
+        """
+        return log_relative_slip(self.slip), np.log(self.load / REFERENCE_LOAD)
 
     @cached_property
     def slip_levels(self) -> Levels:

@@ -25,7 +25,7 @@ from soilml.physics.effects.base import Effect
 Floats = NDArray[np.float64]
 
 #: Prior standard deviations of an effect's two shape coefficients, in their own units.
-SHAPE_STD = {"by_slip": 3.0, "by_load": 1.0}
+SHAPE_STD = {"slip_power": 1.0, "by_load": 1.0}
 
 
 @dataclass(frozen=True)

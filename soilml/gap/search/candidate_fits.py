@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError
 from soilml.gap.fitting.coordinates import EffectCoordinate, shape_coordinates
 from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
-from soilml.gap.search.problem import FitProblem, StartedFit, fit_many
+from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
 Floats = NDArray[np.float64]
@@ -88,30 +87,27 @@ class CandidateRequest:
 def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[CandidateFit]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
-    With `noise_start`, a set is also fitted under noise alone first, and from there beside a
-    discrepancy: beside a large one, a fit can stay where the effect is not needed. Sets that the
+    With `noise_start`, a set is also fitted under noise alone, and from there beside a discrepancy:
+    beside a large one, a fit can stay where the effect is not needed. Sets that the
     model refuses are left out.
     """
-    starts = [_started(problem, r.names, r.start) for r in requests]
-    found = fit_marginal(problem, [(s, r.amplitude) for s, r in zip(starts, requests, strict=True)])
-    alone: list[GapFit | None] = [None] * len(requests)
-    if all(r.noise_start is not None for r in requests):
-        from_soil = [_started(problem, r.names, r.noise_start or {}) for r in requests]
-        fits = fit_many(problem, from_soil)
-        alone = [None if isinstance(fit, InputError) else fit for fit in fits]
-        none = np.zeros(len(problem.readings.channels))
-        again = [
-            (replace(s, start=fit.start_values() if fit else s.start), none)
-            for s, fit in zip(from_soil, alone, strict=True)
-        ]
-        lowest = min((one.evidence.value for one in found if one), default=np.inf)
-        beside = fit_marginal(problem, again, lowest)
-        found = [_better(a, b) for a, b in zip(found, beside, strict=True)]
-    return [
-        CandidateFit(request.names, fit, fit, plain)
-        for request, fit, plain in zip(requests, found, alone, strict=True)
-        if fit is not None
+    none = np.zeros(len(problem.readings.channels))
+    beside = [(_started(problem, r.names, r.start), r.amplitude) for r in requests]
+    alone = [
+        (_started(problem, r.names, r.noise_start), none)
+        for r in requests
+        if r.noise_start is not None
     ]
+    marginal = iter(fit_marginal(problem, [*beside, *alone]))
+    found = [next(marginal) for _ in requests]
+    from_noise = [next(marginal) if r.noise_start is not None else None for r in requests]
+    candidates = []
+    for request, first, second in zip(requests, found, from_noise, strict=True):
+        best = _better(first, second)
+        if best is not None:
+            noise_only = second.first if second else None
+            candidates.append(CandidateFit(request.names, best, best, noise_only))
+    return candidates
 
 
 def _started(problem: FitProblem, names: tuple[str, ...], start: Mapping[str, float]) -> StartedFit:
@@ -153,7 +149,7 @@ def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[
 def shape_directions(problem: FitProblem, fit: GapFit) -> list[Floats]:
     """Changes of the readings by second-order terms in the laws of a fit's effects, (m, k) each.
 
-    The signature of each size times s^2, s w or w^2, with slip s and log load w centred, in the
+    The signature of each size times s^2, s w or w^2, with log slip s and log load w centred, in the
     readings' unit. The estimated shapes cover the first order alone.
     """
     signatures = [
@@ -165,7 +161,7 @@ def shape_directions(problem: FitProblem, fit: GapFit) -> list[Floats]:
     ]
     if not signatures:
         return []
-    s, w = problem.readings.slip, np.log(problem.readings.load)
+    s, w = problem.readings.law_terms
     s, w = s - s.mean(), w - w.mean()
     columns = np.stack(signatures, axis=1)
     return [columns * term[:, None] for term in (s * s, s * w, w * w)]
@@ -175,8 +171,8 @@ def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
     """Upper bound of the improvement by free shapes: linearised and without a prior."""
     fit = candidate.catalogue_law.fit
     whiten = problem.discrepancy.whiten(candidate.catalogue_law.evidence.amplitude)
-    terms = (problem.readings.slip, np.log(problem.readings.load))
     signatures = fit.derivatives[:, len(problem.soil) :]
+    terms = problem.readings.law_terms
     columns = np.column_stack([signatures * term[:, None] for term in terms])
     projected = project_out(whiten @ columns, fit.jacobian)
     basis = column_space(projected, relative_tolerance=ROUNDING)

@@ -28,10 +28,14 @@ HOPELESS = 40.0
 
 @dataclass(frozen=True)
 class MarginalFit:
-    """A fit under the discrepancy that its own evidence supports."""
+    """A fit under the discrepancy that its own evidence supports.
+
+    `first` is the fit under the amplitudes of the discrepancy that were started with.
+    """
 
     fit: GapFit
     evidence: Evidence
+    first: GapFit | None = None
 
 
 def fit_marginal(
@@ -60,7 +64,8 @@ def fit_marginal(
             evidence = problem.discrepancy.evidence(fit, amplitude)
             if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
                 continue
-            found[i] = MarginalFit(fit, evidence)
+            earlier = found[i]
+            found[i] = MarginalFit(fit, evidence, earlier.first if earlier else fit)
             lowest = min(lowest, evidence.value)
             if _changed(amplitude, evidence.amplitude):
                 again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)

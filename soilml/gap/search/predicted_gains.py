@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.signatures import Signature
-from soilml.numerics.subspaces import project_out
+from soilml.numerics.subspaces import ROUNDING, project_out
 
 
 def predicted_with_and_without(
@@ -45,6 +47,28 @@ def predicted_gains(
         possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
         value = evidence.value + EFFECT_PENALTY * (len(candidate.names) + 1)
         gains[s.name] = objective - value if possible else -EFFECT_PENALTY
+    return gains
+
+
+def free_law_gains(
+    problem: FitProblem, candidate: CandidateFit, fit: GapFit, signatures: Sequence[Signature]
+) -> dict[str, float]:
+    """Decrease of a fit's sum of squares by each effect with free shapes, linearised.
+
+    The discrepancy has the amplitudes of the candidate. The shapes have no prior, so that these
+    are upper bounds, by which effects are selected whose law is not the catalogue's.
+    """
+    whiten = problem.discrepancy.whiten(candidate.amplitude)
+    fit = fit.whitened_by(whiten)
+    slip, load = problem.readings.law_terms
+    gains = {}
+    for s in signatures:
+        columns = s.column[:, None] * np.column_stack([np.ones_like(slip), slip, load])
+        projected = project_out(whiten @ columns, fit.jacobian)
+        coefficient = np.linalg.lstsq(projected, fit.residual, rcond=ROUNDING)[0]
+        possible = s.sign == 0 or coefficient[0] * s.sign > 0.0
+        explained = float(np.sum((projected @ coefficient) ** 2))
+        gains[s.name] = explained if possible else 0.0
     return gains
 
 

@@ -100,7 +100,7 @@ class FitProblem:
     def shape_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
         """The coordinates of the effects' shapes that the range of slip and load can determine."""
         varies = {
-            "by_slip": np.ptp(self.readings.slip) > MIN_SLIP_RANGE,
+            "slip_power": np.ptp(self.readings.slip) > MIN_SLIP_RANGE,
             "by_load": bool(np.ptp(np.log(self.readings.load)) > MIN_LOG_LOAD_RANGE),
         }
         shapes = [c for name in names for c in shape_coordinates(self.effects[name])]

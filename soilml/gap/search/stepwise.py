@@ -18,13 +18,15 @@ from soilml.gap.search.candidate_fits import (
 )
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
 from soilml.gap.search.posterior import Posterior, explanations, posterior
-from soilml.gap.search.predicted_gains import (
-    noise_only_gains,
-    predicted_gains,
-    predicted_with_and_without,
-)
+from soilml.gap.search.predicted_gains import predicted_gains, predicted_with_and_without
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.gap.search.residual_test import ResidualTest, residual_test
+from soilml.gap.search.selection import (
+    LARGE_DISCREPANCY,
+    WITHIN_REACH,
+    Starts,
+    effects_to_fit,
+)
 from soilml.gap.statistics.signatures import Untestable, effect_signatures
 
 Floats = NDArray[np.float64]
@@ -33,15 +35,8 @@ Floats = NDArray[np.float64]
 GAP_LEVEL = 0.03
 #: Significance level of the test for a remainder that the best explanation does not account for.
 LACK_OF_FIT_LEVEL = 0.001
-#: Effects are fitted in full if their predicted gain is within this margin of the largest, and so
-#: many of the largest in any case; the prediction is linear and can be wrong by that much.
-GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
-#: Beside a large discrepancy, so many effects more: those that explain most under noise alone.
-FITTED_HIDDEN = 6
 #: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
 MIN_NET_GAIN = -2.0
-#: Objective above that of the best candidate up to which shapes are estimated and sets extended.
-WITHIN_REACH = 15.0
 #: Largest number of effects in a candidate; sets that are extended by one effect in each step, and
 #: effects that each of them is extended by.
 MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
@@ -52,8 +47,6 @@ STEPS = 1 + MAX_EFFECTS
 SHAPE_GAIN_FACTOR = 3.0
 #: Decrease of the sum of squares under noise alone from which the free law of an effect is tried.
 NOTABLE_GAIN = 20.0
-#: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.
-LARGE_DISCREPANCY = 2.5
 #: Distance from the middle of the priors at which a second fit starts, relative to the optimum of
 #: the soil alone.
 INWARD = 0.8
@@ -61,9 +54,6 @@ INWARD = 0.8
 COMPLETE_LEVEL = 0.2
 #: Decrease of the objective by an extension below which no larger set is tried.
 MIN_IMPROVEMENT = 1.0
-
-#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
-Starts = Mapping[tuple[str, ...], CandidateFit]
 
 
 @dataclass(frozen=True)
@@ -136,11 +126,7 @@ def search(
     none = _soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
-    selected = _select_by_gain(gains)
-    if float(none.amplitude.max()) >= LARGE_DISCREPANCY:
-        alone = noise_only_gains(problem, soil, signatures)
-        ordered = sorted(alone, key=lambda name: -alone[name])[:FITTED_HIDDEN]
-        selected += [name for name in ordered if name not in selected]
+    selected = effects_to_fit(problem, none, soil, signatures, gains, starts)
     level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
     for effects in range(1, MAX_EFFECTS):
@@ -239,15 +225,6 @@ def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> 
     fit = candidate.fit
     signatures, _ = effect_signatures(fit.fitted(), problem.readings, problem.effects_not_in(fit))
     return residual_test(problem, fit, signatures, seed)
-
-
-def _select_by_gain(gains: Mapping[str, float]) -> list[str]:
-    """Effects to fit in full, in order of their predicted gain."""
-    ordered = sorted(gains, key=lambda name: -gains[name])
-    if not ordered:
-        return []
-    close = [n for n in ordered if gains[n] > gains[ordered[0]] - GAIN_MARGIN]
-    return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
 
 
 def _extensions(

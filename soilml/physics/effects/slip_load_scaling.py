@@ -12,24 +12,39 @@ from soilml.physics.load_case import LoadCase
 
 #: Slip ratio and load (N) at which the size of an effect is its parameter's value.
 REFERENCE_SLIP, REFERENCE_LOAD = 0.3, 100.0
+#: Slip ratio added where a size is a power of slip, so that it stays finite at zero slip.
+SLIP_OFFSET = 0.03
+
+
+def log_relative_slip(slip: Array) -> Array:
+    """Natural logarithm of the slip ratio's magnitude, relative to the reference; finite at 0."""
+    xp = namespace(slip)
+    return xp.log((xp.abs(slip) + SLIP_OFFSET) / (REFERENCE_SLIP + SLIP_OFFSET))
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlipLoadScaling(Effect):
     r"""An effect whose cause is known and whose law is not: its size may vary with slip and load.
 
-    .. math:: a(s, W) = a \, e^{b_s (|s| - 0.3)} (W / 100 N)^{b_W}
+    .. math::
+        a(s, W) = a \left( \frac{|s| + 0.03}{0.33} \right)^{p_s} (W / 100 N)^{b_W}
+        e^{b_s (|s| - 0.3)}
 
-    Both exponents are zero unless they were fitted to data.
+    All three exponents are zero unless they were fitted to data. A power of slip describes effects
+    that need slip (exponent near 1) as well as those that hardly depend on it, which the
+    exponential growth does not: at zero slip it is not zero.
     """
 
     by_slip: Annotated[Real, Parameter("1", -20.0, 20.0, "growth of the size with slip")] = 0.0
+    slip_power: Annotated[Real, Parameter("1", -5.0, 5.0, "power of slip that the size has")] = 0.0
     by_load: Annotated[Real, Parameter("1", -5.0, 5.0, "power of load that the size has")] = 0.0
 
     @final
     def scaled(self, size: Real, load_case: LoadCase) -> Array:
         """The size at the slip and load of a load case; unchanged, to the last bit, by default."""
         xp = namespace(load_case.at.slip)
-        power = self.by_slip * (xp.abs(load_case.at.slip) - REFERENCE_SLIP)
+        slip = xp.abs(load_case.at.slip)
+        power = self.by_slip * (slip - REFERENCE_SLIP)
+        power = power + self.slip_power * log_relative_slip(slip)
         power = power + self.by_load * xp.log(load_case.at.load / REFERENCE_LOAD)
         return size * xp.exp(power)

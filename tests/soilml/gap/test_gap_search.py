@@ -82,12 +82,12 @@ def test_the_true_law_needs_no_shape(named):
 
 def test_free_shapes_are_supported_where_the_law_is_another(dug):
     case = case_of()
-    bent = DIGGING(n1=0.4, by_slip=3.0)
+    bent = DIGGING(n1=0.4, slip_power=1.0)
     problem = small(fit_problem(case, driven(case, [bent], seed=2)))
     found = fitted(problem, dug[1], "slip-sinkage")
     assert found.shape_supported and found.fit is found.free_law.fit
-    assert found.shape_deviation == pytest.approx(1.0, abs=0.3)  # by_slip 3 is one prior spread
-    assert found.fit.values()["slip-sinkage.by_slip"] == pytest.approx(3.0, abs=0.5)
+    assert found.shape_deviation == pytest.approx(1.0, abs=0.3)  # 1 is one prior spread
+    assert found.fit.values()["slip-sinkage.slip_power"] == pytest.approx(1.0, abs=0.15)
     assert law_matters(problem, found)
 
 
@@ -103,7 +103,8 @@ def test_a_law_that_predicts_the_same_does_not_matter(dug, named):
 def test_slopes_are_shaped_only_as_far_as_slip_and_load_vary():
     case = case_of()
     problem = fit_problem(case, driven(case, loads=(60.0, 60.0)))
-    assert [a.path for a in problem.shape_coordinates(["slip-sinkage"])] == ["slip-sinkage.by_slip"]
+    (shape,) = problem.shape_coordinates(["slip-sinkage"])
+    assert shape.path == "slip-sinkage.slip_power"
 
 
 def test_the_effect_that_acts_promises_most_and_keeps_it(dug, named):

@@ -172,8 +172,10 @@ def test_nothing_else_is_asked_for(name):
 @pytest.mark.parametrize("slip, load", [(0.3, 100.0), (0.5, 40.0), (-0.2, 130.0)])
 def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
     at = replace(AT, slip=slip, load=load)
-    growth = np.exp(0.7 * (abs(slip) - 0.3)) * (load / 100.0) ** 0.2
-    running = (WHEEL + sized(name, 0.8, by_slip=0.7, by_load=0.2))(SAND, at)
+    growth = ((abs(slip) + 0.03) / 0.33) ** 0.6 * (load / 100.0) ** 0.2
+    growth *= np.exp(0.7 * (abs(slip) - 0.3))
+    laws = {"slip_power": 0.6, "by_load": 0.2, "by_slip": 0.7}
+    running = (WHEEL + sized(name, 0.8, **laws))(SAND, at)
     size = EFFECTS[name].about.size
     scaled = {size: growth * getattr(sized(name, 0.8), size)}
     fixed = (WHEEL + replace(sized(name, 0.8), **scaled))(SAND, at)

@@ -1,0 +1,79 @@
+"""Selection: an effect whose law is not the catalogue's is fitted in full, and named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.predicted_gains import (
+    free_law_gains,
+    noise_only_gains,
+    predicted_with_and_without,
+)
+from soilml.gap.search.selection import MIN_FITTED, effects_to_fit
+from soilml.gap.search.stepwise import _soil_alone, search
+from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.statistics.signatures import effect_signatures
+from soilml.physics.effects import EFFECTS
+
+#: The stresses move to the front of the contact in proportion to slip.
+MOVING = EFFECTS["stress-shift"](shift=0.3, slip_power=1.0)
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """A problem on rows with that effect, and the soil alone fitted to them."""
+    case = case_of()
+    problem = fit_problem(case, driven(case, [MOVING], seed=3))
+    return problem, problem.fit_soil([np.full(3, 0.5)])
+
+
+def alone(soil):
+    """The soil alone without discrepancy."""
+    none = np.zeros(3)
+    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x)), none))
+
+
+@pytest.fixture(scope="module")
+def screened(moved):
+    problem, soil = moved
+    signatures, _ = effect_signatures(soil.fitted(), problem.readings, problem.effects)
+    none = _soil_alone(problem, soil, {})
+    return none, signatures, predicted_with_and_without(problem, none, soil, signatures)
+
+
+def test_an_effect_with_its_own_law_is_selected_though_the_catalogues_law_gains_little(
+    moved, screened
+):
+    problem, soil = moved
+    none, signatures, gains = screened
+    by_gain = sorted(gains, key=lambda name: -gains[name])[:MIN_FITTED]
+    assert "stress-shift" not in by_gain
+    assert "stress-shift" in effects_to_fit(problem, none, soil, signatures, gains, {})
+
+
+def test_a_free_law_explains_at_least_what_the_catalogues_does(moved, screened):
+    problem, soil = moved
+    none, signatures, _ = screened
+    exact = replace(none, catalogue_law=alone(soil), free_law=alone(soil))
+    free = free_law_gains(problem, exact, soil, signatures)
+    plain = noise_only_gains(problem, soil, signatures)
+    positive = [name for name in free if free[name] > 0.0]
+    assert len(positive) > 5
+    assert all(free[name] >= plain[name] - 1e-6 for name in positive)
+    assert max(free.values()) <= soil.residual @ soil.residual
+
+
+def test_an_effect_within_reach_of_an_earlier_search_is_fitted_again(moved, screened):
+    problem, soil = moved
+    none, signatures, _ = screened
+    found = search(problem, soil, seed=0)
+    assert found.candidates[0].names == ("stress-shift",)
+    gains = {"slip-sinkage": 9.0, "rate": 8.0, "slope": 7.0, "bulldozing": 6.0, "grousers": 5.0}
+    gains["stress-shift"] = -100.0
+    own = [s for s in signatures if s.name == "slip-sinkage"]
+    starts = {c.names: c for c in found.candidates}
+    assert "stress-shift" not in effects_to_fit(problem, none, soil, own, gains, {})
+    assert "stress-shift" in effects_to_fit(problem, none, soil, own, gains, starts)
