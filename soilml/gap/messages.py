@@ -146,7 +146,7 @@ def unsupported_conclusions(
         conclusions.append("the cause of the remaining discrepancy")
     if report.status == "form-open":
         conclusions.append(
-            "the law of the effect: slip_power and by_load describe these data empirically"
+            "the law of the effect: slip_power, by_slip and by_load describe these data empirically"
         )
     if report.status == "class":
         conclusions.append(

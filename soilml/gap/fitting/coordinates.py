@@ -21,11 +21,12 @@ from soilml.identification.free_parameters import FreeParameter
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.effects.base import Effect
+from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
 
 Floats = NDArray[np.float64]
 
-#: Prior standard deviations of an effect's two shape coefficients, in their own units.
-SHAPE_STD = {"slip_power": 1.0, "by_load": 1.0}
+#: Prior standard deviations of an effect's shape coefficients, in their own units.
+SHAPE_STD = {"slip_power": 1.0, "by_slip": 3.0, "by_load": 1.0}
 
 
 @dataclass(frozen=True)
@@ -108,21 +109,21 @@ def size_coordinate(effect: type[Effect], calibration: float | None) -> EffectCo
 def shape_coordinates(effect: type[Effect]) -> list[EffectCoordinate]:
     """The coordinates of an effect's shape coefficients; none where its law has no uncertainty."""
     coordinates = []
-    for name, std in SHAPE_STD.items():
-        if name in declared(effect):
-            bound = min(declared(effect)[name].upper, 4.0 * std)
-            coordinates.append(
-                EffectCoordinate(
-                    name,
-                    "1",
-                    -bound,
-                    bound,
-                    Prior(0.0, 1.0),
-                    std,
-                    effect=effect.name,
-                    is_shape=True,
-                )
+    for name in effect.law_terms if issubclass(effect, SlipLoadScaling) else ():
+        std = SHAPE_STD[name]
+        bound = min(declared(effect)[name].upper, 4.0 * std)
+        coordinates.append(
+            EffectCoordinate(
+                name,
+                "1",
+                -bound,
+                bound,
+                Prior(0.0, 1.0),
+                std,
+                effect=effect.name,
+                is_shape=True,
             )
+        )
     return coordinates
 
 

@@ -172,7 +172,7 @@ def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
     fit = candidate.catalogue_law.fit
     whiten = problem.discrepancy.whiten(candidate.catalogue_law.evidence.amplitude)
     signatures = fit.derivatives[:, len(problem.soil) :]
-    terms = problem.readings.law_terms
+    terms = (problem.readings.slip, *problem.readings.law_terms)
     columns = np.column_stack([signatures * term[:, None] for term in terms])
     projected = project_out(whiten @ columns, fit.jacobian)
     basis = column_space(projected, relative_tolerance=ROUNDING)

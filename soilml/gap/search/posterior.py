@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,16 +29,17 @@ Names = tuple[str, ...]
 class Posterior:
     """Natural logarithms of the posterior probabilities of sets of effects, by names.
 
-    Sets in `outside` explain the data only by a law or a size that the catalogue does not have:
-    they count as causes outside the catalogue.
+    Sets in `refused` explain the data only by a law or a size that the catalogue does not have:
+    they count as causes outside the catalogue, but for those of their effects, given with them,
+    that explain most of the data without the others.
     """
 
     log_weights: dict[Names, float]
-    outside: frozenset[Names] = frozenset()
+    refused: Mapping[Names, frozenset[str]] = field(default_factory=dict)
 
     def probability(self, effect: str) -> float:
         """Probability that an effect is present, causes outside the catalogue included."""
-        inside = self._log_sum(lambda names: effect in names and names not in self.outside)
+        inside = self._log_sum(lambda names: effect in self.refused.get(names, names))
         return IN_CATALOGUE * float(np.exp(inside))
 
     def weight(self, names: Names) -> float:

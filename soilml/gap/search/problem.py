@@ -99,8 +99,10 @@ class FitProblem:
 
     def shape_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
         """The coordinates of the effects' shapes that the range of slip and load can determine."""
+        slips_vary = np.ptp(self.readings.slip) > MIN_SLIP_RANGE
         varies = {
-            "slip_power": np.ptp(self.readings.slip) > MIN_SLIP_RANGE,
+            "slip_power": slips_vary,
+            "by_slip": slips_vary,
             "by_load": bool(np.ptp(np.log(self.readings.load)) > MIN_LOG_LOAD_RANGE),
         }
         shapes = [c for name in names for c in shape_coordinates(self.effects[name])]

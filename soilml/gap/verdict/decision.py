@@ -16,12 +16,15 @@ from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.verdict.law_difference import law_matters
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
-#: effect keeps its name: 1.7 sigma for one effect. For several effects the limit is lower, because
+#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
 #: several adjustable laws together fit almost any data.
-MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 3.0, 1.0
+MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
 #: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
 #: nothing: a gain error of 18 % without calibration.
 MAX_SIZE_DEVIATION = 3.0
+#: Objective above that of the soil alone up to which an effect is suspected where runs cannot name
+#: a cause: tempered odds of 1 to 3, which the report states.
+SUSPECT_MARGIN = 4.0
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
 #: Why an explanation that the evidence supports is not claimed.
@@ -67,12 +70,11 @@ def decide(
         return Decision("undecided" if disagreements else "no-gap", (), None)
     if is_left_open(result):
         return Decision("undecided", (), None)
-    likeliest, none = result.likeliest, result.none
-    suspects = bool(likeliest and none and likeliest.objective < none.objective)
     if naming_obstacles:
-        if not suspects:
+        if not _likelier_than_none(result, SUSPECT_MARGIN):
             return Decision("not-testable", (), None)
         return Decision("suspected", (), _first_suspect(result))
+    suspects = _likelier_than_none(result)
     accepted = result.accepted
     if not accepted or () in {c.names for c in accepted}:
         if not suspects:
@@ -92,6 +94,12 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def _likelier_than_none(result: SearchResult, margin: float = 0.0) -> bool:
+    """Whether an effect describes the data better than the soil alone beside its discrepancy."""
+    likeliest, none = result.likeliest, result.none
+    return bool(likeliest and none and likeliest.objective < none.objective + margin)
 
 
 def _first_suspect(result: SearchResult) -> CandidateFit | None:
@@ -118,14 +126,20 @@ def is_left_open(result: SearchResult) -> bool:
 def with_refused_outside(result: SearchResult) -> SearchResult:
     """The result with refused explanations counted as causes outside the catalogue.
 
-    They need an implausible size, or another law than the catalogue's.
+    They need an implausible size, or another law than the catalogue's. Where a part of such a set
+    is accepted, what is refused is its supplement, not that part.
     """
-    refused = frozenset(
-        c.names
-        for c in result.candidates
-        if c.names and (_implausible(c.fit) or _far_from_catalogue(c))
-    )
-    return replace(result, posterior=replace(result.posterior, outside=refused))
+    far = {c.names for c in result.candidates if c.names and _is_refused(c)}
+    parts = [set(c.names) for c in result.accepted if c.names not in far]
+    refused = {
+        names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
+    }
+    return replace(result, posterior=replace(result.posterior, refused=refused))
+
+
+def _is_refused(candidate: CandidateFit) -> bool:
+    """Whether an explanation needs an implausible size, or another law than the catalogue's."""
+    return _implausible(candidate.fit) or _far_from_catalogue(candidate)
 
 
 def _far_from_catalogue(best: CandidateFit) -> bool:

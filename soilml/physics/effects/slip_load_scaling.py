@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, final
+from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
@@ -30,11 +30,13 @@ class SlipLoadScaling(Effect):
         a(s, W) = a \left( \frac{|s| + 0.03}{0.33} \right)^{p_s} (W / 100 N)^{b_W}
         e^{b_s (|s| - 0.3)}
 
-    All three exponents are zero unless they were fitted to data. A power of slip describes effects
-    that need slip (exponent near 1) as well as those that hardly depend on it, which the
-    exponential growth does not: at zero slip it is not zero.
+    All three exponents are zero unless they were fitted to data. The power describes effects that
+    need slip (exponent near 1), the exponential those that saturate or grow steeply at high slip.
+    `law_terms` are the exponents that may be fitted: an effect of the gear alone does not depend on
+    slip.
     """
 
+    law_terms: ClassVar[tuple[str, ...]] = ("slip_power", "by_slip", "by_load")
     by_slip: Annotated[Real, Parameter("1", -20.0, 20.0, "growth of the size with slip")] = 0.0
     slip_power: Annotated[Real, Parameter("1", -5.0, 5.0, "power of slip that the size has")] = 0.0
     by_load: Annotated[Real, Parameter("1", -5.0, 5.0, "power of load that the size has")] = 0.0

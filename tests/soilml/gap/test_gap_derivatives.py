@@ -108,7 +108,7 @@ def test_rows_without_equilibrium_have_no_derivatives(problem):
 def test_sinkage_is_predicted_to_first_order(problem, braking):
     readings = braked(problem.readings) if braking else problem.readings
     case, coordinates, x = with_coordinates(problem, "slip-sinkage")
-    change = 1e-3 * np.asarray([[1.0, -1.0, 1.0, 1.0, 0.5, -0.5]])
+    change = 1e-3 * np.asarray([[1.0, -1.0, 1.0, 1.0, 0.5, -0.5, 0.5]])
     requests = [
         PredictionRequest(case, coordinates, at, readings) for at in (x[None, :], x + change)
     ]

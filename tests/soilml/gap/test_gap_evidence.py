@@ -113,3 +113,15 @@ def test_a_smooth_discrepancy_is_recognised_by_its_size(problem):
     found = other.discrepancy.evidence(other.fit_soil([np.full(3, 0.5)]))
     assert 1.0 <= found.amplitude[0] <= 6.3  # its rms is 1.8 usual amplitudes
     assert found.amplitude[0] > 2.0 * found.amplitude[1]
+
+
+def test_the_prior_of_a_size_falls_beyond_usual_sizes():
+    sizes = np.geomspace(1e-6, 1e4, 20001)
+    value = np.asarray([_size_prior(float(x), two_sided=False)[2] for x in sizes])
+    density = np.exp(-0.5 * value) / np.sqrt(2.0 * np.pi)
+    assert np.trapezoid(density, sizes) == pytest.approx(1.0, abs=0.1)
+    assert np.trapezoid(density[sizes > 50.0], sizes[sizes > 50.0]) < 0.01
+    curvature, slope, at = _size_prior(20.0, two_sided=False)
+    ahead = _size_prior(20.001, two_sided=False)[2]
+    assert (ahead - at) / 0.001 == pytest.approx(2.0 * slope, rel=1e-3)
+    assert curvature > 0.0

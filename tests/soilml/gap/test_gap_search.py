@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
+from soilml.gap.fitting.coordinates import shape_coordinates
 from soilml.gap.search.candidate_fits import (
     EFFECT_PENALTY,
     CandidateFit,
@@ -65,7 +66,10 @@ def test_a_refused_explanation_counts_as_a_cause_outside_the_catalogue():
     weights = {(): 0.1, ("slope",): 0.6, ("grousers",): 0.1, ("grousers", "slope"): 0.2}
     logs = {names: float(np.log(w)) for names, w in weights.items()}
     inside = Posterior(logs)
-    refused = Posterior(logs, frozenset({("slope",)}))
+    refused = Posterior(logs, {("slope",): frozenset()})
+    partly = Posterior(logs, {("grousers", "slope"): frozenset({"grousers"})})
+    assert partly.probability("grousers") == pytest.approx(inside.probability("grousers"))
+    assert partly.probability("slope") == pytest.approx(IN_CATALOGUE * 0.6)
     assert inside.probability("slope") == pytest.approx(IN_CATALOGUE * 0.8)
     assert refused.probability("slope") == pytest.approx(IN_CATALOGUE * 0.2)
     assert refused.probability("grousers") == pytest.approx(inside.probability("grousers"))
@@ -103,8 +107,10 @@ def test_a_law_that_predicts_the_same_does_not_matter(dug, named):
 def test_slopes_are_shaped_only_as_far_as_slip_and_load_vary():
     case = case_of()
     problem = fit_problem(case, driven(case, loads=(60.0, 60.0)))
-    (shape,) = problem.shape_coordinates(["slip-sinkage"])
-    assert shape.path == "slip-sinkage.slip_power"
+    shapes = {c.path for c in problem.shape_coordinates(["slip-sinkage", "wheel-flexibility"])}
+    assert shapes == {"slip-sinkage.slip_power", "slip-sinkage.by_slip"}
+    (load,) = shape_coordinates(EFFECTS["wheel-flexibility"])  # a spring knows nothing of slip
+    assert load.path == "wheel-flexibility.by_load"
 
 
 def test_the_effect_that_acts_promises_most_and_keeps_it(dug, named):

@@ -39,6 +39,7 @@ class WheelFlexibility(SlipLoadScaling):
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
     )
+    law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     compliance: Annotated[Real, Parameter("m/N", 0.0, 1e-2, "C, deflection per load")] = 0.0
 

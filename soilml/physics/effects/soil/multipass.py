@@ -37,6 +37,7 @@ class Multipass(SlipLoadScaling):
         isolate="the same runs again in the same rut, and on soil prepared anew",
         needs=("pass_number",),
     )
+    law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     growth: Annotated[Real, Parameter("1", 0.0, 3.0, "a, power of the pass number")] = 0.0
 
     def on_soil(self, soil: Soil, load_case: LoadCase) -> Soil:

@@ -41,6 +41,7 @@ class SmallWheelStiffness(SlipLoadScaling):
         varied_dimension="radius",
         isolate="the same runs with a wheel of another diameter; plate tests of the soil",
     )
+    law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     exponent: Annotated[Real, Parameter("1", -2.0, 0.0, "m, power of the diameter")] = 0.0
 
