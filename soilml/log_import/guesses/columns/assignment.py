@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from soilml.log_import.guesses.axes import axes_of
-from soilml.log_import.guesses.candidates import Candidate
-from soilml.log_import.guesses.column_words import WHEEL_WORDS, wheel_word, words_of
+from soilml.log_import.guesses.columns.axes import axes_of
+from soilml.log_import.guesses.columns.candidates import Candidate
+from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, wheel_word, words_of
 
 #: Roles of which one suffices, the better one first where both fit as well.
 _RIVALS = (
@@ -15,6 +15,8 @@ _RIVALS = (
     ("ground_speed", "position"),
     ("torque", "motor_current"),
 )
+#: What a measured torque is worth over a current, whose constants a log does not tell.
+_MEASURED = 3.0
 #: Roles that each wheel has of its own.
 _PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_current", "load",
               "drawbar_pull", "sinkage", "slip")  # fmt: skip
@@ -64,8 +66,8 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
             found.others.setdefault(role, []).append(candidate)
     for rivals in _RIVALS:
         present = [role for role in rivals if role in found.shared]
-        best = max(present, key=lambda r: found.shared[r].scores[r] - 0.1 * rivals.index(r),
-                   default="")  # fmt: skip
+        best = max(present, key=lambda r: found.shared[r].scores[r] - 0.1 * rivals.index(r) +
+                   (_MEASURED if r == "torque" else 0.0), default="")  # fmt: skip
         for role in present:
             if role != best:
                 found.others.setdefault(role, []).insert(0, found.shared.pop(role))

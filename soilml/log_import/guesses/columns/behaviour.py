@@ -79,6 +79,8 @@ def _wrap(own: Floats, steps: Floats) -> float:
     others = np.abs(np.delete(steps, jumps))
     if others.size == 0 or float(np.percentile(others, 99)) > 0.25 * span:
         return 0.0
+    if abs(float(np.delete(steps, jumps).sum())) < 0.3 * span:
+        return 0.0  # a force that comes and goes: nothing moves between the jumps
     for period in _PERIODS:
         if 0.93 * period < span <= 1.02 * period:
             return float(period)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
-from soilml.log_import.guesses.column_words import name_scores, words_of
+from soilml.log_import.guesses.columns.behaviour import Behaviour, behaviour, looks_like_time
+from soilml.log_import.guesses.columns.column_words import name_scores, words_of
 from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension
