@@ -48,6 +48,8 @@ class Inputs:
         Roles that do not vary, with their value.
     rest
         Mean at rest and its standard error by role; empty where the wheel never rests.
+    tare
+        What was subtracted by role.
     tare_error
         Standard error of the tare by role.
     notes
@@ -60,6 +62,7 @@ class Inputs:
     intervals: dict[str, float] = field(default_factory=dict)
     constants: dict[str, float] = field(default_factory=dict)
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
+    tare: dict[str, float] = field(default_factory=dict)
     tare_error: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -218,6 +221,6 @@ def _tare(inputs: Inputs, wheel: WheelMap) -> None:
             continue
         zero, error = mean_error(stretch, inputs.step)[:2]
         inputs.values[role] = values - zero
-        inputs.tare_error[role] = error
+        inputs.tare[role], inputs.tare_error[role] = zero, error
         if role in inputs.rest:
             inputs.rest[role] = (inputs.rest[role][0] - zero, error)

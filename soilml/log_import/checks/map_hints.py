@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from soilml.log_import.checks.table_hints import MOST_TRACTION, traction_cause
+from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip, traction_cause
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats
 
@@ -43,6 +43,11 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
             yield (
                 f"slip is {float(np.nanmedian(slip)):.3g} in the middle of the windows: probably "
                 "it is in per cent; write unit = '%' in [slip]"
+            )
+        elif falls_with_slip(windows):
+            yield (
+                "torque falls as slip grows: probably the log has the ratio of travel to rim "
+                "speed; write definition = 'v/(r omega)' in [slip]"
             )
         return
     if not {"rim_speed", "speed"} <= windows.keys():

@@ -22,9 +22,14 @@ _PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_curren
               "drawbar_pull", "sinkage", "slip")  # fmt: skip
 #: Lowest score of a guess.
 _LEAST = 2.0
-_SIDES = {"fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"),
-          "rf": ("front", "right"), "rl": ("rear", "left"), "bl": ("rear", "left"),
-          "rr": ("rear", "right"), "br": ("rear", "right")}  # fmt: skip
+_AXLES = {"f": "front", "r": "rear", "b": "rear", "m": "middle", "c": "middle"}
+#: Two letters in either order: fl, lf -> front, left.
+_SIDES = {
+    pair: (axle, side)
+    for letter, axle in _AXLES.items()
+    for short, side in (("l", "left"), ("r", "right"))
+    for pair in (letter + short, short + letter)
+}
 
 
 @dataclass

@@ -42,10 +42,12 @@ def signs(drafts: dict[str, Draft], inputs: Inputs) -> None:
 
 
 def sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Turn a pull that falls where the torque rises."""
-    if not {"torque", "drawbar_pull"} <= drafts.keys() & inputs.values.keys():
+    """Turn a pull that falls where the torque, or the current of the motor, rises."""
+    known = drafts.keys() & inputs.values.keys()
+    role = "torque" if "torque" in known else "motor_current"
+    if not {role, "drawbar_pull"} <= known:
         return
-    torque, pull = inputs.values["torque"], inputs.values["drawbar_pull"]
+    torque, pull = inputs.values[role], inputs.values["drawbar_pull"]
     kept = np.flatnonzero(moving(inputs) & np.isfinite(torque) & np.isfinite(pull))
     width = max(1, round(1.0 / inputs.step))
     count = kept.size // width
@@ -54,7 +56,7 @@ def sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
     blocks = kept[: count * width].reshape(count, width)
     means = np.stack([torque[blocks].mean(axis=1), pull[blocks].mean(axis=1)])
     if np.ptp(means, axis=1).min() > 0.0:
-        sign = -1.0 if drafts["torque"].keys.get("reverse") else 1.0
+        sign = -1.0 if drafts[role].keys.get("reverse") else 1.0
         if sign * float(np.corrcoef(means)[0, 1]) < -0.8:
             why = "it falls in the log where the torque rises"
             drafts["drawbar_pull"].put("reverse", True, why)
