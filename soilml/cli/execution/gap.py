@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import available_effects, check_seed, parse_costs, parse_names
-from soilml.cli.output import json_text
+from soilml.cli.output import json_text, show, tell
 from soilml.cli.output_names import GAP_SUSPECTED
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.report_files import origin_of
@@ -58,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
     earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
     files = {folder / name: text for name, text in texts.items()}
     write_files(files, folders=[folder], remove=earlier)
-    print(_text(report))
-    print(f"\n{', '.join(str(name) for name in files)}", file=sys.stderr)
+    show(_text(report))
+    tell(f"\n{', '.join(str(name) for name in files)}")
     return 0
 
 
