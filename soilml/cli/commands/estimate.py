@@ -69,7 +69,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="measured rows, CSV or Parquet; without it, tell what the file is for",
     )
     parser.add_argument(
-        "--by", metavar="COLUMN", help="one estimate for each value of this column, such as run; all: one of all rows"
+        "--by",
+        metavar="COLUMN",
+        help="one estimate for each value of this column, such as run; all: one of all rows",
     )
     parser.add_argument(
         "--with",

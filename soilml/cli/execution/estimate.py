@@ -19,13 +19,13 @@ from soilml.cli.joint_readings import (
     row_readings,
     unused_std_note,
 )
-from soilml.cli.output import save_columns, show, tell, tell_columns
+from soilml.cli.output import save_columns, show, tell
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.estimate import check_size, estimate_report
 from soilml.cli.reports.report_files import write_with_report
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
-from soilml.cli.usual_errors.usual_model_error import usual_answer
+from soilml.cli.usual_errors.usual_model_error import tell_answers, usual_answer
 from soilml.cli.wheel_check import (
     apply_case_option,
     check_table_wheel,
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     write_with_report(
         args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
     )
-    tell_columns(columns, args.out)
+    tell_answers(columns, args.out)
     tell("\n".join(notes))
     return 0
 
