@@ -37,8 +37,9 @@ lie outside the training data; the estimate is then the prior.
 
 One row gives one equation for three unknowns, so the estimate of a single row
 is close to the prior. --by run pools all rows of a run, which is far more
-accurate, and --by all those of all runs, where these were on one soil; sinkage_m, drawbar_pull_N and <column>_std are used where the table
-has them, slip_std and load_N_std included. The estimate of a run is the prior
+accurate, and --by all those of all runs, which must then be on one soil.
+sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
+slip_std and load_N_std included. The estimate of a run is the prior
 where more than a tenth of its rows is out of range, and widened as far as the
 misfit says where no soil explains them all. A run gets two answers: as if the
 model of wheel and soil were right, and, in columns with _usual, with the errors

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from soilml.cli.reports.report_files import origin_of
 from soilml.cli.table_reading import read_long_table
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
+from soilml.config.sensor_bias import checked_sensors
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.number_text import read_number
@@ -36,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
     check_seed(args)
     effects = available_effects(args)
-    case = read_case(args.model, effects)
+    case = read_case(args.model, effects, with_bias=True)
+    checked = checked_sensors(case.bias) | _calibration(args.checked, effects)
+    case = replace(case, bias={})
     table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
@@ -46,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             free=parse_names(args.free),
             holdout=args.holdout,
             effects=effects,
-            calibration=_calibration(args.checked, effects),
+            calibration=checked,
             costs=parse_costs(args),
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),

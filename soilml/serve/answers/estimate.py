@@ -51,7 +51,8 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     tell("looking for the next measurement")
     advice = advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
-    pull = _pull(case, table)
+    pull = _pull(case, table, as_usual=usual is not None)
+    pull["as_usual"] = usual is not None
     pull["warnings"] = [w for w in pull.get("warnings", []) if w not in fit.warnings]
     found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
@@ -138,13 +139,13 @@ def words(fit: Fit, advice: Advice | None) -> list[str]:
     return [abstention_message(name, part) for name, part in left if part > NOT_IDENTIFIED_ABOVE]
 
 
-def _pull(case: Case, table: Table) -> dict[str, Any]:
+def _pull(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
     """Drawbar pull and slope, of the rover in words; the reason where there is none."""
     try:
         if case.rover is not None:
-            return {"text": rover_text(case.rover, rover_report(case, table))}
+            return {"text": rover_text(case.rover, rover_report(case, table, as_usual=as_usual))}
         if case.gears:
             raise InputError("MODEL.toml has several gears: `soilml pull --gear NAME` takes one")
-        return pull_curves(pull_report(case, table))
+        return pull_curves(pull_report(case, table, as_usual=as_usual))
     except SoilmlError as error:
         return {"reason": " ".join(str(error).split())}
