@@ -113,16 +113,19 @@ def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
 
 
 def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str:
-    if wheel.channels[travel].unit in ("", "m", "m/s"):
-        for factor, unit in _TRAVEL:
-            if 0.4 * factor <= excess <= 1.2 * factor:
-                rate = "/s" if travel == "ground_speed" and "/" not in unit else ""
-                return f"probably [{travel}] is in {unit}{rate}"
+    likely = []
     if rotation != "rim_speed" and wheel.channels[rotation].unit:
         given = spelling(wheel.channels[rotation].unit)
         for factor, read, meant in _SLOW_ROTATION:
             if given == read and 0.4 * factor <= excess <= 1.2 * factor:
-                return f"probably [{rotation}] is in {meant}, and was read as {read}"
+                likely.append(f"[{rotation}] is in {meant}, and was read as {read}")
+    if wheel.channels[travel].unit in ("", "m", "m/s"):
+        for factor, unit in _TRAVEL:
+            if 0.4 * factor <= excess <= 1.2 * factor:
+                rate = "/s" if travel == "ground_speed" and "/" not in unit else ""
+                likely.append(f"[{travel}] is in {unit}{rate}")
+    if likely:
+        return f"probably {', or '.join(likely)}"
     ratio = wheel.channels[rotation].gear_ratio.value if rotation != "rim_speed" else 1.0
     if ratio > 1.0 and excess > 0.4 * ratio:
         return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"

@@ -22,6 +22,7 @@ _OFFSET = 0.05
 def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
     """For each run of a wheel, the roles whose sensor is dead, with the reason."""
     levels = {role: [_level(inputs, role) for inputs in runs] for role in _roles(runs)}
+    stated = _stated_load(runs)
     found: list[dict[str, str]] = []
     for i, inputs in enumerate(runs):
         dead = {}
@@ -29,6 +30,8 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
             known = values[np.isfinite(values)]
             if known.size == 0:
                 dead[role] = "it has no samples"
+            elif role == "load" and stated:
+                continue
             elif np.ptp(known) == 0.0 and role in (*_RESPONDING, "wheel_speed"):
                 dead[role] = f"it reads {known[0]:.3g} throughout"
             elif role in _RESPONDING:
@@ -41,6 +44,13 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
                     )
         found.append(dead)
     return found
+
+
+def _stated_load(runs: list[Inputs]) -> bool:
+    """Whether the load is a constant above zero in all runs: a weight that the log states."""
+    loads = [inputs.values["load"] for inputs in runs if "load" in inputs.values]
+    known = [own[np.isfinite(own)] for own in loads]
+    return all(own.size > 0 and np.ptp(own) == 0.0 and own[0] > 0.0 for own in known)
 
 
 def _roles(runs: list[Inputs]) -> list[str]:
