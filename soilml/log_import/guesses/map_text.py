@@ -24,6 +24,7 @@ from soilml.log_import.guesses.columns.candidates import (
     describe,
     liveliest,
 )
+from soilml.log_import.guesses.columns.column_words import words_of
 from soilml.log_import.guesses.drafts.draft import Draft, keys_alike
 from soilml.log_import.guesses.drafts.draft_channels import draft_channels
 from soilml.log_import.guesses.drafts.draft_inputs import fastest_ratio, inputs_of
@@ -39,6 +40,8 @@ from soilml.log_import.recording import Recording
 
 #: Most columns that are listed, and runs that are looked at.
 _MOST_LISTED, _LOOKED = 40, 8
+#: Words of columns of plate and shear tests.
+_OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 
 
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
@@ -159,6 +162,9 @@ class _MapText:
         if len(listed) > _MOST_LISTED:
             listed = [c for c in listed if not c.about.constant]
         lines += [f"#   {line}" for line in describe(listed[:_MOST_LISTED])]
+        words = {word for c in self.columns for word in words_of(c.address)}
+        if words & _OF_PLATES and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
+            lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
         if len(self.columns) > len(listed[:_MOST_LISTED]):
             lines.append(f"#   and {len(self.columns) - len(listed[:_MOST_LISTED])} more")
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)

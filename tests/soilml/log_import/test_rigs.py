@@ -249,3 +249,10 @@ def test_fields_of_a_protobuf_message_that_are_not_set():
     found = protobuf_fields(message)
     assert found["name"] == "A" and "options" not in found
     assert found["field"][0]["number"] == 3 and found["field"][0]["oneof_index"] == 0
+
+
+def test_plate_tests_are_sent_to_the_bevameter(tmp_path):
+    depth = np.linspace(0.0, 0.05, 30)
+    columns = {"time": 0.1 * np.arange(30.0), "plate sinkage [m]": depth,
+               "plate pressure [kPa]": 900.0 * depth}  # fmt: skip
+    assert "soilml bevameter" in init_map(write_csv(tmp_path / "p.csv", columns))
