@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 from soilml.cli.options import InputFile, add_workers_option
-from soilml.cli.output import tell
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.optional_imports import need
@@ -113,6 +112,7 @@ def _any_wheel(args: argparse.Namespace) -> int:
 
 def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
