@@ -34,7 +34,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/log_import/rows_figure.py": {"matplotlib"},
     "soilml/gap/html/prediction_curves.py": {"matplotlib"},
     "soilml/traction/plot.py": {"matplotlib"},
-    "soilml/log_import/readers/bags.py": {"rosbags", "mcap"},
+    "soilml/log_import/readers/bags.py": {"rosbags", "mcap", "mcap_protobuf"},
     "soilml/log_import/readers/matlab.py": {"scipy", "h5py"},
     "soilml/log_import/readers/parquet_log.py": {"pyarrow"},
     "soilml/log_import/report/figures.py": {"matplotlib"},

@@ -15,7 +15,7 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
-from soilml.io.text_tables import WIDTH, csv_blocks, format_table
+from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
 from soilml.report.terminal import rounded, shown_column
 
 _ENDING = re.compile(r"_(std|p05|p95)$")
@@ -50,6 +50,18 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
 def is_terminal() -> bool:
     """Whether standard output is a terminal."""
     return sys.stdout is not None and sys.stdout.isatty()
+
+
+def show(text: str) -> None:
+    """Print text on standard output; sentences are broken to the width of a terminal."""
+    write_stdout(f"{wrapped(text) if is_terminal() else text}\n")
+
+
+def tell(text: str) -> None:
+    """Print a message on standard error; broken to the width of a terminal, else one line."""
+    print(
+        wrapped(text) if sys.stderr is not None and sys.stderr.isatty() else text, file=sys.stderr
+    )
 
 
 def write_stdout(text: str) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.cli.output import tell
 from soilml.config.case import Case
 from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.io.table import Table
@@ -16,7 +15,7 @@ from soilml.log_import.checks.table_hints import table_hints
 def print_table_hints(table: Table, case: Case | None, radius: float | None = None) -> None:
     """Print a line on standard error for each oddity of a table; see `table_remarks`."""
     for text in table_remarks(table, case, radius):
-        print(f"! {text}", file=sys.stderr)
+        tell(f"! {text}")
 
 
 def table_remarks(table: Table, case: Case | None, radius: float | None = None) -> list[str]:

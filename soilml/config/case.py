@@ -197,8 +197,8 @@ def read_case(
         case = replace(case, bias=take_bias(settings.table("bias")))
     elif "bias" in settings:
         settings.fail(
-            "[bias] is read by identify and estimate --case alone (in Python, with_bias=True); for "
-            "other commands delete it"
+            "[bias] is read by identify, pull, gap and estimate --case alone (in Python, "
+            "with_bias=True); for other commands delete it"
         )
     settings.finish()
     return case
@@ -225,8 +225,8 @@ def read_case_of_one_gear(
         case = replace(case, bias=take_bias(settings.table("bias")))
     elif "bias" in settings:
         settings.fail(
-            "[bias] is read by identify and estimate --case alone (in Python, with_bias=True); for "
-            "other commands delete it"
+            "[bias] is read by identify, pull, gap and estimate --case alone (in Python, "
+            "with_bias=True); for other commands delete it"
         )
     settings.finish()
     if not case.gears and gear is None:

@@ -20,6 +20,14 @@ KNOWN_PARTS: dict[str, tuple[str | None, str | None]] = {
 }
 
 
+#: The same as effects of the catalogue: of an offset, and of a relative error.
+_EFFECTS: dict[str, tuple[str, str]] = {
+    column("slip"): ("slip-offset", ""),
+    column("load"): ("", "load-gain"),
+    column("torque"): ("torque-offset", "torque-gain"),
+    column("sinkage"): ("sinkage-offset", ""),
+    column("drawbar_pull"): ("drawbar-offset", ""),
+}
 #: Forms of a bias in a message; unlike noise, it may be zero.
 NEEDED = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
 
@@ -44,6 +52,19 @@ def take_bias(settings: Settings) -> dict[str, Noise]:
         found[key] = bias
     settings.finish()
     return found
+
+
+def checked_sensors(bias: Mapping[str, Noise]) -> dict[str, float]:
+    """Standard deviations of faults of sensors, by effect, as `gap` takes them: those above zero.
+
+    A declared error becomes the size of the fault that an analysis may find.
+    """
+    sizes: dict[str, float] = {}
+    for key, declared in bias.items():
+        offset, gain = _EFFECTS[key]
+        sizes |= {offset: declared.constant} if offset else {}
+        sizes |= {gain: declared.share} if gain else {}
+    return {name: size for name, size in sizes.items() if size > 0.0}
 
 
 def common_errors(bias: Mapping[str, Noise]) -> dict[str, float]:

@@ -156,7 +156,15 @@ def _read_csv(
 def _known_columns(
     file: Path, header: list[str], ignore_extra: bool, own: Sequence[str] = ()
 ) -> list[str]:
-    kept = []
+    kept: list[str] = []
+    strange = [name for name in header if name not in own and name not in COLUMNS]
+    if len(strange) == len(header) > 2 and not ignore_extra:
+        hints = [(name, _misnamed(name)) for name in strange]
+        shown = ", ".join(f"{name!r} ({hint})" if hint else repr(name) for name, hint in hints)
+        raise TableError(
+            f"{file}: none of its columns is known: {shown}; a table of runs has the columns "
+            f"{', '.join(RUNS)}, in SI units; give other columns these names and units"
+        )
     for name in header:
         if header.count(name) > 1:
             raise TableError(f"{file}: column {name} occurs twice")
@@ -182,9 +190,14 @@ def _misnamed(name: str) -> str:
         if quantity.unit == "-" or len(quantity.name) <= 2:
             continue
         if name.startswith(f"{quantity.name}_"):
+            also = [
+                other.column
+                for other in COLUMNS.values()
+                if other.name.startswith(f"{quantity.name}_") and other.unit == quantity.unit
+            ]
             return (
-                f"{quantity.name.replace('_', ' ')} is read in {quantity.unit}; "
-                f"convert it and name the column {quantity.column}"
+                f"{quantity.name.replace('_', ' ')} is read in {quantity.unit}; convert it and "
+                f"name the column {' or '.join([quantity.column, *also])}"
             )
     near = difflib.get_close_matches(name.lower(), [c.lower() for c in COLUMNS], 1, 0.75)
     if near:

@@ -29,6 +29,10 @@ def fault_of_text(text: str) -> str:
     return "" if is_plain(text) else f"{text!a} has control characters; needed is plain text"
 
 
+#: Name of the group of all rows; see `Table.groups`.
+ALL = "all"
+
+
 @dataclass(frozen=True)
 class Table:
     """Columns of equal length by name.
@@ -109,8 +113,12 @@ class Table:
     def groups(self, name: str = "run") -> Iterator[tuple[str, Table]]:
         """(value, rows) for each value of a column, in order of first appearance.
 
-        Raises `TableError` for a blank cell, whose row would have no group.
+        `all`, where no column has that name, is one group of all rows. Raises `TableError` for a
+        blank cell, whose row would have no group.
         """
+        if name == ALL and name not in self:
+            yield ALL, self
+            return
         column = self[name]
         blank = column == "" if name in TEXT else np.isnan(column)
         if blank.any():

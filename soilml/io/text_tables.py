@@ -22,6 +22,18 @@ WIDTH = 100
 _LEAST_WRAPPED = 16
 
 
+def wrapped(text: str, width: int = WIDTH) -> str:
+    """The text with its longer lines broken between words; what follows a break is indented."""
+    return "\n".join(
+        line
+        if len(line) <= width
+        else textwrap.fill(
+            line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+        )
+        for line in text.split("\n")
+    )
+
+
 def csv_text(columns: Columns) -> str:
     """The columns as CSV; NaN becomes a blank cell, numbers keep ten digits."""
     return "".join(csv_blocks(columns))

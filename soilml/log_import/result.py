@@ -80,33 +80,19 @@ class ImportedLog:
         return [(s.run, stretch) for s in self.series for stretch in s.stretches if stretch.why]
 
     def bias_toml(self) -> str:
-        """The table [bias] of a model file, and the options that `gap` takes in its place."""
+        """The table [bias] of a model file."""
         if not self.bias:
             return (
                 "# No constant of the map has a standard deviation: rows share no stated error.\n"
             )
         lines = [
             "# Errors that all rows share, from the uncertainties of the map. Add this table to",
-            "# the model file for `soilml identify` and `soilml estimate --case`; zero declares a",
-            "# sensor to be exact.",
+            "# the model file, for `soilml identify`, `gap`, `pull` and `estimate --case`; zero",
+            "# declares a sensor to be exact.",
             "[bias]",
         ]
         lines += [f"{key} = {_setting(noise)}" for key, noise in self.bias.items()]
-        lines += self._options_of_gap()
         return "\n".join(lines) + "\n"
-
-    def _options_of_gap(self) -> list[str]:
-        """Commented options that tell `gap` of these errors."""
-        torque, slip = self.bias.get("torque_Nm"), self.bias.get("slip")
-        load = self.bias.get("load_N")
-        sizes = {
-            "torque-gain": torque.share if torque else 0.0,
-            "torque-offset": torque.constant if torque else 0.0,
-            "slip-offset": slip.constant if slip else 0.0,
-            "load-gain": load.share if load else 0.0,
-        }
-        options = [f"--checked {name}={std:.3g}" for name, std in sizes.items() if std]
-        return ["", f"# soilml gap refuses [bias]; for it: {' '.join(options)}"] if options else []
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the rows over slip with 90 % intervals, a panel for each measured channel.

@@ -18,7 +18,7 @@ from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of
 from soilml.log_import.checks.irregular import irregular_windows
 from soilml.log_import.checks.map_hints import map_hints
-from soilml.log_import.checks.sensors import dead_sensors, untared_sensors
+from soilml.log_import.checks.sensors import dead_sensors, untared_load, untared_sensors
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
@@ -216,12 +216,17 @@ class _Wheel:
     def remarks(self) -> list[str]:
         """Dead and untared sensors."""
         of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        found = [
-            f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
-            for run, dead in zip(self.runs, self.dead, strict=True)
-            for role, why in dead.items()
-        ]
-        return found + untared_sensors(self.wheel, self.inputs)
+        found = []
+        for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
+            if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
+                found.append(f"run {run.name}: no sensor{of} says anything: an empty log?")
+                continue
+            found += [
+                f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
+                for role, why in dead.items()
+            ]
+        found += untared_sensors(self.wheel, self.inputs)
+        return found + untared_load(self.wheel, self.inputs)
 
     def series(self, i: int) -> WheelSeries:
         """Quantities and stretches of one run."""

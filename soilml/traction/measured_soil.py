@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from soilml.config.case import Case
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.data.observations import read_observations
 from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.identification.shared_errors.sizes import usual_errors
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.traction.onboard_draws import onboard_draws
@@ -34,14 +35,21 @@ def measured_soil(
     table: Table,
     free: Sequence[str] | None = None,
     estimator: Estimator | None = None,
+    as_usual: bool = False,
 ) -> MeasuredSoil:
-    """The soil of the rows of a table; raises as `pull_report` does."""
+    """The soil of the rows of a table; raises as `pull_report` does.
+
+    With `as_usual`, sensors and model have the errors that they usually have.
+    """
     if estimator is not None:
         check_wheel_size(case, table)
         unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
         return MeasuredSoil(draws, unknown, tuple(notes), None)
     unknown = select_free(case, free)
     data = read_observations(case, table)
+    if as_usual:
+        errors = usual_errors(case, data.load, [f.path for f in unknown])
+        data = replace(data, shared_errors=errors)
     posterior = posterior_draws(case, data, unknown)
     warnings = list(data.notes)
     if [c.name for c in data.channels] == ["torque"]:

@@ -79,6 +79,7 @@ def pull_report(
     loads: Sequence[float] | None = None,
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
+    as_usual: bool = False,
 ) -> PullReport:
     """Pull and slope of a gear on the soil that the rows were measured on.
 
@@ -97,6 +98,9 @@ def pull_report(
         Highest slip, in (0, 1); by default the highest measured one, at least 0.6.
     estimator
         Trained estimator whose estimate replaces the posterior.
+    as_usual
+        Whether sensors and model have the errors that they usually have, as in `identify`; not
+        with an estimator.
 
     Returns
     -------
@@ -111,7 +115,7 @@ def pull_report(
     FitError, TableError
         As `identify` with the posterior method.
     """
-    soil = measured_soil(case, table, free, estimator)
+    soil = measured_soil(case, table, free, estimator, as_usual)
     draws, unknown, warnings = soil.draws, soil.unknown, list(soil.warnings)
     excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
     if excluded:

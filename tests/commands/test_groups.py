@@ -71,3 +71,16 @@ def test_a_blank_cell_is_no_group(folder, capsys, small_model):
         captured = capsys.readouterr()
         assert captured.err.count("\n") == 1 and captured.out == ""
         assert "timed.csv line 3, column time_s: the cell is blank" in captured.err
+
+
+def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
+    """`--by all` gives what the same rows give as one run."""
+    header, *rows = [line for line in RUNS.splitlines() if not line.startswith("b")]
+    renamed = [header, *("x" + row[1:] for row in rows)]
+    (folder / "one.csv").write_text("\n".join(renamed) + "\n")
+    found = {}
+    for table, by in (("runs.csv", "all"), ("one.csv", "run")):
+        assert main(["estimate", "wheel", table, "--by", by]) == 0
+        (found[by],) = rows_of(capsys.readouterr().out)
+        assert found[by].pop(by) == {"all": "all", "run": "x"}[by]
+    assert found["all"] == found["run"] and found["all"]["rows"] == "4"

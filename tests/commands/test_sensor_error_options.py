@@ -1,5 +1,6 @@
 """Errors of slip and load, and common errors, in tables and model files given to `estimate`."""
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,14 @@ from conftest import MODEL, simulated_run
 
 from soilml.cli import main
 from soilml.config.case import read_case_of_one_gear
-from soilml.config.sensor_bias import common_errors
+from soilml.config.sensor_bias import checked_sensors, common_errors, take_bias
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.identification.trained_estimator import with_sensors_of
+from soilml.io.toml_settings import Settings
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
+from soilml.physics.effects import EFFECTS
 
 BIAS = '[bias]\nslip = 0.0\nload_N = "0 %"\ntorque_Nm = "5 % + 0.1"\nsinkage_m = 0.002\n'
 
@@ -104,5 +107,25 @@ def test_a_bias_that_cannot_be_is_refused(folder, line, said):
 
 def test_commands_that_do_not_use_a_bias_refuse_it(folder, capsys):
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")
-    assert main(["gap", "biased.toml", "runs.csv", "--out", "found"]) == 2
+    assert main(["advise", "biased.toml", "runs.csv"]) == 2
     assert "bias" in capsys.readouterr().err
+
+
+def test_a_declared_bias_is_a_checked_sensor_for_gap(folder, monkeypatch):
+    """[bias] says of gap's effects what --checked says; the option has the last word."""
+    import soilml.gap
+
+    bias = take_bias(Settings(tomllib.loads(BIAS)["bias"], "[bias]", folder))
+    sizes = {"torque-gain": 0.05, "torque-offset": 0.1, "sinkage-offset": 0.002}
+    assert checked_sensors(bias) == sizes and set(sizes) <= set(EFFECTS)
+    (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")
+    given = {}
+
+    def stop(case, table, **options):
+        given.update(options)
+        raise InputError("enough")
+
+    monkeypatch.setattr(soilml.gap, "gap", stop)
+    command = ["gap", "biased.toml", "runs.csv", "--out", "found", "--checked", "torque-gain=0.01"]
+    assert main(command) == 2
+    assert given["calibration"] == sizes | {"torque-gain": 0.01}

@@ -112,6 +112,7 @@ def _any_wheel(args: argparse.Namespace) -> int:
 
 def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
@@ -139,17 +140,15 @@ def _from_data(args: argparse.Namespace) -> int:
         for name, s in trained.scores.items()
     ]
     labels = [QUANTITIES[name].symbol if name in QUANTITIES else name for name in spec.targets]
-    head = ("", *[f"RMSE/prior {n}" for n in labels], *[f"cover90 {n}" for n in labels])
-    print(
+    head = ("", *[f"RMSE {n}" for n in labels], *[f"cover {n}" for n in labels])
+    tell(
         f"On {trained.scores['estimator'].rows} held-out rows: RMSE over the prior's standard "
-        "deviation, and coverage of 90 % intervals\n",
-        file=sys.stderr,
+        "deviation, and coverage of 90 % intervals\n"
     )
     print(format_table(head, rows), file=sys.stderr)
-    print(
+    tell(
         f"\nwritten: {out} ({out.stat().st_size / 1e3:.0f} kB; largest difference of the float32 "
         f"file {metadata['parity']} prior standard deviations), "
-        f"{out.with_suffix('.md')}, {out.with_suffix('.png')}",
-        file=sys.stderr,
+        f"{out.with_suffix('.md')}, {out.with_suffix('.png')}"
     )
     return 0

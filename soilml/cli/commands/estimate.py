@@ -37,8 +37,9 @@ lie outside the training data; the estimate is then the prior.
 
 One row gives one equation for three unknowns, so the estimate of a single row
 is close to the prior. --by run pools all rows of a run, which is far more
-accurate; sinkage_m, drawbar_pull_N and <column>_std are used where the table
-has them, slip_std and load_N_std included. The estimate of a run is the prior
+accurate, and --by all those of all runs, which must then be on one soil.
+sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
+slip_std and load_N_std included. The estimate of a run is the prior
 where more than a tenth of its rows is out of range, and widened as far as the
 misfit says where no soil explains them all. A run gets two answers: as if the
 model of wheel and soil were right, and, in columns with _usual, with the errors
@@ -69,7 +70,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="measured rows, CSV or Parquet; without it, tell what the file is for",
     )
     parser.add_argument(
-        "--by", metavar="COLUMN", help="one estimate for each value of this column, such as run"
+        "--by",
+        metavar="COLUMN",
+        help="one estimate for each value of this column, such as run; all: one of all rows",
     )
     parser.add_argument(
         "--with",

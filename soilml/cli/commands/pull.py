@@ -82,6 +82,11 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
     )
     add_row_options(parser)
+    parser.add_argument(
+        "--as-usual",
+        action="store_true",
+        help="allow for the errors that sensors and models usually have, as in identify",
+    )
     parser.add_argument("--out", metavar="FILE.csv", help="write the curves to this file")
     parser.add_argument("--picture", metavar="FILE.png", help="draw the curves and bands")
     add_report_option(parser)

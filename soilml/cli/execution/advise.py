@@ -12,7 +12,7 @@ import numpy as np
 
 from soilml.cli.advice_text import mean_covariates
 from soilml.cli.option_values import available_effects, parse_names, parse_numbers
-from soilml.cli.output import write_columns
+from soilml.cli.output import tell, write_columns
 from soilml.cli.progress import working
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
             f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "
             "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
         )
-    print("\n".join(notes), file=sys.stderr)
+    tell("\n".join(notes))
     return 0
 
 

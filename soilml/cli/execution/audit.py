@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from typing import TYPE_CHECKING
 
 from soilml.cli.option_values import available_effects, parse_costs, parse_names
-from soilml.cli.output import json_text
+from soilml.cli.output import json_text, show, tell
 from soilml.cli.progress import working
 from soilml.cli.table_reading import read_long_table
 from soilml.config.case import read_case
@@ -34,9 +33,9 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
-    print(_text(found))
+    show(_text(found))
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
-        print(line, file=sys.stderr)
+        tell(line)
     return 0
 
 

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 from soilml.cli.option_values import available_effects
-from soilml.cli.output import json_text
+from soilml.cli.output import json_text, show
 from soilml.cli.progress import working
 from soilml.config.case import read_case
 from soilml.errors import InputError, TableError
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
             print(
                 f"{args.out} lacks {', '.join(missing)}: add them, or give --model", file=sys.stderr
             )
-    print(_text(result))
+    show(_text(result))
     return 0
 
 

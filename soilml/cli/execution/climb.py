@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import check_seed
-from soilml.cli.output import is_terminal, json_text, write_stdout
+from soilml.cli.output import is_terminal, json_text, show, write_stdout
 from soilml.cli.output_names import CLIMB_FILES
 from soilml.cli.progress import working
 from soilml.cli.reports.report_files import origin_of, report_texts
@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         write_files(contents, folders=[args.out])
     elif args.out is not None:
         save_text(args.out, json_text(content))
-    print(climb_text(report))
+    show(climb_text(report))
     return 0
 
 

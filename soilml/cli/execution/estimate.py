@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from functools import partial
 from itertools import combinations
@@ -20,13 +19,13 @@ from soilml.cli.joint_readings import (
     row_readings,
     unused_std_note,
 )
-from soilml.cli.output import save_columns, tell_columns
+from soilml.cli.output import save_columns, show, tell
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.estimate import check_size, estimate_report
 from soilml.cli.reports.report_files import write_with_report
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
-from soilml.cli.usual_errors.usual_model_error import usual_answer
+from soilml.cli.usual_errors.usual_model_error import tell_answers, usual_answer
 from soilml.cli.wheel_check import (
     apply_case_option,
     check_table_wheel,
@@ -36,7 +35,7 @@ from soilml.cli.wheel_check import (
 from soilml.errors import InputError, TableError
 from soilml.identification.trained_estimator import narrower_priors
 from soilml.io.read_table import FILLED, RUNS
-from soilml.io.table import Table
+from soilml.io.table import ALL, Table
 from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
@@ -60,12 +59,12 @@ def run(args: argparse.Namespace) -> int:
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
     if args.runs is None and args.case is None:
-        print("\n".join(describe_file(estimator) for estimator in estimators))
+        show("\n".join(describe_file(estimator) for estimator in estimators))
         return 0
     estimators, case, case_notes = apply_case_option(args, estimators)
     case_notes = [describe_file(estimator) for estimator in estimators] + case_notes
     if args.runs is None:
-        print("\n".join(case_notes))
+        show("\n".join(case_notes))
         return 0
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
@@ -101,8 +100,8 @@ def run(args: argparse.Namespace) -> int:
     write_with_report(
         args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
     )
-    tell_columns(columns, args.out)
-    print("\n".join(notes), file=sys.stderr)
+    tell_answers(columns, args.out)
+    tell("\n".join(notes))
     return 0
 
 
@@ -260,12 +259,16 @@ def _group_estimates(
     second, second_notes = usual_answer(estimator, case, by, names, readings, estimate, box)
     columns |= {key: np.where(answered, values[index], np.nan) for key, values in second.items()}
     notes = channel_note(estimator, joint_readings(estimator, table.rows(usable)))
-    notes += width_notes(estimate, f"all rows of a {by}", "do", "measure other loads and slips")
+    whose = "all rows" if by == ALL else f"all rows of a {by}"
+    better = "measure other loads and slips"
+    if by != ALL and len(groups) > 1:
+        better += f", or take those of one soil together, such as --by {ALL},"
+    notes += width_notes(estimate, whose, "do", better)
     if estimate.in_range.any():
         name, rows = groups[i := widest_row(estimate)]
         lines = advice_after_estimate(
             estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
         )
-        notes += [f"{by} {name}: {line}" for line in lines]
+        notes += lines if by == ALL else [f"{by} {name}: {line}" for line in lines]
     notes += refusal_notes(by, names, counts - in_range, counts, estimate)
     return columns, notes + second_notes

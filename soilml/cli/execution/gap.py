@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import available_effects, check_seed, parse_costs, parse_names
-from soilml.cli.output import json_text
+from soilml.cli.output import json_text, show, tell
 from soilml.cli.output_names import GAP_SUSPECTED
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.report_files import origin_of
 from soilml.cli.table_reading import read_long_table
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.case import read_case
+from soilml.config.sensor_bias import checked_sensors
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.number_text import read_number
@@ -37,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
     check_seed(args)
     effects = available_effects(args)
-    case = read_case(args.model, effects)
+    case = read_case(args.model, effects, with_bias=True)
+    checked = checked_sensors(case.bias) | _calibration(args.checked, effects)
+    case = replace(case, bias={})
     table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
@@ -47,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
             free=parse_names(args.free),
             holdout=args.holdout,
             effects=effects,
-            calibration=_calibration(args.checked, effects),
+            calibration=checked,
             costs=parse_costs(args),
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
@@ -58,8 +61,8 @@ def run(args: argparse.Namespace) -> int:
     earlier = [folder / GAP_SUSPECTED] if GAP_SUSPECTED not in texts else []
     files = {folder / name: text for name, text in texts.items()}
     write_files(files, folders=[folder], remove=earlier)
-    print(_text(report))
-    print(f"\n{', '.join(str(name) for name in files)}", file=sys.stderr)
+    show(_text(report))
+    tell(f"\n{', '.join(str(name) for name in files)}")
     return 0
 
 

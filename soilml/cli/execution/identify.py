@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from soilml.cli.advice_text import advice_after_fit
 from soilml.cli.option_values import available_effects, parse_names
-from soilml.cli.output import is_terminal, json_text, write_stdout
+from soilml.cli.output import is_terminal, json_text, show, tell, write_stdout
 from soilml.cli.progress import progress_bar, working
 from soilml.cli.reports.identify import Identification, identify_report
 from soilml.cli.reports.report_files import write_with_report
@@ -67,11 +66,11 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.out is not None or args.report is not None or is_terminal():
         heads = {name: f"{args.by} {name}: " if name else "" for name in found}
-        print("\n\n".join(heads[name] + result.text() for name, result in found.items()))
+        show("\n\n".join(heads[name] + result.text() for name, result in found.items()))
     else:
         write_stdout(text)
     for name, why in failed.items():
-        print(f"{args.by} {name} has no result: {why}", file=sys.stderr)
+        tell(f"{args.by} {name} has no result: {why}")
     return 0
 
 

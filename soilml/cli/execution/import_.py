@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from soilml.cli.output import format_columns, is_terminal, json_text, write_stdout
+from soilml.cli.output import format_columns, is_terminal, json_text, tell, write_stdout
 from soilml.cli.output_names import IMPORT_SUFFIXES
 from soilml.cli.progress import stage_progress
 from soilml.cli.reports.report_files import origin_of
@@ -30,14 +29,14 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         for library in ("jinja2", "matplotlib"):
             need(library, "import")
-    with stage_progress() as tell:
-        found = import_log(args.files, args.map, accept=args.accept, progress=tell)
+    with stage_progress() as progress:
+        found = import_log(args.files, args.map, accept=args.accept, progress=progress)
         html, entry = "", {}
         if args.out is not None:
             from soilml.log_import.report.page import page, summary
 
             origin = origin_of(args)
-            html = page(found, tell, origin)
+            html = page(found, progress, origin)
             entry = {"report": summary(found).as_json(origin)}
     _print_remarks(found)
     if args.out is None:
@@ -53,10 +52,9 @@ def run(args: argparse.Namespace) -> int:
     write_files(dict(zip(files, texts, strict=True)))
     if is_terminal():
         _print_table(found)
-    print(
+    tell(
         f"{len(found.table)} rows of {len(found.series)} runs written to {args.out}; "
-        f"report: {files[1]}; errors that all rows share: {files[3]}",
-        file=sys.stderr,
+        f"report: {files[1]}; errors that all rows share: {files[3]}"
     )
     return 0
 
@@ -70,18 +68,15 @@ def _init(args: argparse.Namespace) -> int:
     changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
     lines = "1 line needs" if changes == 1 else f"{changes} lines need"
     todo = f"{lines} a look (CHANGE, NEEDED)" if changes else "look at its guesses"
-    print(
-        f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv",
-        file=sys.stderr,
-    )
+    tell(f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv")
     return 0
 
 
 def _print_remarks(found: ImportedLog) -> None:
     for text in (*found.implausible, *found.remarks):
-        print(f"! {text}", file=sys.stderr)
+        tell(f"! {text}")
     short = sum(stop.stop - stop.start for _, stop in found.left_out())
-    print(f"{short:.0f} s were left out; the report says why", file=sys.stderr)
+    tell(f"{short:.0f} s were left out; the report says why")
 
 
 def _print_table(found: ImportedLog) -> None:

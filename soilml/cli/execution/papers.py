@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import textwrap
 from collections import Counter
 
-from soilml.cli.output import is_terminal, write_columns
+from soilml.cli.output import is_terminal, tell, write_columns
 from soilml.cli.progress import progress_bar
 from soilml.io.text_tables import format_table
 from soilml.optional_imports import need
 from soilml.papers.catalogue import PAPERS
 from soilml.papers.published import Comparison, printed_numbers
 
-WIDTH = 110
+WIDTH = 100
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,11 +32,10 @@ def run(args: argparse.Namespace) -> int:
         papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
         print("\n\n".join(_page(paper, its, args.all) for paper, its in papers.items()), end="\n\n")
     count = Counter(c.verdict for c in found)
-    print(
+    tell(
         f"{len(found)} printed numbers: {count['yes']} reproduced within their tolerance, "
         f"{count['known']} known to miss it, {count['NO']} wrong; {count['given']} inputs kept as "
-        f"printed; {count['not computed']} not computed",
-        file=sys.stderr,
+        f"printed; {count['not computed']} not computed"
     )
     return 1 if count["NO"] else 0
 

@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     table = read_rows(args, RUNS)
     if args.load is None and args.gear is None:
-        whole = read_case(args.model, available_effects(args))
+        whole = read_case(args.model, available_effects(args), with_bias=True)
         if whole.rover is not None:
             print_table_hints(table, whole)
             return _run_rover(args, whole, table)
@@ -46,13 +46,14 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(
                 f"--{option} needs a model file with [rover], and neither --load nor --gear"
             )
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear, True)
     print_table_hints(table, case)
     options: dict[str, Any] = {
         "loads": None if args.load is None else parse_numbers("--load", args.load).tolist(),
         "slip_limit": args.slip_limit,
         "free": parse_names(args.free),
         "estimator": _estimator(args),
+        "as_usual": args.as_usual,
     }
     if len(options["loads"] or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(options['loads'])} loads; at most {MAX_LOADS}")
@@ -71,6 +72,7 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table) -> int:
     slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
     options: dict[str, Any] = {"slopes": slopes, "slip_limit": args.slip_limit}
     options |= {"free": parse_names(args.free), "estimator": _estimator(args)}
+    options["as_usual"] = args.as_usual
     found, failed = _by_group(args, table, lambda rows: rover_report(case, rows, **options))
     assert case.rover is not None
     write_results(args, found, rover_presentation(case.rover), failed)
@@ -121,6 +123,8 @@ def _check(args: argparse.Namespace) -> None:
             raise InputError(
                 "--picture draws one soil; select it with --where run=NAME instead of --by"
             )
+    if args.trained is not None and args.as_usual:
+        raise InputError("--as-usual applies to the posterior, not to the file of --from")
     if args.trained is not None and args.free is not None:
         raise InputError(
             "--free applies to the posterior; the parameters of --from are those of the model file"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from soilml.cli.output import is_terminal, write_stdout
+from soilml.cli.output import is_terminal, show, tell, write_stdout
 from soilml.cli.reports.report_files import write_with_report
 from soilml.io.text_tables import csv_text
 from soilml.report.figure_style import save_png
@@ -90,11 +89,11 @@ def write_results(
         write_stdout(table)
         for name, one in found.items():
             for line in how.warnings(one):
-                print(f"{heads[name]}{line}", file=sys.stderr)
+                tell(f"{heads[name]}{line}")
     else:
-        print("\n\n".join(heads[name] + how.text(one) for name, one in found.items()))
+        show("\n\n".join(heads[name] + how.text(one) for name, one in found.items()))
     for name, why in failed.items():
-        print(f"{args.by} {name} has no result: {why}", file=sys.stderr)
+        tell(f"{args.by} {name} has no result: {why}")
 
 
 def _joined(

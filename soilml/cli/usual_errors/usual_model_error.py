@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.cli.estimate_text import estimate_columns
+from soilml.cli.output import is_terminal, show, tell_columns
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import MODEL_ERROR_INPUT
@@ -68,6 +69,21 @@ def _columns(estimate: Estimate) -> dict[str, NDArray[Any]]:
         columns[f"{name}_{USUAL}{dash}{part}" if statistic else f"{key}_{USUAL}"] = values
     columns[f"in_range_{USUAL}"] = estimate.in_range.astype(float)
     return columns
+
+
+def tell_answers(columns: Mapping[str, Any], out: str | None) -> None:
+    """Write or print the columns of both answers; on a terminal, as two tables."""
+    ends = (f"_{USUAL}", *(f"_{USUAL}_{part}" for part in ("std", "p05", "p95")))
+    second = [name for name in columns if name.endswith(ends)]
+    if not second or out is not None or not is_terminal():
+        tell_columns(columns, out)
+        return
+    tell_columns({name: columns[name] for name in columns if name not in second}, None)
+    show(f"\nas usual, with the errors that models usually have: columns with _{USUAL} in a file\n")
+    group = next(iter(columns))
+    usual = {name.replace(f"_{USUAL}", ""): columns[name] for name in second}
+    usual["in_range"] = np.asarray(usual["in_range"], dtype=bool)
+    tell_columns({group: columns[group]} | usual, None)
 
 
 def _notes(by: str, names: Sequence[Any], first: Estimate, second: Estimate) -> list[str]:

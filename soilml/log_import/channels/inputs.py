@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,8 @@ class Inputs:
         Roles that do not vary, with their value.
     rest
         Mean at rest and its standard error by role; empty where the wheel never rests.
+    tare
+        What was subtracted by role.
     tare_error
         Standard error of the tare by role.
     notes
@@ -59,6 +62,7 @@ class Inputs:
     intervals: dict[str, float] = field(default_factory=dict)
     constants: dict[str, float] = field(default_factory=dict)
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
+    tare: dict[str, float] = field(default_factory=dict)
     tare_error: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -123,8 +127,21 @@ def _add(inputs: Inputs, channel: Channel, sampled: list[Floats]) -> None:
         place = channel.scale * sampled[0]
         inputs.places[role] = place
         inputs.values.setdefault("wheel_speed", derivative(grid, place, SMOOTH))
+    elif role == "slip":
+        inputs.values[role] = our_slip(channel.scale * sampled[0], channel.definition)
     else:
         inputs.values[role] = channel.scale * sampled[0]
+
+
+def our_slip(given: Any, definition: str) -> Any:
+    """Slip (...) as 1 - v/(r omega), braking r omega/v - 1, of another definition of it (...)."""
+    given = np.asarray(given, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if definition == "v/(r omega)":
+            return np.where(given <= 1.0, 1.0 - given, 1.0 / given - 1.0)
+        if definition == "(r omega - v)/v":
+            return np.where(given > 0.0, given / (1.0 + given), given)
+    return given
 
 
 def along_path(sampled: list[Floats]) -> Floats:
@@ -143,19 +160,21 @@ def along_path(sampled: list[Floats]) -> Floats:
 def _constant(run: Run, channel: Channel) -> float:
     if channel.value is not None:
         return channel.value.value
-    assert channel.name_pattern is not None
-    match = channel.name_pattern.search(run.name)
-    try:
-        return channel.scale * float(match[1].replace(",", ".")) if match else float("nan")
-    except ValueError:
-        match = None
-    finally:
-        if match is None:
-            raise InputError(
-                f"{channel.where} file_name {channel.name_pattern.pattern!r} finds no number in "
-                f"the name of the run {run.name!r}"
-            )
-    return float("nan")
+    if channel.head_pattern is not None:
+        key, place, texts = "head", "the lines before the header of", run.about
+        pattern = channel.head_pattern
+    else:
+        assert channel.name_pattern is not None
+        key, place, texts, pattern = "file_name", "the name of", (run.name,), channel.name_pattern
+    for match in filter(None, map(pattern.search, texts)):
+        try:
+            number = channel.scale * float(match[1].replace(",", "."))
+        except ValueError:
+            continue
+        return float(our_slip(number, channel.definition)) if channel.role == "slip" else number
+    raise InputError(
+        f"{channel.where} {key} {pattern.pattern!r} finds no number in {place} the run {run.name!r}"
+    )
 
 
 def resting(inputs: Inputs) -> slice | None:
@@ -202,6 +221,6 @@ def _tare(inputs: Inputs, wheel: WheelMap) -> None:
             continue
         zero, error = mean_error(stretch, inputs.step)[:2]
         inputs.values[role] = values - zero
-        inputs.tare_error[role] = error
+        inputs.tare[role], inputs.tare_error[role] = zero, error
         if role in inputs.rest:
             inputs.rest[role] = (inputs.rest[role][0] - zero, error)

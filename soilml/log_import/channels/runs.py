@@ -31,6 +31,11 @@ class Run:
     times: tuple[Floats, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def about(self) -> tuple[str, ...]:
+        """What its files state before their samples, line by line."""
+        return tuple(dict.fromkeys(line for own in self.recordings for line in own.about))
+
     def find(self, address: str) -> tuple[Floats, Floats]:
         """Times and samples of a column, `NAME` or `RECORDING:NAME`.
 
@@ -170,7 +175,7 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
             "'100 Hz'"
         )
     common = [clock[0] for clock, same in clocks if same]
-    divided = log_map.run_column or log_map.split_at_reset
+    divided = log_map.run_column or log_map.splits_by_time
     start = (common[0] if divided else min(common)) if common else 0.0
     times = tuple(clock - start if same else clock for clock, same in clocks)
     return Run(name, tuple(recordings), times, tuple(dict.fromkeys(notes)))
@@ -216,7 +221,7 @@ def alike_structs(recordings: Sequence[Recording]) -> list[int]:
 def _divided(
     name: str, members: Sequence[Member], log_map: LogMap
 ) -> list[tuple[str, list[Member]]]:
-    """A log as its runs: by the values of the run column, or where its time starts again.
+    """A log as its runs: by the run column, where its time starts again, or where it pauses.
 
     Recordings without the column take part in every run, where they overlap in time.
     """
@@ -239,12 +244,14 @@ def _divided(
             (f"{name}_{members[i][0].name.rpartition('.')[2]}", [members[i], *shared])
             for i in alike
         ]
-    elif log_map.split_at_reset:
+    elif log_map.splits_by_time:
         at = [0]
         clock = _clock(members[0][0], log_map, members[0][1])
         if clock is None:
             return [(name, list(members))]
-        parts = np.concatenate([[0], np.cumsum(np.diff(clock) < 0.0)])
+        steps = np.diff(clock)
+        ends = (steps < 0.0) & log_map.split_at_reset | (steps > log_map.split_at_pause)
+        parts = np.concatenate([[0], np.cumsum(ends)])
         labels = [f"{name}_{part + 1:02d}" for part in parts]
     else:
         return [(name, list(members))]

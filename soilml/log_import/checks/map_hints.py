@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from soilml.log_import.checks.table_hints import MOST_TRACTION, traction_cause
+from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip, traction_cause
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats
+from soilml.log_import.units.unit_names import spelling
 
 #: Ratio of what was read to what is meant, for rotations; and for travel.
 _ROTATION = (
@@ -17,6 +18,12 @@ _ROTATION = (
     (30.0 / math.pi, "rpm"),
     (2.0 * math.pi, "turns"),
     (6.0, "deg/s, and was read as rpm"),
+)
+_SLOW_ROTATION = (
+    (6.0, "deg/s", "rpm"),
+    (180.0 / math.pi, "deg/s", "rad/s"),
+    (180.0 / math.pi, "deg", "rad"),
+    (30.0 / math.pi, "rpm", "rad/s"),
 )
 _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 
@@ -31,8 +38,10 @@ def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> l
         direction, `slip`, `torque`, `load`, `slope`.
     """
     of = f" of wheel {wheel.name}" if wheel.name else ""
-    found = [*_ratio(log_map, wheel, windows), *_load(log_map, wheel, windows)]
-    found += [*_torque(log_map, wheel, windows), *_slope(wheel, windows)]
+    # the load follows from the slope, and T / (W r) from the load: causes come before consequences
+    found = [*_slope(wheel, windows), *_ratio(log_map, wheel, windows)]
+    found += [*_load(log_map, wheel, windows), *_torque(log_map, wheel, windows)]
+    found += _sinkage(wheel, windows)
     return [f"{log_map.source}{of}: {text}" for text in found]
 
 
@@ -43,6 +52,11 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
             yield (
                 f"slip is {float(np.nanmedian(slip)):.3g} in the middle of the windows: probably "
                 "it is in per cent; write unit = '%' in [slip]"
+            )
+        elif falls_with_slip(windows):
+            yield (
+                "torque falls as slip grows: probably the log has the ratio of travel to rim "
+                "speed; write definition = 'v/(r omega)' in [slip]"
             )
         return
     if not {"rim_speed", "speed"} <= windows.keys():
@@ -99,10 +113,19 @@ def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
 
 
 def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str:
+    likely = []
+    if rotation != "rim_speed" and wheel.channels[rotation].unit:
+        given = spelling(wheel.channels[rotation].unit)
+        for factor, read, meant in _SLOW_ROTATION:
+            if given == read and 0.4 * factor <= excess <= 1.2 * factor:
+                likely.append(f"[{rotation}] is in {meant}, and was read as {read}")
     if wheel.channels[travel].unit in ("", "m", "m/s"):
         for factor, unit in _TRAVEL:
             if 0.4 * factor <= excess <= 1.2 * factor:
-                return f"probably [{travel}] is in {unit}"
+                rate = "/s" if travel == "ground_speed" and "/" not in unit else ""
+                likely.append(f"[{travel}] is in {unit}{rate}")
+    if likely:
+        return f"probably {', or '.join(likely)}"
     ratio = wheel.channels[rotation].gear_ratio.value if rotation != "rim_speed" else 1.0
     if ratio > 1.0 and excess > 0.4 * ratio:
         return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
@@ -150,13 +173,29 @@ def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Ite
             cause = "the radius is in another unit"
         yield f"torque is {traction:.3g} times W r in the middle of the windows: probably {cause}"
     elif cause:
-        if role == "motor_current":
+        unit = wheel.channels[role].unit
+        if spelling(unit) == "mN*m" and 0.02 < 1000.0 * traction < MOST_TRACTION:
+            cause = f"[torque] is in N m, and was read as {unit}"
+        elif role == "motor_current":
             cause = "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
         yield f"torque is only {traction:.2g} times W r: probably {cause}"
     slip = windows.get("slip", np.full(torque.shape, np.nan))
     driving = good & (slip > 0.05)
     if driving.sum() >= 2 and np.mean(torque[driving] < 0.0) > 0.6:
         yield f"torque is below zero while the wheel drives: write reverse = true in [{role}]"
+
+
+def _sinkage(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+    sinkage = windows.get("sinkage", np.zeros(0))
+    sinkage = sinkage[np.isfinite(sinkage)]
+    if wheel.radius is None or sinkage.size == 0:
+        return
+    middle = float(np.median(np.abs(sinkage)))
+    if middle > 2.0 * wheel.radius.value:
+        cause = "it has its zero elsewhere; write tare = 'rest' in [sinkage]"
+        if middle / 1000.0 < wheel.radius.value:
+            cause = "it is in mm; write unit = 'mm' in [sinkage]"
+        yield f"sinkage is {middle:.3g} m, more than the diameter of the wheel: probably {cause}"
 
 
 def _slope(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:

@@ -13,6 +13,8 @@ from soilml.log_import.recording import Floats
 _RESPONDING = ("torque", "motor_current", "load", "drawbar_pull", "sinkage")
 #: A sensor is dead below this share of its usual level in the other runs.
 _DEAD_LEVEL = 0.05
+#: Share of the radius to which a wheel sinks in at rest.
+_SUNK = 0.5
 #: A reading at rest counts as an offset above this share of the reading while driving.
 _OFFSET = 0.05
 
@@ -20,6 +22,7 @@ _OFFSET = 0.05
 def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
     """For each run of a wheel, the roles whose sensor is dead, with the reason."""
     levels = {role: [_level(inputs, role) for inputs in runs] for role in _roles(runs)}
+    stated = _stated_load(runs)
     found: list[dict[str, str]] = []
     for i, inputs in enumerate(runs):
         dead = {}
@@ -27,6 +30,8 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
             known = values[np.isfinite(values)]
             if known.size == 0:
                 dead[role] = "it has no samples"
+            elif role == "load" and stated:
+                continue
             elif np.ptp(known) == 0.0 and role in (*_RESPONDING, "wheel_speed"):
                 dead[role] = f"it reads {known[0]:.3g} throughout"
             elif role in _RESPONDING:
@@ -39,6 +44,13 @@ def dead_sensors(runs: list[Inputs]) -> list[dict[str, str]]:
                     )
         found.append(dead)
     return found
+
+
+def _stated_load(runs: list[Inputs]) -> bool:
+    """Whether the load is a constant above zero in all runs: a weight that the log states."""
+    loads = [inputs.values["load"] for inputs in runs if "load" in inputs.values]
+    known = [own[np.isfinite(own)] for own in loads]
+    return all(own.size > 0 and np.ptp(own) == 0.0 and own[0] > 0.0 for own in known)
 
 
 def _roles(runs: list[Inputs]) -> list[str]:
@@ -73,11 +85,16 @@ def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
         channel = wheel.channels.get(role)
         if channel is None or channel.tare is not None:
             continue
-        offsets, shares = [], []
+        offsets: list[float] = []
+        shares: list[float] = []
         for inputs in runs:
             if role not in inputs.rest or role not in inputs.values:
                 continue
             mean, error = inputs.rest[role]
+            if role == "sinkage" and 0.0 < mean < _SUNK * (
+                wheel.radius.value if wheel.radius else 0.1
+            ):
+                continue  # a wheel at rest has sunk in
             level = _level(inputs, role)
             if np.isfinite(mean) and abs(mean) > 5.0 * np.nan_to_num(error):
                 offsets.append(mean)
@@ -89,3 +106,32 @@ def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
                 "reading while driving: add tare = 'rest' where it should read zero there"
             )
     return found
+
+
+def untared_load(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
+    """A load that is not tared, beside a pull of the same kind of sensor with a large offset.
+
+    What a load sensor reads too much cannot be seen while the wheel stands in the soil.
+    """
+    load, pull = wheel.channels.get("load"), wheel.channels.get("drawbar_pull")
+    if load is None or pull is None or not load.columns or load.tare is not None:
+        return []
+    if pull.tare is None or load.bias.constant > 0.0:
+        return []
+    shares = [
+        abs(inputs.tare["drawbar_pull"]) / level
+        for inputs in runs
+        if "drawbar_pull" in inputs.tare and (level := _level(inputs, "load")) > 0.0
+    ]
+    if not shares or float(np.median(shares)) < _OFFSET:
+        return []
+    offset = float(
+        np.median([abs(i.tare["drawbar_pull"]) for i in runs if "drawbar_pull" in i.tare])
+    )
+    share = f"{float(np.median(shares)):.0%} of the load"
+    return [
+        f"[drawbar_pull] read {offset:.3g} N before the wheel started, {share}: if one sensor "
+        "measures both, the load may be wrong by as much, which no log shows; tare it with the "
+        f"wheel lifted, give [load] value = the weight, or write bias = '1 % + {offset:.2g}' in "
+        "[load]"
+    ]

@@ -48,7 +48,16 @@ def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) ->
     ['torque is 3.27 times W r in the middle of the rows: probably the load is in kg and was taken as N']
     """  # noqa: E501
     found: list[str] = []
-    for check in (_traction, _signs, _slip, _constant_torque, _pull, _sinkage, _angles):
+    for check in (
+        _traction,
+        _signs,
+        _slip,
+        _definition,
+        _constant_torque,
+        _pull,
+        _sinkage,
+        _angles,
+    ):
         found += check(columns, radius)
     return found
 
@@ -65,6 +74,34 @@ def traction_cause(traction: float) -> str:
         other = "the torque lacks a gear ratio, or its sensor is dead"
     distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
     return text if distance < np.log(4.0) else other
+
+
+def falls_with_slip(columns: Mapping[str, Floats]) -> bool:
+    """Whether torque for each newton of load falls steadily over a wide range of slip (rows,).
+
+    The columns are `slip`, `torque` and `load`. A wheel needs more torque as it slips more, or as
+    much; where it is the other way round, slip is the ratio of travel to rim speed.
+    """
+    if not {"slip", "torque", "load"} <= columns.keys():
+        return False
+    slip = columns["slip"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        traction = np.asarray(columns["torque"] / columns["load"])
+    good = np.isfinite(slip) & np.isfinite(traction) & (slip > 0.0) & (slip < 1.0)
+    if good.sum() < 3 or np.ptp(slip[good]) < 0.15 or float(np.median(traction[good])) <= 0.0:
+        return False
+    varies = np.ptp(traction[good]) > 0.15 * float(np.median(traction[good]))
+    return bool(varies and np.corrcoef(slip[good], traction[good])[0, 1] < -0.9)
+
+
+def _definition(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+    named = {"slip": "slip", "torque": "torque_Nm", "load": "load_N"}
+    held = {key: columns[name] for key, name in named.items() if name in columns}
+    if falls_with_slip(held):
+        yield (
+            "torque falls as slip grows: is slip the ratio of travel to rim speed, v/(r omega)? "
+            "Needed is 1 less it"
+        )
 
 
 def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:

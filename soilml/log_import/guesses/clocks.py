@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -9,13 +10,16 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.log_import.channels.runs import alike_structs
-from soilml.log_import.guesses.behaviour import time_unit
-from soilml.log_import.guesses.candidates import candidates_of
-from soilml.log_import.guesses.column_words import WHEEL_WORDS, name_scores, words_of
+from soilml.log_import.guesses.columns.behaviour import time_unit
+from soilml.log_import.guesses.columns.candidates import candidates_of
+from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, name_scores, words_of
 from soilml.log_import.recording import Recording
+from soilml.log_import.units.conversion import factor
 
 #: Lowest score of a clock, and most runs of one file.
 _LEAST, _MOST_RUNS = 0.5, 1000
+#: Shortest pause between two runs, s.
+_PAUSE = 5.0
 
 
 def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:
@@ -70,6 +74,21 @@ def restarts(recordings: Sequence[Recording], column: str) -> int:
             back = steps < -0.2 * np.nanmax(np.abs(values - values[0]))
             return int(back.sum()) if back.sum() == np.sum(steps < 0.0) else 0
     return 0
+
+
+def pauses(recordings: Sequence[Recording], column: str, unit: str) -> tuple[int, float]:
+    """How often a log pauses between runs, and a length below that of these pauses, s.
+
+    Pauses are at least 5 s and 100 samples long. Without one, 0 and infinity.
+    """
+    for recording in recordings:
+        if column in recording.columns:
+            steps = np.diff(recording.columns[column]) * factor(unit, "s", "[time] unit")
+            usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else math.inf
+            long = steps[steps > max(_PAUSE, 100.0 * usual)]
+            if 0 < long.size < _MOST_RUNS:
+                return int(long.size), float(f"{0.8 * float(np.min(long)):.2g}")
+    return 0, math.inf
 
 
 def refuse_a_table_of_runs(log: Sequence[Recording]) -> None:

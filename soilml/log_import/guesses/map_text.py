@@ -10,25 +10,27 @@ from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
-from soilml.log_import.guesses.assignment import Assignment, assign, axle_of
-from soilml.log_import.guesses.candidates import Candidate, candidates_of, describe, liveliest
 from soilml.log_import.guesses.clocks import (
     guess_clock,
     guess_run_column,
+    pauses,
     refuse_a_table_of_runs,
     restarts,
     structs_are_runs,
 )
-from soilml.log_import.guesses.column_words import words_of
-from soilml.log_import.guesses.draft import (
-    Draft,
-    draft_channels,
-    fastest_ratio,
-    inputs_of,
-    keys_alike,
+from soilml.log_import.guesses.columns.assignment import Assignment, assign, axle_of
+from soilml.log_import.guesses.columns.candidates import (
+    candidates_of,
+    describe,
+    liveliest,
 )
+from soilml.log_import.guesses.columns.column_words import words_of
+from soilml.log_import.guesses.drafts.draft import Draft, keys_alike
+from soilml.log_import.guesses.drafts.draft_channels import draft_channels
+from soilml.log_import.guesses.drafts.draft_inputs import fastest_ratio, inputs_of
 from soilml.log_import.guesses.file_kinds import clocks_differ, guess_file_kinds
-from soilml.log_import.guesses.stated_constants import number_in_names, stated_constants
+from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
+from soilml.log_import.guesses.stated_constants import agreed_constants
 from soilml.log_import.guesses.toml_value import toml_value
 from soilml.log_import.guesses.windows_guess import guess_windows
 from soilml.log_import.mapping.channel import ROLES
@@ -38,6 +40,8 @@ from soilml.log_import.recording import Recording
 
 #: Most columns that are listed, and runs that are looked at.
 _MOST_LISTED, _LOOKED = 40, 8
+#: Words of columns of plate and shear tests.
+_OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 
 
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
@@ -65,9 +69,12 @@ class _MapText:
         self.run_column, self.run_count = guess_run_column(logs[0])
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
         self.structs = structs_are_runs(logs[0], self.time_column)
+        self.pauses, self.longest = pauses(logs[0], self.time_column, self.time_unit)
+        if self.run_column or self.structs:
+            self.pauses, self.longest = 0, math.inf
         for log in logs:
             refuse_a_table_of_runs(log)
-        self.stated = stated_constants([line for recording in first for line in recording.about])
+        self.stated, self.heads = agreed_constants(logs)
         self.rate = 0.0
         if not self.time_column and all(recording.clock is None for recording in first):
             self.rate = float(self.stated.get("rate", ("100", ""))[0].split()[0])
@@ -90,6 +97,7 @@ class _MapText:
             self.run_column,
             self.restarts > 0 and not self.structs,
             self.structs > 0,
+            self.longest,
         )
 
     def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
@@ -119,12 +127,12 @@ class _MapText:
         }
         first = next(iter(drafts.values()))
         lines += self._wheel(first)
-        lines += self._load()
+        lines += load_lines(self.found, self.stated, self.heads, self.run_names)
         for role in ROLES:
             if role in self.found.shared:
                 lines += self._channel(f"[{role}]", role, first[role])
             elif role not in self.found.roles():
-                lines += self._absent(role)
+                lines += absent_lines(role, self.found, self.columns, self.run_names)
         of_wheels = self.found.wheels.items()
         alike = keys_alike([{role: drafts[name][role] for role in own} for name, own in of_wheels])
         for role, draft in alike.items():
@@ -150,9 +158,15 @@ class _MapText:
             "#",
             "# The columns, with the unit that the log states and the range of their values:",
         ]
-        lines += [f"#   {line}" for line in describe(self.columns[:_MOST_LISTED])]
-        if len(self.columns) > _MOST_LISTED:
-            lines.append(f"#   and {len(self.columns) - _MOST_LISTED} more")
+        listed = self.columns
+        if len(listed) > _MOST_LISTED:
+            listed = [c for c in listed if not c.about.constant]
+        lines += [f"#   {line}" for line in describe(listed[:_MOST_LISTED])]
+        words = {word for c in self.columns for word in words_of(c.address)}
+        if words & _OF_PLATES and not self.found.roles() & {"wheel_speed", "wheel_angle", "slip"}:
+            lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
+        if len(self.columns) > len(listed[:_MOST_LISTED]):
+            lines.append(f"#   and {len(self.columns) - len(listed[:_MOST_LISTED])} more")
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
         return lines + [f"# Note: {note}" for note in list(notes)[:5]]
 
@@ -187,6 +201,9 @@ class _MapText:
         if self.restarts:
             why = f"the time starts again {self.restarts} times"
             return ["", "[runs]", f"split_where_time_restarts = true  # {why}"]
+        if self.pauses:
+            why = f"the log pauses {self.pauses} times"
+            return ["", "[runs]", f'split_at_pauses_over = "{self.longest:g} s"  # {why}']
         return []
 
     def _wheel(self, drafts: dict[str, Draft]) -> list[str]:
@@ -213,34 +230,6 @@ class _MapText:
         word = "NEEDED" if needed else "for checks"
         return [*lines, f'# radius = "0.15 m +- 1 %"  # {word}{hint}']
 
-    def _load(self) -> list[str]:
-        if "load" in self.found.roles():
-            return []
-        if "load" in self.stated and "mass" not in self.stated:
-            value, line = self.stated["load"]
-            return ["", "[load]", f'value = "{value} +- 1 %"  # stated in the log: {line[:60]}']
-        in_name = number_in_names("load", self.run_names)
-        if in_name is not None:
-            pattern, unit, numbers = in_name
-            shown = ", ".join(f"{n:g}" for n in numbers[:4])
-            return [
-                "",
-                "[load]",
-                f"file_name = {toml_value(pattern)}  # the names say {shown}",
-                f"unit = {toml_value(unit)}",
-            ]
-        count = max(1, len(self.found.wheels))
-        mass = self.stated.get("mass", ("", ""))[0]
-        lines = ["", "# No column is a vertical load: it follows from the mass."]
-        if mass:
-            return [*lines, "[vehicle]", f'mass = "{mass} +- 1 %"', f"wheels = {count}"]
-        return [
-            *lines,
-            "# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'",
-            '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
-            f"# wheels = {count}",
-        ]
-
     def _table(self, header: str, role: str, draft: Draft) -> list[str]:
         lines = ["", header]
         for key, value in draft.keys.items():
@@ -258,36 +247,3 @@ class _MapText:
             if share:
                 lines.append(f'bias = "{share}"  # calibration error that all rows share')
         return lines
-
-    def _absent(self, role: str) -> list[str]:
-        others: list[Candidate] = self.found.others.get(role, [])
-        if role == "slip" and not ({"position", "ground_speed"} & self.found.roles()):
-            in_name = number_in_names("slip", self.run_names)
-            if in_name is not None:
-                return [
-                    "",
-                    "[slip]",
-                    f"file_name = {toml_value(in_name[0])}",
-                    f"unit = {toml_value(in_name[1])}",
-                ]
-        rotation = {"wheel_speed", "wheel_angle", "rim_speed", "slip"} & self.found.roles()
-        if role == "wheel_speed" and not rotation and not others:
-            commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
-            return [
-                "",
-                "# NEEDED: no column is the rotation of the wheel. One of these:",
-                "# [wheel_angle]",
-                "# [wheel_speed]",
-                *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
-            ]
-        if role == "ground_speed" and not ({"position", "slip"} & self.found.roles() or others):
-            return [
-                "",
-                "# NEEDED: no column is the travel. One of these:",
-                "# [ground_speed]",
-                '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
-            ]
-        if others:
-            column = toml_value(others[0].address)
-            return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {column}"]
-        return []

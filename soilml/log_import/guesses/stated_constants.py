@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension
 
 _VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ][:=,;\s]*"
@@ -12,7 +13,7 @@ _VALUE += r"([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
 _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
-    "radius": (r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r)", "m"),
+    "radius": (r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel)", "m"),
     "diameter": (r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser)", "m"),
     "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
     "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
@@ -60,6 +61,29 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
     if "diameter" in found and "radius" in found:
         del found["diameter"]
     return found
+
+
+def agreed_constants(
+    logs: Sequence[Sequence[Recording]],
+) -> tuple[dict[str, tuple[str, str]], dict[str, tuple[str, str, list[str]]]]:
+    """Constants that the logs state alike, and those that differ between them.
+
+    Of those that differ, a pattern for the number in the line, its unit, and the numbers.
+    """
+    each = [stated_constants([line for own in log for line in own.about]) for log in logs]
+    alike, differing = {}, {}
+    for name in dict.fromkeys(name for found in each for name in found):
+        values = list(dict.fromkeys(found[name][0] for found in each if name in found))
+        value, line = next(found[name] for found in each if name in found)
+        if len(values) == 1:
+            alike[name] = (value, line)
+            continue
+        number, _, unit = value.partition(" ")
+        start = max(line.find(number), line.find(number.replace(".", ",")))
+        if start > 0 and all(name in found for found in each):
+            pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
+            differing[name] = (pattern, unit, values)
+    return alike, differing
 
 
 def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:

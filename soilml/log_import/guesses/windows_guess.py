@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.draft import Draft
+from soilml.log_import.guesses.drafts.draft import Draft
 
 #: Shortest window for long runs, s, and its share of short ones.
 _USUAL, _SHARE = 2.0, 0.15

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from soilml.config.measurement_noise import Noise
 from soilml.config.share_and_constant import take_share_and_constant
@@ -29,6 +29,8 @@ ROLES: dict[str, tuple[str, str]] = {
 }
 #: Channels that an encoder before the gearbox, or a motor, may give.
 GEARED = ("wheel_speed", "wheel_angle", "torque", "motor_current")
+#: What a log may call slip: ours; the ratio of travel to rim speed; (r omega - v) / v.
+SLIP_DEFINITIONS = ("1 - v/(r omega)", "v/(r omega)", "(r omega - v)/v")
 _EXACT, _NOTHING = Uncertain(1.0), Uncertain(0.0)
 _NEEDED = "a number, '2 %' of the reading, or '2 % + 0.05'"
 
@@ -52,12 +54,15 @@ class Channel:
         Errors that all rows share, and errors of each row beside its scatter.
     value
         A constant; None where it is measured.
-    name_pattern
-        Regular expression whose group 1 is the number in the name of the file or run.
+    name_pattern, head_pattern
+        Regular expression whose group 1 is the number in the name of the file or run; in a line
+        before the header of the file.
     gear_ratio, efficiency, torque_constant, idle_current
         What stands between motor and wheel; the ratio is turns of the motor for one of the wheel.
     unwrap
         Range of an angle or counter that starts again at 0, in the log's unit; 0 where it does not.
+    definition
+        What a slip that the log has is: one of `SLIP_DEFINITIONS`.
     """
 
     role: str
@@ -74,6 +79,8 @@ class Channel:
     torque_constant: Uncertain = _EXACT
     idle_current: Uncertain = _NOTHING
     unwrap: float = 0.0
+    definition: str = SLIP_DEFINITIONS[0]
+    head_pattern: re.Pattern[str] | None = None
 
     @property
     def where(self) -> str:
@@ -86,18 +93,24 @@ def take_channel(settings: Settings, role: str) -> Channel:
     ours = ROLES[role][0]
     where = settings.where
     columns = _columns(settings, role)
-    pattern = _pattern(settings, columns)
+    pattern = _pattern(settings, "file_name", columns)
+    head_pattern = _pattern(settings, "head", columns)
     value = None
-    if not columns and pattern is None:
+    if not columns and pattern is None and head_pattern is None:
         if "value" not in settings:
             settings.fail(
-                "needed is column = 'NAME', value = a constant, or file_name = a pattern such as "
-                "'load_(\\d+)N'"
+                "needed is column = 'NAME', value = a constant, file_name = a pattern such as "
+                "'load_(\\d+)N', or head = one for a line before the header"
             )
         value = take_uncertain(settings, "value", ours)
     unit = settings.text("unit", "")
-    scale = 1.0
-    if "counts_per_turn" in settings:
+    scale, gain = 1.0, 0.0
+    if "scale" in settings:
+        one = take_uncertain(settings, "scale", ours)
+        scale, gain = one.value, one.relative
+        if scale == 0.0 or "counts_per_turn" in settings:
+            settings.fail("needed is a scale other than 0, and no counts_per_turn beside it")
+    elif "counts_per_turn" in settings:
         turn = take_uncertain(settings, "counts_per_turn", "1", lower=0.0).value
         if dimension(unit or "count") not in ("count", "count/s"):
             settings.fail(f"counts_per_turn is given, and unit is {unit!r}; needed is 'count'")
@@ -119,17 +132,20 @@ def take_channel(settings: Settings, role: str) -> Channel:
         own["torque_constant"] = take_uncertain(settings, "torque_constant", "N m/A", lower=0.0)
         own["idle_current"] = take_uncertain(settings, "idle_current", "A", _NOTHING)
     unwrap = settings.number("wraps_at", 0.0) if role == "wheel_angle" else 0.0
+    bias = _error(settings, "bias")
     channel = Channel(
         role,
         columns,
         scale,
         unit,
         _tare(settings),
-        _error(settings, "bias"),
+        replace(bias, share=math.hypot(bias.share, gain)),
         _error(settings, "noise"),
         value,
         pattern,
         unwrap=unwrap,
+        definition=_definition(settings, role),
+        head_pattern=head_pattern,
         **own,
     )
     settings.finish()
@@ -151,19 +167,31 @@ def _columns(settings: Settings, role: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _pattern(settings: Settings, columns: tuple[str, ...]) -> re.Pattern[str] | None:
-    if "file_name" not in settings:
-        settings.permit(["file_name"])
+def _definition(settings: Settings, role: str) -> str:
+    if role != "slip":
+        return SLIP_DEFINITIONS[0]
+    given = settings.text("definition", SLIP_DEFINITIONS[0])
+    for known in SLIP_DEFINITIONS:
+        if given.replace(" ", "") == known.replace(" ", ""):
+            return known
+    shown = ", ".join(repr(known) for known in SLIP_DEFINITIONS)
+    settings.fail(f"definition is {given!r}; needed is one of {shown}")
+    return ""
+
+
+def _pattern(settings: Settings, key: str, columns: tuple[str, ...]) -> re.Pattern[str] | None:
+    if key not in settings:
+        settings.permit([key])
         return None
-    text = settings.text("file_name")
+    text = settings.text(key)
     if columns:
-        settings.fail("has column and file_name; give one of them")
+        settings.fail(f"has column and {key}; give one of them")
     try:
         pattern = re.compile(text, re.IGNORECASE)
     except re.error as error:
-        settings.fail(f"file_name {text!r} is no regular expression: {error}")
+        settings.fail(f"{key} {text!r} is no regular expression: {error}")
     if pattern.groups != 1:
-        settings.fail(f"file_name is {text!r}; needed is one group in brackets, the number")
+        settings.fail(f"{key} is {text!r}; needed is one group in brackets, the number")
     return pattern
 
 

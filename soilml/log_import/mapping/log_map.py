@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -91,9 +92,15 @@ class LogMap:
     run_column: str = ""
     split_at_reset: bool = False
     each_struct: bool = False
+    split_at_pause: float = math.inf
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
+
+    @property
+    def splits_by_time(self) -> bool:
+        """Whether one file holds several runs, one after the other."""
+        return self.split_at_reset or math.isfinite(self.split_at_pause)
 
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
@@ -124,6 +131,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     run_column = runs.text("column", "")
     at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
     each_struct = bool(runs.take("each_struct", bool, "true or false", False))
+    pause = take_uncertain(runs, "split_at_pauses_over", "s", Uncertain(math.inf), 0.0).value
     runs.finish()
     vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
     shared_wheel = settings.table("wheel")
@@ -165,6 +173,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         run_column,
         at_reset,
         each_struct,
+        pause,
         vehicle,
         _take_windows(settings.table("windows")),
         tuple(_take_left_out(entry) for entry in settings.tables("leave_out")),

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from soilml.errors import InputError
+from soilml.errors import InputError, MissingLibraryError
 from soilml.log_import.readers.message_fields import TopicColumns
+from soilml.log_import.readers.protobuf_messages import protobuf_fields
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 
@@ -27,7 +28,7 @@ def read_bag(path: Path) -> list[Recording]:
     try:
         for topic, seconds, message in messages(path, notes):
             topics.setdefault(topic, TopicColumns()).add(seconds, message)
-    except InputError:
+    except (InputError, MissingLibraryError):
         raise
     except Exception as error:  # the libraries raise many kinds for damaged files
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -71,7 +72,9 @@ def _mcap_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, A
                 decoders[channel.id] = _decoder(schema, channel.message_encoding)
                 if decoders[channel.id] is None:
                     kind = channel.message_encoding or "unknown"
-                    notes.append(f"{channel.topic}: encoding {kind} is not read (json, cdr, ros1)")
+                    notes.append(
+                        f"{channel.topic}: encoding {kind} is not read (json, protobuf, cdr, ros1)"
+                    )
             decode = decoders[channel.id]
             if decode is not None:
                 yield channel.topic, 1e-9 * message.log_time, decode(message.data)
@@ -80,6 +83,12 @@ def _mcap_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, A
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:
     if encoding == "json":
         return json.loads
+    if encoding == "protobuf" and schema is not None:
+        need("mcap_protobuf", "import", "logs")
+        from mcap_protobuf.decoder import DecoderFactory
+
+        parse_message = DecoderFactory().decoder_for(encoding, schema)
+        return None if parse_message is None else lambda data: protobuf_fields(parse_message(data))
     if schema is None or encoding not in ("cdr", "ros1"):
         return None
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore

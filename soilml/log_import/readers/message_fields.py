@@ -41,12 +41,17 @@ class TopicColumns:
                 cells.append(math.nan)
 
     def columns(self) -> dict[str, Floats]:
-        """The columns as arrays; those without a number are left out."""
-        arrays = {name: np.asarray(cells) for name, cells in self._cells.items()}
+        """The columns as arrays in order of time; those without a number are left out."""
+        order = np.argsort(self._unordered_times(), kind="stable")
+        arrays = {name: np.asarray(cells)[order] for name, cells in self._cells.items()}
         return {name: values for name, values in arrays.items() if np.isfinite(values).any()}
 
     def times(self) -> Floats:
-        """Time of the samples, s: the stamps in the messages where they are set, else the bag's.
+        """Time of the samples in order, s; messages may be received out of order."""
+        return np.sort(self._unordered_times())
+
+    def _unordered_times(self) -> Floats:
+        """Time of the messages as received, s: their stamps where they are set, else the bag's.
 
         The time of receipt jitters; the stamp is when the sensor was read.
         """

@@ -29,6 +29,8 @@ _SPELLINGS = {
     "counts": "count", "count": "count", "cts": "count", "cnt": "count", "ticks": "count",
     "tick": "count", "inc": "count", "incs": "count", "pulses": "count", "pulse": "count",
     "qc": "count", "steps": "count", "counts/s": "count/s", "cps": "count/s", "ticks/s": "count/s",
+    "inkr": "count", "inkremente": "count", "increments": "count", "impulse": "count",
+    "imp": "count", "digits": "count", "digit": "count", "lsb": "count",
     "inc/s": "count/s", "qc/s": "count/s",
     "amps": "A", "amp": "A", "ampere": "A", "volts": "V", "volt": "V", "newton": "N",
     "newtons": "N", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "c": "degC",

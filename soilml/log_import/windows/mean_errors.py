@@ -8,6 +8,10 @@ from soilml.log_import.recording import Floats
 
 #: Samples are first averaged to at most this many, which lowers the noise in their correlations.
 _MOST_VALUES = 256
+#: Correlation below which samples count as having a ripple.
+_RIPPLE = -0.3
+#: Cosines that measure slow noise: few enough to lie below the frequency of grousers.
+_COSINES = 6
 #: Fewest independent samples, and degrees of freedom, that an error counts with.
 _FEWEST, _LEAST_FREEDOM = 4.0, 4.0
 
@@ -17,8 +21,10 @@ def autocorrelation_time(values: Floats) -> float:
     return time_and_window(values)[0]
 
 
-def time_and_window(values: Floats) -> tuple[float, int]:
+def time_and_window(values: Floats) -> tuple[float, int, float]:
     r"""Integrated autocorrelation time of samples (n,), in samples, and the last lag M of its sum.
+
+    The third number is the lowest correlation: well below zero where the samples have a ripple.
 
     .. math:: \tau = 1 + 2 \sum_{k=1}^{M} \rho_k
 
@@ -33,7 +39,7 @@ def time_and_window(values: Floats) -> tuple[float, int]:
     variance = float(np.mean(centred**2))
     # below rounding, a constant has no autocorrelation
     if n < 4 or variance <= 1e-24 * max(1e-300, float(np.mean(values**2))):
-        return 1.0, 0
+        return 1.0, 0, 0.0
     size = 1 << (2 * n - 1).bit_length()
     spectrum = np.fft.rfft(centred, size)
     rho = np.fft.irfft(spectrum * np.conj(spectrum), size)[: n // 2 * 2] / (n * variance)
@@ -42,7 +48,8 @@ def time_and_window(values: Floats) -> tuple[float, int]:
     count = max(1, int(below[0])) if below.size else pairs.size
     tau = 2.0 * float(np.minimum.accumulate(pairs[:count]).sum()) - 1.0
     last = 2 * count - 1
-    return float(np.clip(tau * (1.0 + (2.0 * last + 1.0) / n), 1.0, n / 2.0)), last
+    time = float(np.clip(tau * (1.0 + (2.0 * last + 1.0) / n), 1.0, n / 2.0))
+    return time, last, float(rho.min())
 
 
 def mean_error(values: Floats, step: float) -> tuple[float, float, float]:
@@ -55,6 +62,9 @@ def mean_error(values: Floats, step: float) -> tuple[float, float, float]:
     methods in statistical mechanics", 1997, equation 3.19), that of a chi-squared variable with
     :math:`\nu` degrees of freedom over :math:`\nu`: the last factor makes the error the standard
     deviation of the t distribution that follows. NaN are left out.
+
+    Where a ripple hides slow noise, the correlations turn negative and the sum ends too early. The
+    error is then at least that of `slow_error`.
     """
     own = values[np.isfinite(values)]
     if own.size == 0:
@@ -63,12 +73,31 @@ def mean_error(values: Floats, step: float) -> tuple[float, float, float]:
         return float(own.mean()), float("nan"), step
     total, width = own.size, -(-own.size // _MOST_VALUES)
     own = own[: total // width * width].reshape(-1, width).mean(axis=1)
-    tau, last = time_and_window(own)
+    tau, last, lowest = time_and_window(own)
     independent = max(own.size / tau, _FEWEST)
     freedom = max(own.size / (2.0 * last + 1.0), _LEAST_FREEDOM)
     variance = float(np.var(own)) / independent / (1.0 - 1.0 / independent)
+    error = float(np.sqrt(variance * freedom / (freedom - 2.0)))
     return (
         float(own.mean()),
-        float(np.sqrt(variance * freedom / (freedom - 2.0))),
+        max(error, slow_error(own)) if lowest < _RIPPLE else error,
         tau * width * step,
     )
+
+
+def slow_error(values: Floats) -> float:
+    r"""Standard error of the mean of samples (n,) by their slowest variations; 0 for few samples.
+
+    .. math:: \sigma^2 = \frac{1}{n} \frac{1}{B} \sum_{j=1}^{B} \Lambda_j^2 \frac{B}{B - 2}, \quad
+        \Lambda_j = \sqrt{2 / n} \sum_{t=1}^{n} \cos(\pi j (t - 1/2) / n) \, y_t
+
+    The spectral density at frequency zero from B cosines, with B degrees of freedom: Lazarus and
+    others, "HAR inference", J. Bus. Econ. Stat. 36 (2018), section 2. A ripple of more than B / 2
+    periods does not enter.
+    """
+    n = values.size
+    if n < 2 * _COSINES:
+        return 0.0
+    phase = np.pi * (np.arange(n) + 0.5) / n
+    weights = np.sqrt(2.0 / n) * np.cos(np.arange(1, _COSINES + 1)[:, None] * phase)
+    return float(np.sqrt(np.sum((weights @ values) ** 2) / (n * (_COSINES - 2.0))))

@@ -77,7 +77,7 @@ def _slope_error(time: Floats, difference: Floats, interval: float) -> float:
     rates, length = _rates(residual, span, fine)
     size, neighbours = _two_correlations(rates)
     if neighbours > _NOISY * size:
-        tau, last = time_and_window(rates)
+        tau, last, _ = time_and_window(rates)
         freedom = max(rates.size / (2.0 * last + 1.0), 4.0)
         wander = size * length * tau / (1.0 - min(tau / rates.size, 0.5))
         return float(np.sqrt(1.2 * wander / span * freedom / (freedom - 2.0)))

@@ -13,7 +13,7 @@ from soilml.cli.table_remarks import table_remarks
 from soilml.cli.usual_errors.usual_fit import usual_fit
 from soilml.config.case import Case, read_case
 from soilml.config.write_case import case_as_toml
-from soilml.errors import InputError, SoilmlError
+from soilml.errors import SoilmlError
 from soilml.experiment_design import Advice
 from soilml.experiment_design.messages import abstention_message, next_row_messages, row_message
 from soilml.identification import Fit, identify
@@ -23,7 +23,7 @@ from soilml.io.table import Table
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.serve.answers.dropped_file import table_summary
 from soilml.serve.answers.job_output import Tell, setting_file, write_files
-from soilml.serve.answers.pull_curves import pull_curves
+from soilml.serve.answers.pull_curves import pull_curves, pull_of_gears
 from soilml.traction.report import pull_report
 from soilml.traction.rover.report import rover_report
 
@@ -51,9 +51,11 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     tell("looking for the next measurement")
     advice = advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
-    pull = _pull(case, table)
+    pull = _pull(case, table, as_usual=usual is not None)
+    pull["as_usual"] = usual is not None
     pull["warnings"] = [w for w in pull.get("warnings", []) if w not in fit.warnings]
-    found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
+    best = fit if usual is None else usual.usual
+    found = case.with_values(dict(zip(best.names, map(float, best.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
     texts = {
         "identify.json": json_text(
@@ -126,6 +128,7 @@ def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
         "usual_band": [factor * float(end[i]) for end in usual.interval],
         "usual_identified": not left > NOT_IDENTIFIED_ABOVE,
         "usual_left": left,
+        "usual_weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
         "usual_si": float(usual.values[i]),
     }
 
@@ -138,13 +141,13 @@ def words(fit: Fit, advice: Advice | None) -> list[str]:
     return [abstention_message(name, part) for name, part in left if part > NOT_IDENTIFIED_ABOVE]
 
 
-def _pull(case: Case, table: Table) -> dict[str, Any]:
+def _pull(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
     """Drawbar pull and slope, of the rover in words; the reason where there is none."""
     try:
         if case.rover is not None:
-            return {"text": rover_text(case.rover, rover_report(case, table))}
+            return {"text": rover_text(case.rover, rover_report(case, table, as_usual=as_usual))}
         if case.gears:
-            raise InputError("MODEL.toml has several gears: `soilml pull --gear NAME` takes one")
-        return pull_curves(pull_report(case, table))
+            return pull_of_gears(case, table, as_usual)
+        return pull_curves(pull_report(case, table, as_usual=as_usual))
     except SoilmlError as error:
         return {"reason": " ".join(str(error).split())}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from soilml.cli.execution.gap import gap_files
 from soilml.config.case import read_case
+from soilml.config.sensor_bias import checked_sensors
 from soilml.gap import STATUSES, gap
 from soilml.gap.html.discrepancy_map import discrepancy_maps
 from soilml.gap.html.verdict_section import advice, effect_descriptions, suspect_table
@@ -24,11 +26,14 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     Raises `SoilmlError` as `soilml gap` does.
     """
     model = setting_file("MODEL.toml", request.get("model"))
-    case = read_case(model)
+    case = read_case(model, with_bias=True)
+    checked, case = checked_sensors(case.bias), replace(case, bias={})
     table = read_rows(request)
     stage = f"analysing {len(table)} rows"
     tell(stage, 0.0)
-    report = gap(case, table, progress=lambda share: tell(stage, min(share, 1.0)))
+    report = gap(
+        case, table, calibration=checked, progress=lambda share: tell(stage, min(share, 1.0))
+    )
     tell("drawing the report")
     texts = gap_files(report, model.name, table.source)
     return verdict(report) | {"rows": len(table), "files": write_files(texts)}

@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.io.table import Table
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.traction.by_load import LoadPrediction
-from soilml.traction.report import PullReport
+from soilml.traction.report import PullReport, pull_report
 
 
 def pull_curves(report: PullReport) -> dict[str, Any]:
@@ -20,6 +23,25 @@ def pull_curves(report: PullReport) -> dict[str, Any]:
         "measured": {"slip": slip.tolist(), "load": load.tolist(), "pull": pull.tolist()},
         "warnings": list(report.warnings),
     }
+
+
+def pull_of_gears(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
+    """The curves of each gear that was driven, on the soil that its own rows show.
+
+    Raises `InputError` where rows do not name their gear.
+    """
+    if "gear" not in table:
+        raise InputError("MODEL.toml has several gears, and the table no column gear")
+    loads, warnings = [], ["the soil below each wheel is that of its own rows"]
+    for name in case.gears:
+        rows = table.rows(table["gear"] == name)
+        if len(rows):
+            own = pull_curves(pull_report(case.of_gear(name), rows, as_usual=as_usual))
+            loads += [one | {"gear": name, "measured": own["measured"]} for one in own["loads"]]
+            warnings += own["warnings"]
+    if not loads:
+        raise InputError(f"no row has a gear of MODEL.toml: {', '.join(case.gears)}")
+    return {"loads": loads, "warnings": list(dict.fromkeys(warnings))}
 
 
 def _curves(one: LoadPrediction) -> dict[str, Any]:

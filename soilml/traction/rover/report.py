@@ -71,6 +71,7 @@ def rover_report(
     slopes: Floats | None = None,
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
+    as_usual: bool = False,
 ) -> RoverReport:
     """Performance of the case's rover on the soil that the rows were measured on.
 
@@ -90,6 +91,9 @@ def rover_report(
         Highest slip; by default the highest measured one, at least 0.6.
     estimator
         Trained estimator whose estimate replaces the posterior.
+    as_usual
+        Whether sensors and model have the errors that they usually have, as in `identify`; not
+        with an estimator.
 
     Raises
     ------
@@ -104,7 +108,7 @@ def rover_report(
         tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
         slopes = SLOPES[tipping >= SLOPES]
     table = with_rover_columns(case, table)
-    soil = measured_soil(case, table, free, estimator)
+    soil = measured_soil(case, table, free, estimator, as_usual)
     table = table.rows(table.answered)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
     slip = slip_grid(slip_limit, measured)

@@ -89,3 +89,12 @@ def test_a_truncated_parquet_file_is_refused(tmp_path, small_data):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(TableError, match="no such file"):
         read_table(tmp_path / "none.csv")
+
+
+def test_a_table_with_names_of_another_laboratory_is_told_all_at_once(tmp_path):
+    (tmp_path / "bin.csv").write_text("Test No,Slip (%),Load (N),Torque (Nm)\n1,5,50,1.5\n")
+    with pytest.raises(TableError, match=r"none of its columns is known: 'Test No', .*torque_Nm'"):
+        read_table(tmp_path / "bin.csv")
+    (tmp_path / "box.csv").write_text("test,normal_kPa\na,4\n")
+    with pytest.raises(TableError, match="normal_stress_Pa"):
+        read_table(tmp_path / "box.csv")

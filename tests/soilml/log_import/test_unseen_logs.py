@@ -7,8 +7,8 @@ from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.assignment import assign
-from soilml.log_import.guesses.candidates import candidates_of
+from soilml.log_import.guesses.columns.assignment import assign
+from soilml.log_import.guesses.columns.candidates import candidates_of
 from soilml.log_import.guesses.stated_constants import stated_constants
 from soilml.log_import.recording import Recording
 

@@ -63,6 +63,18 @@ def test_standard_errors_of_means_are_calibrated(memory, noise, seconds):
     assert 0.8 < np.std(scores) < 1.15
 
 
+def test_a_ripple_does_not_hide_slow_noise():
+    """Noise with a memory of 1 s under a ripple of 1 Hz, whose correlations end the sum early."""
+    rng, scores, time = np.random.default_rng(17), [], np.arange(0.0, 20.0, 0.02)
+    for _ in range(300):
+        values = wandering(rng, time.size, 0.02, 1.0, 1.0)
+        values += 1.3 * np.sin(2 * np.pi * (time + rng.random()))
+        mean, error, _ = mean_error(values, 0.02)
+        scores.append(mean / error)
+    assert np.mean(np.abs(scores) < 1.645) > 0.84
+    assert np.std(scores) < 1.15
+
+
 def test_the_autocorrelation_time_is_that_of_the_process():
     values = wandering(np.random.default_rng(8), 20000, 1.0, 1.0, 10.0)
     assert autocorrelation_time(values) == pytest.approx(20.0, rel=0.2)

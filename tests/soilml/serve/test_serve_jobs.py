@@ -133,7 +133,7 @@ def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp
     (tmp_path / "model.toml").write_bytes(text)
     case = read_case(tmp_path / "model.toml")
     for found in job["result"]["parameters"]:
-        assert getattr(case.soil, found["path"]) == pytest.approx(found["si"])
+        assert getattr(case.soil, found["path"]) == pytest.approx(found["usual_si"])
 
 
 @pytest.mark.parametrize(
@@ -151,3 +151,28 @@ def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp
 def test_a_wrong_job_is_refused_in_one_line(page, request_, said):
     wrong, status = page.ask("/api/jobs", request_)
     assert status in (400, 422) and said in wrong["error"]
+
+
+def test_the_pull_is_that_of_usual_errors_and_of_each_wheel(page):
+    """Wider than as if the model file were right; with several wheels, a curve for each of them."""
+    lines = runs_text(6).decode().replace("\r", "").splitlines()
+    light = [line for line in lines[1:] if not line.startswith("heavy")]
+    content = lines[0] + ",gear\n" + "".join(f"{line},{gear}\n" for gear in "ab" for line in light)
+    wheel = 'type = "wheel"\nradius = 0.15\nwidth = 0.12\n'
+    soil_of = '[soil]\nname = "wong1989/dry_sand"\n[soil.prior]\nfriction_angle = [0.4, 0.8]\n'
+    text = f'[gears.a]\n{wheel}[gears.b]\n{wheel}{soil_of}[noise]\ntorque_Nm = "2 %"\n'
+    results = {}
+    for name, model in (("usual", text), ("stated", text + '[discrepancy]\ntorque_Nm = "1 %"\n')):
+        job = page.job(
+            kind="estimate", files=[page.put("R.csv", content.encode())], model={"model": model}
+        )
+        assert job["state"] == "done", job["error"]
+        results[name] = job["result"]
+    usual, stated = results["usual"], results["stated"]
+    assert usual["pull"]["as_usual"] and not stated["pull"]["as_usual"]
+    assert [one["gear"] for one in usual["pull"]["loads"]] == ["a", "b"]
+    (parameter,) = usual["parameters"]
+    low, high = parameter["usual_band"]
+    assert high - low > parameter["band"][1] - parameter["band"][0]
+    widths = [r["pull"]["loads"][0]["largest_pull"] for r in (usual, stated)]
+    assert widths[0][2] - widths[0][0] > widths[1][2] - widths[1][0]

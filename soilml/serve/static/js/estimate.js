@@ -62,10 +62,10 @@ async function estimate() {
 }
 
 function show({ id, result }) {
-  const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.si]));
+  const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.usual_si ?? p.si]));
   const place = byId("estimate-result");
   place.replaceChildren(
-    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue, the first answer: what the log leaves, 90 % of it, if the model file is right. Brown, the second: the same with the errors that sensors and models usually have.`),
+    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue, the first answer: what the log leaves, 90 % of it, if the model file is right. Brown, the second: the same with the errors that sensors and models usually have; the large figures and the pull below are from it, where there is one.`),
     ...(result.believe ? [element("p", { class: "next" }, `${result.believe[0].toUpperCase()}${result.believe.slice(1)}.`)] : []),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
     ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
@@ -84,7 +84,8 @@ function show({ id, result }) {
 
 /** One parameter: value, band, what it leaves of the prior, and a picture of both. */
 function band(parameter) {
-  const { label, symbol, unit, value, band: [low, high], left, identified, weak } = parameter;
+  const { label, symbol, unit } = parameter;
+  const { value, band: [low, high], left, identified, weak } = deserved(parameter);
   const told = !identified
     ? `not identified: ${percent(left)} of the prior's width remains`
     : `${weak ? "weakly identified" : "identified"}: ${percent(left)} of the prior's width remains`;
@@ -93,14 +94,21 @@ function band(parameter) {
       element("span", { class: "value" }, identified ? `${withUnit(value, unit)} ` : "not known ",
         element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))),
     picture(parameter),
-    element("p", { class: `told ${identified ? "yes" : "no"}` }, told), usualWords(parameter));
+    element("p", { class: `told ${identified ? "yes" : "no"}` }, told), firstWords(parameter));
 }
 
-/** The second answer, with the errors that sensors and models usually have. */
-function usualWords({ usual, usual_band: ends, usual_identified: known, usual_left: left, unit }) {
-  if (!ends) return null;
-  const value = known ? `${withUnit(usual, unit)} (90 %: ${range(...ends, unit)})` : `not known (90 %: ${range(...ends, unit)})`;
-  return element("p", { class: "told usual" }, `with usual errors: ${value}, ${percent(left)} of the prior's width remains`);
+/** The answer to act on: the second one, with the errors that sensors and models usually have. */
+function deserved(parameter) {
+  if (!parameter.usual_band) return parameter;
+  return { value: parameter.usual, band: parameter.usual_band, left: parameter.usual_left,
+    identified: parameter.usual_identified, weak: parameter.usual_weak };
+}
+
+/** The first answer, where the second one is the large figure. */
+function firstWords({ usual_band: usual, value, band: ends, identified: known, left, unit }) {
+  if (!usual) return null;
+  const shown = known ? `${withUnit(value, unit)} (90 %: ${range(...ends, unit)})` : `not known (90 %: ${range(...ends, unit)})`;
+  return element("p", { class: "told first" }, `if the model file is right: ${shown}, ${percent(left)} of the prior's width remains`);
 }
 
 const SYMBOLS = { phi: "φ", k_phi: "kφ", k_c: "kc", a_0: "a₀", a_1: "a₁", gamma: "γ" };

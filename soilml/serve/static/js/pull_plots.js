@@ -10,9 +10,10 @@ export function pullPlots(place, pull) {
   if (pull.text) return place.replaceChildren(element("pre", { tabindex: "0" }, pull.text));
   const view = element("div");
   const choose = element("select", { id: "pull-load", onchange: () => draw(view, pull, Number(choose.value)) },
-    ...pull.loads.map((one, i) => element("option", { value: String(i) }, `${number(one.load)} N`)));
+    ...pull.loads.map((one, i) => element("option", { value: String(i) }, `${one.gear ? `${one.gear}, ` : ""}${number(one.load)} N`)));
   place.replaceChildren(
-    element("div", { class: "buttons" }, element("label", { for: "pull-load" }, "Load"), choose),
+    element("div", { class: "buttons" }, element("label", { for: "pull-load" }, pull.loads[0].gear ? "Wheel and load" : "Load"), choose),
+    ...(pull.as_usual ? [element("p", { class: "soft" }, "With the errors that sensors and models usually have.")] : []),
     view, ...[wordList(pull.warnings, "soft")].filter(Boolean));
   return draw(view, pull, 0);
 }
@@ -33,7 +34,7 @@ function draw(view, pull, index) {
     element("div", { class: "pair" }, left.whole, right.whole),
     element("p", { class: "key", "aria-hidden": "true" }, element("span", { class: "k-posterior" }, "after the log, 90 % band"),
       element("span", { class: "k-prior" }, "before the log, 90 % band"), element("span", { class: "k-measured" }, "measured")));
-  const { slip, load, pull: values } = pull.measured;
+  const { slip, load, pull: values } = one.measured ?? pull.measured;
   const points = slip.map((s, i) => [s, load[i], values[i]]).filter(([, l]) => Math.abs(l / one.load - 1) < 0.1);
   curves(left, "N", one.slip, one.pull, one.prior_pull, points, `Drawbar pull against slip under ${number(one.load)} N`);
   curves(right, "°", one.slip, one.slope, one.prior_slope, [], `Slope against slip under ${number(one.load)} N`);

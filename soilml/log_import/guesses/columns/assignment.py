@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from soilml.log_import.guesses.axes import axes_of
-from soilml.log_import.guesses.candidates import Candidate
-from soilml.log_import.guesses.column_words import WHEEL_WORDS, wheel_word, words_of
+from soilml.log_import.guesses.columns.axes import axes_of
+from soilml.log_import.guesses.columns.candidates import Candidate
+from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, wheel_word, words_of
 
 #: Roles of which one suffices, the better one first where both fit as well.
 _RIVALS = (
@@ -15,14 +15,21 @@ _RIVALS = (
     ("ground_speed", "position"),
     ("torque", "motor_current"),
 )
+#: What a measured torque is worth over a current, whose constants a log does not tell.
+_MEASURED = 3.0
 #: Roles that each wheel has of its own.
 _PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_current", "load",
               "drawbar_pull", "sinkage", "slip")  # fmt: skip
 #: Lowest score of a guess.
 _LEAST = 2.0
-_SIDES = {"fl": ("front", "left"), "lf": ("front", "left"), "fr": ("front", "right"),
-          "rf": ("front", "right"), "rl": ("rear", "left"), "bl": ("rear", "left"),
-          "rr": ("rear", "right"), "br": ("rear", "right")}  # fmt: skip
+_AXLES = {"f": "front", "r": "rear", "b": "rear", "m": "middle", "c": "middle"}
+#: Two letters in either order: fl, lf -> front, left.
+_SIDES = {
+    pair: (axle, side)
+    for letter, axle in _AXLES.items()
+    for short, side in (("l", "left"), ("r", "right"))
+    for pair in (letter + short, short + letter)
+}
 
 
 @dataclass
@@ -64,8 +71,8 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
             found.others.setdefault(role, []).append(candidate)
     for rivals in _RIVALS:
         present = [role for role in rivals if role in found.shared]
-        best = max(present, key=lambda r: found.shared[r].scores[r] - 0.1 * rivals.index(r),
-                   default="")  # fmt: skip
+        best = max(present, key=lambda r: found.shared[r].scores[r] - 0.1 * rivals.index(r) +
+                   (_MEASURED if r == "torque" else 0.0), default="")  # fmt: skip
         for role in present:
             if role != best:
                 found.others.setdefault(role, []).insert(0, found.shared.pop(role))

@@ -29,7 +29,7 @@ class Behaviour:
     wraps_at
         Range of an angle or a counter that starts again; 0 where it does not.
     travel
-        Net change, a share of the sum of all changes: 1 for a monotone column.
+        Net change, a share of the sum of all changes: 1 for a monotone column, 0 for a single step.
     """
 
     count: int
@@ -57,7 +57,9 @@ def behaviour(values: Floats) -> Behaviour:
     moved = steps[steps != 0.0]
     # noise from sample to sample is no way
     places = own[:: max(1, own.size // 60)]
-    total = float(np.abs(np.diff(places)).sum())
+    changes = np.abs(np.diff(places))
+    total = float(changes.sum())
+    is_step = total > 0.0 and float(changes.max()) > 0.5 * total
     return Behaviour(
         own.size,
         low,
@@ -66,7 +68,7 @@ def behaviour(values: Floats) -> Behaviour:
         float(np.mean(moved > 0.0)) if moved.size else 0.0,
         float(np.ptp(own)) == 0.0,
         _wrap(own, steps),
-        abs(float(places[-1] - places[0])) / total if total else 0.0,
+        abs(float(places[-1] - places[0])) / total if total and not is_step else 0.0,
     )
 
 
@@ -79,6 +81,8 @@ def _wrap(own: Floats, steps: Floats) -> float:
     others = np.abs(np.delete(steps, jumps))
     if others.size == 0 or float(np.percentile(others, 99)) > 0.25 * span:
         return 0.0
+    if abs(float(np.delete(steps, jumps).sum())) < 0.3 * span:
+        return 0.0  # a force that comes and goes: nothing moves between the jumps
     for period in _PERIODS:
         if 0.93 * period < span <= 1.02 * period:
             return float(period)

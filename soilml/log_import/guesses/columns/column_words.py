@@ -16,6 +16,8 @@ WHEEL_WORDS = (
     *"12345678",
 )
 _PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
+#: Words of topics and columns that say nothing of the quantity.
+_FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw")
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -42,7 +44,10 @@ def name_scores(name: str) -> dict[str, float]:
     """How well a name fits each role; roles that it does not fit are left out."""
     words = words_of(name)
     # "velocity front left wheel" is a velocity of a wheel: words of the place stand between
-    texts = {" ".join(words), " ".join(word for word in words if word not in _PLACES)}
+    texts = {
+        " ".join(word for word in words if word not in left_out)
+        for left_out in ((), _PLACES, _FILLERS, (*_PLACES, *_FILLERS))
+    }
     scores = {}
     for role, patterns in _patterns().items():
         fits = [w for w, pattern in patterns if any(pattern.search(text) for text in texts)]

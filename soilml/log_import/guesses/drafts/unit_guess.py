@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from soilml.log_import.guesses.candidates import Candidate
-from soilml.log_import.guesses.column_words import words_of
+from soilml.log_import.guesses.columns.candidates import Candidate
+from soilml.log_import.guesses.columns.column_words import words_of
 
 #: Radius of the wheels of rovers and rigs, m: the usual one, and its range.
 _USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
-from soilml.log_import.guesses.column_words import name_scores, words_of
+from soilml.log_import.guesses.columns.behaviour import Behaviour, behaviour, looks_like_time
+from soilml.log_import.guesses.columns.column_words import name_scores, words_of
 from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension
@@ -17,9 +17,12 @@ from soilml.log_import.units.unit_names import unit_in_name
 _ALSO = {
     "wheel_angle": ("count",),
     "wheel_speed": ("count/s",),
+    "position": ("count",),
     "load": ("kg",),
-    "slope": (),
+    "drawbar_pull": ("kg",),
 }
+#: Score from which a name says the role whatever the topic is called.
+_CLEAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,13 @@ def _candidate(recording: Recording, name: str, ambiguous: bool) -> Candidate:
     topic = f"{recording.name} {name}" if recording.name else name
     scores = name_scores(topic)
     own_scores = name_scores(name)
-    for role, score in own_scores.items():
-        scores[role] = max(score, scores.get(role, score))
+    clear = max(own_scores.values(), default=0.0) >= _CLEAR
+    for role in {*scores, *own_scores}:
+        own_score, score = own_scores.get(role, 0.0), scores.get(role, 0.0)
+        if clear and not own_score:
+            scores[role] = score - _CLEAR  # fx of /force_torque is a force
+        elif own_score >= _CLEAR or role not in scores:
+            scores[role] = max(own_score, score)
     found = {
         role: total
         for role in (*ROLES, "time")

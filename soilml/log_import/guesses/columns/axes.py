@@ -5,8 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from soilml.log_import.guesses.candidates import Candidate
+from soilml.log_import.guesses.columns.candidates import Candidate
+from soilml.log_import.guesses.columns.column_words import words_of
 
+#: Words of a place in the world, whose y may be constant where a rover drives straight.
+_OF_A_ROVER = {"odom", "odometry", "vo", "pose", "gps", "marker", "tracking"}
 _X = re.compile(r"[xX]")
 
 
@@ -24,7 +27,7 @@ def axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candidat
             address = column.address[: match.start()] + own + column.address[match.end() :]
             if address in known and not known[address].about.constant:
                 others.append(known[address])
-            elif letter == "y":
+            elif letter == "y" and not (address in known and _OF_A_ROVER & {*words_of(address)}):
                 break
         if others:
             return [column, *others]

@@ -1,0 +1,1 @@
+"""Columns of a log: their words, how they behave, and which is taken for which role."""

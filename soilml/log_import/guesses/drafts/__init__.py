@@ -1,0 +1,1 @@
+"""Drafts of the tables of channels: unit, sign, tare, and what stands between."""

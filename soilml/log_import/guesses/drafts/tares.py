@@ -1,0 +1,74 @@
+"""Channels of a draft that read something where they should read zero."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from soilml.log_import.channels.inputs import Inputs, resting
+from soilml.log_import.guesses.drafts.draft import Draft
+from soilml.log_import.guesses.drafts.draft_inputs import moving
+
+#: Share of the reading while driving from which a reading at rest is an offset.
+_OFFSET = 0.01
+#: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.
+_FAR, _SUNK = 0.08, 0.01
+#: Roles that read zero while a wheel rests.
+ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
+
+
+def tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Tare what reads something before the wheel starts and should read zero there."""
+    driven = moving(inputs)
+    for role in ZERO_AT_REST:
+        if role not in drafts or role not in inputs.rest or role not in inputs.values:
+            continue
+        mean, error = inputs.rest[role]
+        level = abs(float(np.nanmedian(inputs.values[role][driven])) - mean)
+        if not abs(mean) > 3.0 * np.nan_to_num(error) or level == 0.0:
+            continue
+        if abs(mean) > _OFFSET * level and (role != "motor_current" or abs(mean) < level):
+            drafts[role].put(
+                "tare", "rest", f"it reads {mean:.3g} before the wheel starts; remove this line "
+                "where that is real"
+            )  # fmt: skip
+
+
+def far_sinkage(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Tare a sinkage that is the distance of a sensor to the ground, or a place on a scale."""
+    if "sinkage" not in drafts or "sinkage" not in inputs.values or "sinkage" not in inputs.rest:
+        return
+    rest = inputs.rest["sinkage"][0]
+    level = float(np.nanmedian(inputs.values["sinkage"][moving(inputs)]))
+    if not math.isfinite(rest) or abs(level) < _FAR:
+        return
+    draft = drafts["sinkage"]
+    if level < rest:
+        draft.put("reverse", True, "it falls as the wheel sinks in")
+    else:
+        draft.keys.pop("reverse", None)
+    why = "sinkage counts from where the wheel rests"
+    draft.put("tare", "rest", f"it reads {1e3 * abs(rest):.3g} mm there; {why}")
+    draft.put("bias", _SUNK, "CHANGE: m, by how much the wheel may have sunk in before it started")
+
+
+def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Tare a load where the log starts with the wheel above the ground and reads an offset."""
+    rest = resting(inputs)
+    if rest is None or "load" not in inputs.values or "load" not in drafts:
+        return
+    values, shortest = inputs.values["load"][rest], round(0.4 / inputs.step)
+    driving = float(np.nanmedian(inputs.values["load"][moving(inputs)]))
+    first = float(np.nanmedian(values[:shortest])) if values.size >= shortest > 0 else math.nan
+    if not _OFFSET * abs(driving) < abs(first) < 0.6 * abs(driving):
+        return
+    landed = np.abs(values - first) > 0.25 * abs(driving - first)
+    end = int(np.argmax(landed)) if landed.any() else values.size
+    if end < shortest:
+        return
+    start, stop = float(inputs.time[0]), float(inputs.time[0] + 0.8 * end * inputs.step)
+    drafts["load"].put(
+        "tare", [round(start, 2), round(stop, 2)], f"CHANGE: from, until, s; it reads {first:.3g} "
+        f"there and {driving:.3g} while driving: right if the wheel was above the ground"
+    )  # fmt: skip
