@@ -8,7 +8,7 @@ evaluation fixes the bytes of the file.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,6 +170,10 @@ class Value:
         axes = [] if axis is None else [self.indices([axis])]
         return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
 
+    def within(self, branch: Graph) -> Value:
+        """The value as a branch of its graph reads it."""
+        return Value(branch, self.name, self.dtype)
+
     def named(self, name: str) -> Value:
         """The value under the name of a graph output; only for the output of the last node."""
         self.graph.rename_last(self.name, name)
@@ -253,11 +257,34 @@ def where(condition: Value, x: Value, otherwise: Operand) -> Value:
     return Value(x.graph, x.graph.op("Where", *inputs), x.dtype)
 
 
+def shortcut(
+    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *values: Value
+) -> Value:
+    """The general function of float32 values, or where a condition (1,) is true, a quicker one.
+
+    Only one of both is run. Both must give the same where the condition is true.
+    """
+    ways = []
+    for way in (quick, general):
+        branch = condition.graph.branch()
+        ways.append((branch, way(*(value.within(branch) for value in values)).name))
+    return Value(condition.graph, condition.graph.shortcut(condition.name, *ways))
+
+
 def concat(values: Sequence[Value], axis: int) -> Value:
     """Values one after another along an axis."""
     first = values[0]
     name = first.graph.op("Concat", *[value.name for value in values], axis=axis)
     return Value(first.graph, name, first.dtype)
+
+
+def stack_rows(values: Sequence[Value]) -> Value:
+    """Values (n,) or (1, n) as the rows of a matrix; parts of a matrix become that matrix again."""
+    first = values[0]
+    whole = first.graph.whole_of([value.name for value in values], 0)
+    if whole is not None:
+        return Value(first.graph, whole, first.dtype)
+    return concat(values, axis=0).reshape(len(values), -1)
 
 
 def add_all(values: Sequence[Value]) -> Value:

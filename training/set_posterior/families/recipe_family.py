@@ -24,7 +24,7 @@ from soilml.onboard.set_contract import (
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
+from training.onnx_graph.value import Value, asinh, constant, log, maximum, sqrt, stack_rows
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.run_patterns import run_patterns
 from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
@@ -166,12 +166,11 @@ class RecipeFamily:
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
-        operating = concat([readings["slip"], readings["load"]], axis=0)
-        log_operating = log(maximum(operating, SMALLEST))
+        operating = stack_rows([readings["slip"], readings["load"]])
         length = constant(operating.graph, 1.0)
         torque, torque_slope = self._torque(readings, length)
         return ContextValues(
-            features=log_operating.reshape(2, -1).node("Transpose"),
+            features=log(maximum(operating, SMALLEST)),
             feature_slopes=np.eye(2),
             torque=torque,
             torque_slope=torque_slope,
