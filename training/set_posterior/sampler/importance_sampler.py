@@ -34,6 +34,7 @@ from training.set_posterior.sampler.polynomial_residuals import (
     NearlyKnown,
     PolynomialResiduals,
     gauss_newton,
+    within_box,
 )
 from training.set_posterior.sampler.proposals import (
     ProposalDraws,
@@ -201,10 +202,11 @@ def _prior_round(
 ) -> WeightedRound:
     """The round whose other coordinates are draws of the prior."""
     residual, slope = residuals.at_fixed_points(draws.others)
-    others = constant(residual.graph, draws.others[:-1])
+    ones = np.ones((1, len(draws.t)))
+    others = constant(residual.graph, np.concatenate([ones, draws.others[:-1]]))
     mode, precision = gauss_newton(constant(residual.graph, 0.0), residual, slope)
     for _ in range(PRIOR_STEPS - 1):
-        mode, precision = residuals.step(others, mode, len(draws.t))
+        mode, precision = residuals.step(concat([others, mode], axis=0), mode)
     return sample_round(residuals, family.axes, others, (mode, precision), draws)
 
 
@@ -222,9 +224,11 @@ def _adapted_round(
     `proposal` (1 + p, n) has 1, the unbounded coordinates, and the solved one by linear regression.
     """
     _, unbounded, mode = proposal.split([1, len(residuals.order) - 1, 1], axis=0)
-    others = tanh(unbounded)
-    log_jacobian = log(maximum(1.0 - others * others, 1.0 - LARGEST_TANH**2))
+    bounded = tanh(unbounded)
+    log_jacobian = log(maximum(1.0 - bounded * bounded, 1.0 - LARGEST_TANH**2))
+    ones = constant(bounded.graph, np.ones((1, len(draws.t))))
+    others = concat([ones, bounded], axis=0)
     for _ in range(ADAPTED_STEPS):
-        mode, precision = residuals.step(others, mode, len(draws.t))
+        mode, precision = residuals.step(concat([others, within_box(mode)], axis=0), mode)
     solved = (mode, precision)
     return unbounded, sample_round(residuals, family.axes, others, solved, draws, log_jacobian)

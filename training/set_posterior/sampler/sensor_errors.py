@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import OPERATING_STD_INPUTS, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import (
+    OPERATING_STD_INPUTS,
+    RESPONSE_CHANNELS,
+    SENSOR_ERROR_COLUMNS,
+)
 from training.onnx_graph.value import (
     Value,
     concat,
@@ -150,6 +154,18 @@ def integrate_out_errors(system: Value, terms: int, errors: int) -> Value:
         scaled = g / _kappa(gemm(g, g, one, transpose_a=True))
         system = gemm(scaled, gemm(g, a, transpose_a=True), a, alpha=-1.0)
     return system
+
+
+def integrate_out_sensor_errors(system: Value, terms: int) -> Value:
+    """The system (m, terms) with the errors in `SENSOR_ERROR_COLUMNS` integrated out.
+
+    Sets of torque alone have no offsets of sinkage and drawbar pull.
+    """
+    first, last = (SENSOR_ERROR_COLUMNS.index(f"{name}_bias") for name in RESPONSE_CHANNELS[1:])
+    others = len(SENSOR_ERROR_COLUMNS) - last - 1
+    system = integrate_out_errors(system, terms + last + 1, others)
+    system = integrate_out_if_any(system, terms + first, last + 1 - first)
+    return integrate_out_errors(system, terms, first)
 
 
 def integrate_out_if_any(system: Value, terms: int, errors: int) -> Value:
