@@ -180,6 +180,8 @@ class Value:
         return self._output(name)
 
     def _binary(self, kind: str, left: Operand, right: Operand) -> Value:
+        if kind in ("Mul", "Div") and isinstance(right, float) and right == 1.0:
+            return self
         first, second = self.operand(left), self.operand(right)
         return self._output(self.graph.op(kind, first.name, second.name))
 

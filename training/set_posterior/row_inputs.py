@@ -98,9 +98,10 @@ def complete_inputs(
     total = reduce(add, by_row)  # (rows,), also where some inputs have one element
     rows = total.node("Shape")
     if context:
-        of_set = reduce(add, [inputs[name] for name in context])
-        finite = absolute(of_set) <= LARGEST_CONTEXT
-        complete |= {name: where(finite, inputs[name], 1.0) for name in context}
+        values = concat([inputs[name] for name in context], axis=0)
+        of_set = values.sum(keepdims=True)  # (1,)
+        values = where(absolute(of_set) <= LARGEST_CONTEXT, values, 1.0)
+        complete |= zip(context, values.split(len(context), axis=0), strict=True)
         total = total + of_set
     finite = absolute(total) <= LARGEST_SUM
     stacked = concat([value.node("Expand", rows) for value in by_row], axis=0)

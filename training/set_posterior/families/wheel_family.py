@@ -40,9 +40,9 @@ class ContextValues:
     torque_by_load: float  # derivative of the torque scale by log load, with its sign changed
     usual_log_load: float  # from which changes with the logarithm of load are counted
     most_torque_noise: float  # readings with more noise on that scale are left out
-    length: Value  # unit of sinkage, and of torque over load, m
-    target_scale: Value  # (q, 1) factors of the values of the estimated axes
-    axis_std: Value  # (p, 1) standard deviation of nearly known coordinates, 1 for all others
+    length: Value | float  # unit of sinkage, and of torque over load, m
+    target_scale: Value | None  # (q, 1) factors of the values of the estimated axes; None: 1
+    axis_std: Value | None  # (p, 1) std of nearly known coordinates, 1 for others; None: no such
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,9 @@ class SimulatedSets:
         )
 
 
-def add_log_torque(readings: dict[str, Value], length: Value) -> tuple[Value, Value]:
+def add_log_torque(
+    readings: dict[str, Value], length: Value | float
+) -> tuple[Value, Value]:
     r"""Logarithm of torque over load and length (1, rows), and its derivative by torque.
 
     .. math:: y = \log \frac{T}{W r} + \min\left(\tfrac12 \left(\sigma / T\right)^2, 0.02\right),

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.onnx_graph.cholesky import cholesky_columns
 from training.onnx_graph.value import (
@@ -17,6 +18,7 @@ from training.onnx_graph.value import (
     log,
     maximum,
     minimum,
+    shortcut,
     softmax,
     sqrt,
     tanh,
@@ -42,6 +44,8 @@ from training.set_posterior.sampler.proposals import (
     prior_draws,
     sample_sizes,
 )
+
+Floats = NDArray[np.float64]
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.
@@ -128,18 +132,21 @@ def add_importance_sampler(
     bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
     unbounded = constant(graph, np.arctanh(bounded))
     rounds, count = [current], sizes.prior
-    one = constant(graph, np.ones(1))
-    variance = one
+    least = np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
+    variance = one = constant(graph, np.ones(1))
     samples = first_samples = _with_ones(unbounded, current, unknowns, count)
     for number in range(sizes.rounds):
-        moments = _moments(samples, rounds[-1].tempered_weights()[0])
+        moments = _moments(samples, rounds[-1].tempered_weights()[0], least)
         if number == sizes.rounds - 1:
             variance = excess_variance(least_misfit(rounds), consistency, family.targets)
             residuals = residuals.divided_by(sqrt(variance))
-            spread = softmax(rounds[0].misfit * -0.5 / variance, axis=1)
-            moments = where(variance > one, _moments(first_samples, spread), moments)
-        floored = moments + np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
-        proposal = cholesky_columns(floored, unknowns) @ draws.others
+            moments = shortcut(
+                variance <= 1.0,
+                lambda found, *_: found,
+                lambda _, *of_first: _moments_of_likelihood(*of_first, least),
+                *(moments, first_samples, rounds[0].misfit, variance),
+            )
+        proposal = cholesky_columns(moments, unknowns) @ draws.others
         unbounded, current = _adapted_round(family, residuals, proposal, draws)
         rounds.append(current)
         samples = _with_ones(unbounded, current, unknowns, sizes.adapted)
@@ -158,9 +165,14 @@ def _with_ones(unbounded: Value, current: WeightedRound, unknowns: int, count: i
     return concat([ones, unbounded, solved], axis=0)
 
 
-def _moments(samples: Value, weights: Value) -> Value:
-    """Second moments (1 + p, 1 + p) of weighted samples."""
-    return gemm(samples * weights, samples, transpose_b=True)
+def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
+    """Second moments (1 + p, 1 + p) of weighted samples, with their least variances added."""
+    return gemm(samples * weights, samples, floor, transpose_b=True)
+
+
+def _moments_of_likelihood(samples: Value, misfit: Value, variance: Value, least: Floats) -> Value:
+    """As `_moments`, of samples with this misfit where the noise is enlarged by a variance."""
+    return _moments(samples, softmax(misfit * -0.5 / variance, axis=1), least)
 
 
 def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:

@@ -135,7 +135,7 @@ class NearlyKnown:
     def of(family: WheelFamily, response: Response, context: ContextValues) -> NearlyKnown | None:
         """Of a family; None where nothing is nearly known."""
         unknowns, free, terms = len(family.axes), family.free, response.terms
-        if free == unknowns:
+        if context.axis_std is None:
             return None
         powers = np.asarray(
             [[term.count(axis) for term in terms] for axis in range(1, unknowns + 1)]
