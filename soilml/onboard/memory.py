@@ -19,6 +19,12 @@ Singles = NDArray[np.float32]
 
 #: Version of the content of a memory.
 MEMORY_FORMAT = "1"
+#: A memory is packed each time that it has grown by so many rows, so that a step takes about as
+#: long after thousands of readings as after a few.
+PACKED_EVERY = 32
+#: Least singular value that is kept, in standard deviations: monomials lie within [-1, 1], so that
+#: the sum of squared residuals changes by less than 1e-4.
+LEAST_SINGULAR_VALUE = 1e-3
 
 
 def memory_identity(metadata: Mapping[str, str], context: Mapping[str, float]) -> str:
@@ -59,16 +65,31 @@ class Memory:
         """Number of rows that were read."""
         return int(self.counts[1])
 
-    def packed(self) -> Memory:
-        """An equivalent memory, with the triangular factor of a longer system in its place.
+    def packed(self, rows_before: int | None = None) -> Memory:
+        r"""An equivalent memory of fewer rows, where it has more rows than columns.
 
-        The likelihood depends on the system A only through A^T A = R^T R, with R its triangular
-        factor (Golub and Van Loan, Matrix Computations, section 5.3).
+        The likelihood depends on the system :math:`A = U S V^T` only through
+        :math:`A^T A = (S V^T)^T S V^T`. Rows of :math:`S V^T` whose singular value is below
+        `LEAST_SINGULAR_VALUE` change no answer, and are left out: readings of one wheel have
+        fewer directions than the system has columns.
+
+        Parameters
+        ----------
+        rows_before : int, optional
+            Rows of the memory before the last step: it is packed also where it has passed a
+            multiple of `PACKED_EVERY` since.
+
+        References
+        ----------
+        Golub and Van Loan, Matrix Computations, section 2.4.
         """
-        if len(self.system) <= self.system.shape[1]:
+        rows, columns = self.system.shape
+        passed = rows_before is not None and rows // PACKED_EVERY > rows_before // PACKED_EVERY
+        if rows <= columns and not passed:
             return self
-        factor: Any = np.linalg.qr(self.system.astype(np.float64), mode="r")
-        return replace(self, system=factor)
+        _, size, directions = np.linalg.svd(self.system.astype(np.float64), full_matrices=False)
+        kept = size > LEAST_SINGULAR_VALUE
+        return replace(self, system=size[kept, None] * directions[kept])
 
     def grown(self, system: Singles, counts: Singles) -> Memory:
         """The memory with the rows that a graph added to its system, and the new counts.
@@ -77,6 +98,8 @@ class Memory:
         steps do not add up rounding errors.
         """
         added = system[len(self.system) :].astype(np.float64)
+        if not len(self.system):
+            return replace(self, system=added, counts=counts)
         return replace(self, system=np.concatenate([self.system, added]), counts=counts)
 
 
