@@ -289,11 +289,6 @@ def stack_rows(values: Sequence[Value]) -> Value:
     return concat(values, axis=0).reshape(len(values), -1)
 
 
-def add_all(values: Sequence[Value]) -> Value:
-    """The sum of several values, as one node."""
-    return values[0].node("Sum", *values[1:])
-
-
 def gemm(
     a: Value,
     b: Operand,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,22 +160,33 @@ def integrate_out_errors(system: Value, terms: int, errors: int) -> Value:
 def integrate_out_sensor_errors(system: Value, terms: int) -> Value:
     """The system (m, terms) with the errors in `SENSOR_ERROR_COLUMNS` integrated out.
 
-    Sets of torque alone have no offsets of sinkage and drawbar pull.
+    Many sets have no offset of torque, and sets of torque alone none of sinkage and drawbar pull.
     """
-    first, last = (SENSOR_ERROR_COLUMNS.index(f"{name}_bias") for name in RESPONSE_CHANNELS[1:])
-    others = len(SENSOR_ERROR_COLUMNS) - last - 1
-    system = integrate_out_errors(system, terms + last + 1, others)
-    system = integrate_out_if_any(system, terms + first, last + 1 - first)
-    return integrate_out_errors(system, terms, first)
+    offsets = [SENSOR_ERROR_COLUMNS.index(f"{name}_bias") for name in RESPONSE_CHANNELS]
+    count, others = len(offsets), len(SENSOR_ERROR_COLUMNS) - len(offsets)
+
+    def of_offsets(whole: Value) -> Value:
+        of_torque = integrate_out_if_any(whole, terms + 1, count - 1)
+        return integrate_out_errors(of_torque, terms, 1)
+
+    return integrate_out_if_any(
+        integrate_out_errors(system, terms + count, others), terms, count, of_offsets
+    )
 
 
-def integrate_out_if_any(system: Value, terms: int, errors: int) -> Value:
-    """As `integrate_out_errors`, but nothing is to be done where all errors are zero."""
+def integrate_out_if_any(
+    system: Value, terms: int, errors: int, general: Callable[[Value], Value] | None = None
+) -> Value:
+    """As `integrate_out_errors`, but nothing is to be done where all errors are zero.
+
+    `general` integrates them out where they are not, if it is another function.
+    """
     a, g = system.split([terms, errors], axis=1)
+    general = general or (lambda whole: integrate_out_errors(whole, terms, errors))
     return shortcut(
         g.sum_of_squares() <= 0.0,
         lambda _, without: without,
-        lambda whole, _: integrate_out_errors(whole, terms, errors),
+        lambda whole, _: general(whole),
         system,
         a,
     )
