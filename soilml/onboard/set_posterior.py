@@ -243,9 +243,10 @@ class SetPosterior:
         for first in range(0, last, ROWS_PER_CALL):
             part = {name: v[first : first + ROWS_PER_CALL] for name, v in rows.items()}
             memory = memory.grown(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
-        part = {name: values[last:] for name, values in rows.items()} if last else rows
+        if last:
+            rows = {name: values[last:] for name, values in rows.items()}
         memory = memory.packed()
-        outputs = session.run(OUTPUTS, self.feed(part, memory))
+        outputs = session.run(OUTPUTS, self.feed(rows, memory))
         return outputs[: len(SET_OUTPUTS)], memory.grown(*outputs[len(SET_OUTPUTS) :])
 
 

@@ -8,7 +8,7 @@ evaluation fixes the bytes of the file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -257,20 +257,6 @@ def where(condition: Value, x: Value, otherwise: Operand) -> Value:
     """`x` where the condition is true, else the other value, element by element."""
     inputs = (condition.name, x.name, x.operand(otherwise).name)
     return Value(x.graph, x.graph.op("Where", *inputs), x.dtype)
-
-
-def shortcut(
-    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *values: Value
-) -> Value:
-    """The general function of float32 values, or where a condition (1,) is true, a quicker one.
-
-    Only one of both is run. Both must give the same where the condition is true.
-    """
-    ways = []
-    for way in (quick, general):
-        branch = condition.graph.branch()
-        ways.append((branch, way(*(value.within(branch) for value in values)).name))
-    return Value(condition.graph, condition.graph.shortcut(condition.name, *ways))
 
 
 def concat(values: Sequence[Value], axis: int) -> Value:

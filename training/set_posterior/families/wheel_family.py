@@ -100,9 +100,7 @@ class SimulatedSets:
         )
 
 
-def add_log_torque(
-    readings: dict[str, Value], length: Value | float
-) -> tuple[Value, Value]:
+def add_log_torque(readings: dict[str, Value], length: Value | float) -> tuple[Value, Value]:
     r"""Logarithm of torque over load and length (1, rows), and its derivative by torque.
 
     .. math:: y = \log \frac{T}{W r} + \min\left(\tfrac12 \left(\sigma / T\right)^2, 0.02\right),

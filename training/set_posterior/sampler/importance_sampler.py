@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.cholesky import cholesky_columns
+from training.onnx_graph.shortcut import shortcut
 from training.onnx_graph.value import (
     Value,
     concat,
@@ -18,7 +19,6 @@ from training.onnx_graph.value import (
     log,
     maximum,
     minimum,
-    shortcut,
     softmax,
     sqrt,
     tanh,
@@ -143,7 +143,7 @@ def add_importance_sampler(
             moments = shortcut(
                 variance <= 1.0,
                 lambda found, *_: found,
-                lambda _, *of_first: _moments_of_likelihood(*of_first, least),
+                lambda _, first, misfit, v: _moments_of_likelihood(first, misfit, v, least),
                 *(moments, first_samples, rounds[0].misfit, variance),
             )
         proposal = cholesky_columns(moments, unknowns) @ draws.others

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
+from training.onnx_graph.shortcut import shortcut
 from training.onnx_graph.value import (
     Value,
     concat,
@@ -15,7 +16,6 @@ from training.onnx_graph.value import (
     gemm,
     log,
     maximum,
-    shortcut,
     stack_rows,
 )
 from training.set_posterior.families.coordinates import Coordinate
@@ -112,9 +112,7 @@ class ModelErrors:
         names = [axis.name for axis in self.family.axes]
         if COHESION in names:
             number = names.index(COHESION)
-            by_log = _by_log_value(
-                basis, self.response.terms, number + 1, self.family.axes[number]
-            )
+            by_log = _by_log_value(basis, self.response.terms, number + 1, self.family.axes[number])
             of_cohesion = gemm(by_log, coefficients, transpose_a=True)
             change = change - of_cohesion.reshape(1, channels, -1)
         none = change * 0.0

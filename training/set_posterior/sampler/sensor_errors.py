@@ -12,12 +12,12 @@ from soilml.onboard.set_contract import (
     RESPONSE_CHANNELS,
     SENSOR_ERROR_COLUMNS,
 )
+from training.onnx_graph.shortcut import shortcut
 from training.onnx_graph.value import (
     Value,
     concat,
     constant,
     gemm,
-    shortcut,
     sqrt,
     stack_rows,
 )
