@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,7 +144,7 @@ def add_importance_sampler(
             moments = shortcut(
                 variance <= 1.0,
                 lambda found, *_: found,
-                lambda _, first, misfit, v: _moments_of_likelihood(first, misfit, v, least),
+                partial(_moments_of_likelihood, least=least),
                 *(moments, first_samples, rounds[0].misfit, variance),
             )
         proposal = cholesky_columns(moments, unknowns) @ draws.others
@@ -170,9 +171,12 @@ def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
     return gemm(samples * weights, samples, floor, transpose_b=True)
 
 
-def _moments_of_likelihood(samples: Value, misfit: Value, variance: Value, least: Floats) -> Value:
-    """As `_moments`, of samples with this misfit where the noise is enlarged by a variance."""
-    return _moments(samples, softmax(misfit * -0.5 / variance, axis=1), least)
+def _moments_of_likelihood(
+    moments: Value, samples: Value, misfit: Value, variance: Value, least: Floats
+) -> Value:
+    """Moments of samples with this misfit, if the noise has to be enlarged by a variance."""
+    enlarged = _moments(samples, softmax(misfit * -0.5 / variance, axis=1), least)
+    return where(variance > 1.0, enlarged, moments)
 
 
 def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:
