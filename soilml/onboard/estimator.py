@@ -263,7 +263,7 @@ class Estimator:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
         return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
 
-    @property
+    @cached_property
     def _configured_sets(self) -> SetPosterior:
         """The set posterior; raises `InputError` where it is missing or the wheel is not set."""
         if self.sets is None:

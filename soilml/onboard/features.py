@@ -93,8 +93,11 @@ def flatten_readings(
     for name in names:
         if name not in measured:
             raise InputError(f"{name} is missing; this model reads {', '.join(names)}")
-        array = as_numbers(name, measured[name])
-        low, high = READABLE[name]
+        value, (low, high) = measured[name], READABLE[name]
+        array = as_numbers(name, value)
+        if type(value) is float and low < value < high:
+            arrays.append(array)
+            continue
         inside = (array > low) & (array < high)
         if not inside.all():
             bad = ~inside

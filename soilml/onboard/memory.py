@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import final
@@ -98,9 +99,9 @@ class Memory:
         steps do not add up rounding errors.
         """
         added = system[len(self.system) :].astype(np.float64)
-        if not len(self.system):
-            return replace(self, system=added, counts=counts)
-        return replace(self, system=np.concatenate([self.system, added]), counts=counts)
+        if len(self.system):
+            added = np.concatenate([self.system, added])
+        return Memory(added, counts, self.file, self.format)
 
 
 def check_memory(memory: object, columns: int, identity: str, path: str) -> Memory:
@@ -119,7 +120,7 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"sensors than {identity!r} of {path}: {begin}"
         )
     system, counts = (as_numbers("memory", part) for part in (memory.system, memory.counts))
-    finite = bool(np.isfinite(system).all() and np.isfinite(counts).all())
+    finite = math.isfinite(system.sum() + counts.sum())
     if system.shape[1:] != (columns,) or counts.shape != (3,) or not finite:
         raise InputError(
             f"this memory is damaged: its system has shape {system.shape}; needed are finite "

@@ -165,16 +165,16 @@ class SetPosterior:
         required = {name: measured[name] for name in measured if name in REQUIRED_READINGS}
         flat, shape = flatten_readings(REQUIRED_READINGS, required)
         rows = dict(zip(REQUIRED_READINGS, flat, strict=True))
+        absent = [np.full(len(flat[0]), value) for value in (ABSENT_READING, ABSENT_STD)]
         for name in OPTIONAL_READINGS:
             if name not in measured and f"{name}_std" not in measured:
-                rows[name] = np.full(len(flat[0]), ABSENT_READING)
-                rows[f"{name}_std"] = np.full(len(flat[0]), ABSENT_STD)
+                rows[name], rows[f"{name}_std"] = absent
                 continue
             value = _broadcast(name, measured.get(name, np.nan), shape)
-            absent = np.isnan(value)
+            missing = np.isnan(value)
             std = self._std(f"{name}_std", name, value, measured, shape)
-            rows[name] = np.where(absent, ABSENT_READING, value)
-            rows[f"{name}_std"] = np.where(absent, ABSENT_STD, std)
+            rows[name] = np.where(missing, ABSENT_READING, value)
+            rows[f"{name}_std"] = np.where(missing, ABSENT_STD, std)
         for name, source in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
         for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
