@@ -12,10 +12,13 @@ import numpy as np
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.identification.trained_estimator import for_simulated_case
+from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import MEMORY_OUTPUTS, SET_OUTPUTS, SET_PREFIX
 
 ROOT = Path(__file__).parents[1]
 CALLS = 4000
+#: Readings before a step that is timed.
+STEPS = (8, 24, 200, 2000)
 OUTPUTS = ("mean", "std", "covariance", "in_range")
 COLD = """
 import time; t = time.perf_counter()
@@ -71,6 +74,54 @@ def set_in_runtime(estimator: Estimator) -> tuple[float, float]:
     feed = sets.feed(sets.rows(readings()), sets.start())
     names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
     return timed(lambda: estimator.session.run(names, feed), CALLS // 8)
+
+
+def steps() -> str:
+    """Time (us) of one more torque reading by `step`, by the readings before it."""
+    lines = [
+        "One more reading by `step`, by the readings before it: median processor time, all in "
+        "turn. Goal: at 200 within 20 % of 8.",
+        "",
+        "| file | readings before | rows of the memory | us | over that at 8 |",
+        "|---|---:|---:|---:|---:|",
+    ]
+    for name in ("wheel", "any_wheel"):
+        estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+        estimator = for_simulated_case(estimator, read_recipe("wheel").case)
+        memories = [_memory_of(estimator, count) for count in STEPS]
+        calls = [lambda e=estimator, m=m: e.step(m, **reading()) for m in memories]
+        taken = processor_times(calls, CALLS // 8)
+        lines += [
+            f"| {name}.onnx | {count} | {len(memory.system)} | {us:.0f} | {us / taken[0]:.2f} |"
+            for count, memory, us in zip(STEPS, memories, taken, strict=True)
+        ]
+    return "\n".join(lines)
+
+
+def processor_times(calls, count: int) -> list[float]:  # type: ignore[no-untyped-def]
+    """Median processor time (us) of each of several calls, which are made in turn."""
+    taken = np.empty((len(calls), count))
+    for i in range(-20, count):
+        for k, call in enumerate(calls):
+            started = time.thread_time()
+            call()
+            taken[k, i] = time.thread_time() - started
+    return [float(us) for us in np.median(taken, axis=1) * 1e6]
+
+
+def _memory_of(estimator: Estimator, count: int) -> Memory:
+    """The memory of readings of one soil, in steps of eight."""
+    rng, memory = np.random.default_rng(0), estimator.start()
+    slip, load = rng.uniform(0.08, 0.55, count), rng.uniform(40.0, 110.0, count)
+    force = Model(Wheel(radius=0.15, width=0.12))(
+        soil("wong1989/dry_sand"), Operating(slip=slip, load=load)
+    )
+    torque = force.torque * (1.0 + 0.02 * rng.standard_normal(count))
+    for at in range(0, count, 8):
+        part = slice(at, at + 8)
+        rows = {"slip": slip[part], "load": load[part], "torque": torque[part]}
+        _, memory = estimator.step(memory, **rows)
+    return memory
 
 
 def cold_start() -> str:

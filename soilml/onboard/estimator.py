@@ -255,15 +255,15 @@ class Estimator:
         3
         """
         sets = self._configured_sets
-        memory = check_memory(memory, sets.columns, self.memory_id, self.path)
-        estimate, memory = self._set_estimate(sets.rows(measured), memory)
-        return estimate, memory.packed()
+        before = check_memory(memory, sets.columns, self.memory_id, self.path)
+        estimate, memory = self._set_estimate(sets.rows(measured), before)
+        return estimate, memory.packed(len(before.system))
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
         return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
 
-    @property
+    @cached_property
     def _configured_sets(self) -> SetPosterior:
         """The set posterior; raises `InputError` where it is missing or the wheel is not set."""
         if self.sets is None:

@@ -32,7 +32,7 @@ MOST_SHOWN = 40
 
 def as_numbers(name: str, value: Any) -> Floats:
     """An argument as an array of float64; raises `InputError` for what is not real numbers."""
-    if type(value) is float:
+    if type(value) is float or (type(value) is np.ndarray and value.dtype == np.float64):
         return np.asarray(value)
     try:
         array = np.asarray(value)
@@ -93,10 +93,14 @@ def flatten_readings(
     for name in names:
         if name not in measured:
             raise InputError(f"{name} is missing; this model reads {', '.join(names)}")
-        array = as_numbers(name, measured[name])
-        low, high = READABLE[name]
-        bad = ~((array > low) & (array < high))
-        if bad.any():
+        value, (low, high) = measured[name], READABLE[name]
+        array = as_numbers(name, value)
+        if type(value) is float and low < value < high:
+            arrays.append(array)
+            continue
+        inside = (array > low) & (array < high)
+        if not inside.all():
+            bad = ~inside
             unit = QUANTITIES[name].unit
             raise InputError(
                 f"{name} is {array[bad].flat[0]:g}; needed is a finite number between "

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,12 @@ Singles = NDArray[np.float32]
 
 #: Version of the content of a memory.
 MEMORY_FORMAT = "1"
+#: A memory is packed each time that it has grown by so many rows, so that a step takes about as
+#: long after thousands of readings as after a few.
+PACKED_EVERY = 32
+#: Least singular value that is kept, in standard deviations: monomials lie within [-1, 1], so that
+#: the sum of squared residuals changes by less than 1e-4.
+LEAST_SINGULAR_VALUE = 1e-3
 
 
 def memory_identity(metadata: Mapping[str, str], context: Mapping[str, float]) -> str:
@@ -59,16 +66,31 @@ class Memory:
         """Number of rows that were read."""
         return int(self.counts[1])
 
-    def packed(self) -> Memory:
-        """An equivalent memory, with the triangular factor of a longer system in its place.
+    def packed(self, rows_before: int | None = None) -> Memory:
+        r"""An equivalent memory of fewer rows, where it has more rows than columns.
 
-        The likelihood depends on the system A only through A^T A = R^T R, with R its triangular
-        factor (Golub and Van Loan, Matrix Computations, section 5.3).
+        The likelihood depends on the system :math:`A = U S V^T` only through
+        :math:`A^T A = (S V^T)^T S V^T`. Rows of :math:`S V^T` whose singular value is below
+        `LEAST_SINGULAR_VALUE` change no answer, and are left out: readings of one wheel have
+        fewer directions than the system has columns.
+
+        Parameters
+        ----------
+        rows_before : int, optional
+            Rows of the memory before the last step: it is packed also where it has passed a
+            multiple of `PACKED_EVERY` since.
+
+        References
+        ----------
+        Golub and Van Loan, Matrix Computations, section 2.4.
         """
-        if len(self.system) <= self.system.shape[1]:
+        rows, columns = self.system.shape
+        passed = rows_before is not None and rows // PACKED_EVERY > rows_before // PACKED_EVERY
+        if rows <= columns and not passed:
             return self
-        factor: Any = np.linalg.qr(self.system.astype(np.float64), mode="r")
-        return replace(self, system=factor)
+        _, size, directions = np.linalg.svd(self.system.astype(np.float64), full_matrices=False)
+        kept = size > LEAST_SINGULAR_VALUE
+        return replace(self, system=size[kept, None] * directions[kept])
 
     def grown(self, system: Singles, counts: Singles) -> Memory:
         """The memory with the rows that a graph added to its system, and the new counts.
@@ -77,7 +99,9 @@ class Memory:
         steps do not add up rounding errors.
         """
         added = system[len(self.system) :].astype(np.float64)
-        return replace(self, system=np.concatenate([self.system, added]), counts=counts)
+        if len(self.system):
+            added = np.concatenate([self.system, added])
+        return Memory(added, counts, self.file, self.format)
 
 
 def check_memory(memory: object, columns: int, identity: str, path: str) -> Memory:
@@ -96,7 +120,7 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"sensors than {identity!r} of {path}: {begin}"
         )
     system, counts = (as_numbers("memory", part) for part in (memory.system, memory.counts))
-    finite = bool(np.isfinite(system).all() and np.isfinite(counts).all())
+    finite = math.isfinite(system.sum() + counts.sum())
     if system.shape[1:] != (columns,) or counts.shape != (3,) or not finite:
         raise InputError(
             f"this memory is damaged: its system has shape {system.shape}; needed are finite "

@@ -27,7 +27,7 @@ def run_rows(session: Session, rows: Mapping[str, NDArray[np.float64]]) -> dict[
         Readings (m,) by input name.
     """
     with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
-        feed = {name: values.astype(np.float32) for name, values in rows.items()}
+        feed = dict(zip(rows, np.array(list(rows.values()), np.float32), strict=True))
     count = len(next(iter(feed.values())))
     pieces = [
         session.run(ROW_OUTPUTS, {n: v[first : first + ROWS_PER_CALL] for n, v in feed.items()})

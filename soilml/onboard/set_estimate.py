@@ -30,8 +30,8 @@ def estimate_of_set(
     memory : Memory
         The memory with these rows.
     """
-    mean, std, covariance, low, high = (np.asarray(x, np.float64) for x in outputs[:5])
-    in_range = bool(outputs[5][0])
+    mean, std, covariance, low, high = (x.astype(np.float64) for x in outputs[:5])
+    in_range, (_, rows, rows_used) = bool(outputs[5][0]), memory.counts.tolist()
     return Estimate(
         names=names,
         units=units,
@@ -43,17 +43,17 @@ def estimate_of_set(
         in_range=np.asarray(in_range),
         prior=prior,
         misfit=np.asarray(float(outputs[6][0])),
-        rows_used=np.asarray(int(memory.counts[2])),
-        rows_set_aside=np.asarray(int(memory.counts[1] - memory.counts[2])),
+        rows_used=np.asarray(int(rows_used)),
+        rows_set_aside=np.asarray(int(rows - rows_used)),
         reason=np.asarray(int(_reason(in_range, memory))),
     )
 
 
 def _reason(in_range: bool, memory: Memory) -> Reason:
     """Why a set has the estimate that it has, as its graph decides."""
-    readings, rows, rows_in_range = memory.counts
     if in_range:
         return Reason.ESTIMATED
+    readings, rows, rows_in_range = memory.counts
     if not rows_in_range >= rows * np.float32(LEAST_SHARE_IN_RANGE):
         return Reason.OUT_OF_RANGE
     return Reason.INCONSISTENT if readings > 0.5 else Reason.NO_INFORMATION

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, final
 
 import numpy as np
@@ -52,6 +53,8 @@ ROWS_PER_CALL = 256
 MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
 #: Everything that is read of a row.
 KNOWN = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)
+#: Outputs that are read of the graph.
+OUTPUTS = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
 #: Stands for the smallest positive standard deviation: zero and negative values are refused.
 POSITIVE_STD = 1e-300
 
@@ -162,16 +165,16 @@ class SetPosterior:
         required = {name: measured[name] for name in measured if name in REQUIRED_READINGS}
         flat, shape = flatten_readings(REQUIRED_READINGS, required)
         rows = dict(zip(REQUIRED_READINGS, flat, strict=True))
+        absent = [np.full(len(flat[0]), value) for value in (ABSENT_READING, ABSENT_STD)]
         for name in OPTIONAL_READINGS:
             if name not in measured and f"{name}_std" not in measured:
-                rows[name] = np.full_like(flat[0], ABSENT_READING)
-                rows[f"{name}_std"] = np.full_like(flat[0], ABSENT_STD)
+                rows[name], rows[f"{name}_std"] = absent
                 continue
             value = _broadcast(name, measured.get(name, np.nan), shape)
-            absent = np.isnan(value)
+            missing = np.isnan(value)
             std = self._std(f"{name}_std", name, value, measured, shape)
-            rows[name] = np.where(absent, ABSENT_READING, value)
-            rows[f"{name}_std"] = np.where(absent, ABSENT_STD, std)
+            rows[name] = np.where(missing, ABSENT_READING, value)
+            rows[f"{name}_std"] = np.where(missing, ABSENT_STD, std)
         for name, source in (("torque_std", "torque"), ("torque_bias", "torque_bias")):
             rows[name] = self._std(name, source, rows["torque"], measured, shape)
         for name, source in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True):
@@ -180,6 +183,8 @@ class SetPosterior:
                 rows[name] = std
             else:
                 check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
+        if len(measured) == len(REQUIRED_READINGS):
+            return rows
         for name in measured.keys() & rows.keys() - READABLE.keys():  # others are positive
             least = 0.0 if name in MAY_BE_ZERO else POSITIVE_STD
             if not (rows[name] >= least).all():
@@ -200,20 +205,26 @@ class SetPosterior:
             return _broadcast(name, measured[name], shape)
         constant, share = self.noise.get(source, (0.0, 0.0))
         if source in OPTIONAL_READINGS and not constant + share:
-            return np.full_like(reading, ABSENT_STD)
+            return np.full(len(reading), ABSENT_STD)
         least = 0.0 if name in MAY_BE_ZERO else LEAST_STD
+        if not share:
+            return np.full(len(reading), max(constant, least))
         return np.maximum(np.hypot(constant, share * np.abs(reading)), least)
 
     def feed(self, rows: Mapping[str, Floats], memory: Memory) -> Feed:
         """All inputs of the graph by name."""
         with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
-            feed: Feed = {name: values.astype(np.float32) for name, values in rows.items()}
-        of_set = self.context_values | self.common_errors
-        feed |= {n: np.asarray([value], np.float32) for n, value in of_set.items()}
-        if not self.sets_only:
-            feed[SET_SWITCH] = np.ones(1, np.bool_)
+            stacked = np.array(list(rows.values()), np.float32)
+        feed: Feed = dict(zip(rows, stacked, strict=True)) | self._feed_of_set
         kept = memory.system.astype(np.float32), memory.counts.astype(np.float32)
         return feed | dict(zip(MEMORY_INPUTS, kept, strict=True))
+
+    @cached_property
+    def _feed_of_set(self) -> Feed:
+        """Inputs of the graph that hold for a whole set."""
+        of_set = self.context_values | self.common_errors
+        feed: Feed = {name: np.asarray([value], np.float32) for name, value in of_set.items()}
+        return feed if self.sets_only else feed | {SET_SWITCH: np.ones(1, np.bool_)}
 
     def rows_in_range(self, session: Session, rows: Mapping[str, Floats]) -> NDArray[np.bool_]:
         """Which rows (m,) lie in the range of the response surface."""
@@ -232,16 +243,19 @@ class SetPosterior:
         for first in range(0, last, ROWS_PER_CALL):
             part = {name: v[first : first + ROWS_PER_CALL] for name, v in rows.items()}
             memory = memory.grown(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
-        part = {name: values[last:] for name, values in rows.items()}
-        names = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
+        if last:
+            rows = {name: values[last:] for name, values in rows.items()}
         memory = memory.packed()
-        outputs = session.run(names, self.feed(part, memory))
+        outputs = session.run(OUTPUTS, self.feed(rows, memory))
         return outputs[: len(SET_OUTPUTS)], memory.grown(*outputs[len(SET_OUTPUTS) :])
 
 
 def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
     """Rows without those that repeat another in every reading: copies carry no information."""
     if len(rows["slip"]) < 2:
+        return dict(rows)
+    slip = rows["slip"]
+    if len(set(slip.tolist())) == len(slip):
         return dict(rows)
     table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
     first: dict[bytes, int] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
 )
+from training.onnx_graph.builder import SHORTCUT
 
 #: Names of constants of the graph.
 ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"
@@ -48,15 +50,8 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     if not {*MEMORY_INPUTS} <= given:
         raise InputError(f"{name} has no set posterior: each of its answers is from one row")
     nodes, initializers = list(graph.node), list(graph.initializer)
-    switches = [node for node in nodes if node.op_type == "If"]
-    renamed = {}
-    if switches:
-        (switch,) = switches
-        branch = next(a.g for a in switch.attribute if a.name == "then_branch")
-        nodes = [node for node in nodes if node is not switch] + list(branch.node)
-        initializers += list(branch.initializer)
-        inner = [value.name for value in branch.output]
-        renamed = dict(zip(inner, switch.output, strict=True))
+    nodes, constants, renamed = _without_branches(nodes)
+    initializers += constants
     wanted = [*(SET_PREFIX + one for one in (*SET_OUTPUTS, "abstains", "at_edge"))]
     wanted += [*MEMORY_OUTPUTS, ROW_IN_RANGE]
     columns = next(v for v in graph.input if v.name == MEMORY_INPUTS[0])
@@ -87,6 +82,28 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
         raise InputError(f"{name}: the shape of {', '.join(open_ended)} does not follow from rows")
     del fixed.graph.value_info[:]
     return fixed
+
+
+def _without_branches(nodes: Iterable[Any]) -> tuple[list[Any], list[Any], dict[str, str]]:
+    """Nodes with each If replaced by one branch, constants of these, and names of their results.
+
+    That is the general way of a shortcut, and the set posterior of a file that has another branch.
+    """
+    found: list[Any] = []
+    constants: list[Any] = []
+    renamed: dict[str, str] = {}
+    for node in nodes:
+        if node.op_type != "If":
+            found.append(node)
+            continue
+        wanted = "else_branch" if node.doc_string == SHORTCUT else "then_branch"
+        branch = next(a.g for a in node.attribute if a.name == wanted)
+        inside, of_branch, names = _without_branches(branch.node)
+        found += inside
+        constants += [*branch.initializer, *of_branch]
+        renamed |= names
+        renamed |= dict(zip([value.name for value in branch.output], node.output, strict=True))
+    return found, constants, renamed
 
 
 def _without_compress(node: Any) -> list[Any]:

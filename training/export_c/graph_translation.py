@@ -15,6 +15,7 @@ from training.export_c.operators import OPERATORS
 from training.export_c.program import Program
 from training.export_c.sizes import Size
 from training.export_c.tensor import Tensor
+from training.onnx_graph.builder import SHORTCUT
 
 
 def translate_graph(
@@ -147,7 +148,10 @@ def _computed_now(node: Any, inputs: list[Tensor | None], opsets: Any) -> list[T
 
 
 def _without_branches(graph: Any, known: dict[str, Tensor]) -> list[Any]:
-    """The nodes of a graph, with each If node replaced by its chosen branch."""
+    """The nodes of a graph, with each If node replaced by its chosen branch.
+
+    Of a shortcut whose condition depends on the readings, that is the general way.
+    """
     from onnx import helper, numpy_helper
 
     nodes: list[Any] = []
@@ -156,11 +160,14 @@ def _without_branches(graph: Any, known: dict[str, Tensor]) -> list[Any]:
             nodes.append(node)
             continue
         condition = known.get(node.input[0])
-        if condition is None or condition.value is None:
+        if condition is not None and condition.value is not None:
+            chosen = "then_branch" if condition.value.all() else "else_branch"
+        elif node.doc_string == SHORTCUT:
+            chosen = "else_branch"
+        else:
             raise ModelFileError(
                 "operator If whose condition depends on the readings is not known to export-c"
             )
-        chosen = "then_branch" if condition.value.all() else "else_branch"
         branch = next(helper.get_attribute_value(a) for a in node.attribute if a.name == chosen)
         for initial in branch.initializer:
             known[initial.name] = Tensor.constant(numpy_helper.to_array(initial), initial.name)

@@ -3,6 +3,8 @@
 `training.onnx_graph.value` adds operators to it. Bytes of a file depend on the order of nodes and
 constants, which are numbered as they are added.
 
+A constant or a node that is there already is not added again: its name is returned.
+
 The operator set and file version are readable by every onnxruntime since 1.14; the defaults of the
 onnx package are newer than that. Every node has a name of its own: up to release 1.21, onnxruntime
 derives the names of fused nodes from them, and refuses a graph in which two fused nodes get the
@@ -11,7 +13,7 @@ same one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,9 @@ Output = tuple[int, list[Any]]
 
 #: ONNX's numbers of the element types of inputs and outputs (onnx.TensorProto.DataType).
 FLOAT, BOOL = 1, 9
+
+#: Mark of If nodes whose else branch is right for every condition.
+SHORTCUT = "shortcut"
 
 OPSET = 18
 IR_VERSION = 9
@@ -44,6 +49,10 @@ class Graph:
         self._prefix = prefix
         self._nodes: list[Any] = []
         self._constants: list[Any] = []
+        self._names_of_constants: dict[tuple[Any, ...], str] = {}
+        self._names_of_nodes: dict[tuple[Any, ...], list[str]] = {}
+        self._parts: dict[tuple[tuple[str, ...], int], str] = {}
+        self._branches = 0
 
     def constant(self, value: Any, exact: bool = False) -> str:
         """The name of a constant array; floating-point numbers become float64 unless `exact`."""
@@ -52,9 +61,12 @@ class Graph:
         array = np.asarray(value)
         if array.dtype.kind == "f" and not exact:
             array = array.astype(np.float64)
-        name = f"{self._prefix}c{len(self._constants)}"
-        self._constants.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
-        return name
+        key = (array.dtype.str, array.shape, array.tobytes())
+        if key not in self._names_of_constants:
+            name = f"{self._prefix}c{len(self._constants)}"
+            self._constants.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
+            self._names_of_constants[key] = name
+        return self._names_of_constants[key]
 
     def op(self, kind: str, *inputs: str, out: str | None = None, **attributes: Any) -> str:
         """Add a node with one output, and return the name of the output."""
@@ -72,12 +84,24 @@ class Graph:
         """Add a node with several outputs, and return their names: new ones, or `outs`."""
         from onnx import helper
 
+        key = (kind, count, inputs, repr(sorted(attributes.items())))
+        unnamed = out is None and outs is None
+        if unnamed and key in self._names_of_nodes:
+            return self._names_of_nodes[key]
         count_before = len(self._nodes)
         name = out or f"{self._prefix}v{count_before}"
         names = outs or [name, *[f"{name}_{i}" for i in range(1, count)]]
         own = f"{self._prefix}n{count_before}"
         self._nodes.append(helper.make_node(kind, list(inputs), names, name=own, **attributes))
+        if unnamed:
+            self._names_of_nodes[key] = names
+        if kind == "Split":
+            self._parts[tuple(names), attributes["axis"]] = inputs[0]
         return names
+
+    def whole_of(self, names: Sequence[str], axis: int) -> str | None:
+        """The value of which these are all the parts along an axis, if there is one."""
+        return self._parts.get((tuple(names), axis))
 
     def rename_last(self, name: str, new: str) -> None:
         """Rename the output of the node that was added last, which nothing reads yet.
@@ -90,6 +114,7 @@ class Graph:
         if not self._nodes or self._nodes[-1].output[0] != name:
             raise ValueError(f"{name} is not the output of the last node; name it right away")
         self._nodes[-1].output[0] = new
+        self._names_of_nodes = {k: v for k, v in self._names_of_nodes.items() if v[0] != name}
 
     def double(self, name: str) -> str:
         """A value cast to float64."""
@@ -153,6 +178,31 @@ class Graph:
             outs=list(outputs),
         )
 
+    def branch(self) -> Graph:
+        """A graph for one branch of this one, with names of its own; it may read values of this."""
+        self._branches += 1
+        return Graph(f"{self._prefix}b{self._branches}_")
+
+    def shortcut(self, condition: str, quick: tuple[Graph, str], general: tuple[Graph, str]) -> str:
+        """Add an If node that takes a quicker way to the same float32 value where it exists.
+
+        Each way is a branch and the name of its result. The general way is right whether the
+        condition is true or not: a caller that cannot branch takes it always.
+        """
+        then, otherwise = (graph._result(name) for graph, name in (quick, general))
+        attributes = {"then_branch": then, "else_branch": otherwise, "doc_string": SHORTCUT}
+        return self.ops("If", 1, condition, **attributes)[0]
+
+    def _result(self, name: str) -> Any:
+        """This graph as a branch with one float32 output, which may be a value that it captures."""
+        from onnx import helper
+
+        if not any(name in node.output for node in self._nodes):
+            name = self.op("Identity", name)
+        nodes, constants = self._needed([name])
+        info = helper.make_tensor_value_info(name, FLOAT, None)
+        return helper.make_graph(nodes, f"{self._prefix}branch", [], [info], constants)
+
     def _branch(self, outputs: Mapping[str, Output]) -> Any:
         from onnx import helper
 
@@ -164,7 +214,17 @@ class Graph:
                 empty = np.zeros([0] * len(shape), helper.tensor_dtype_to_np_dtype(kind))
                 self.op("Identity", self.constant(empty, exact=True), out=own)
             infos.append(helper.make_tensor_value_info(own, kind, [None] * len(shape)))
-        return helper.make_graph(self._nodes, f"{self._prefix}branch", [], infos, self._constants)
+        nodes, constants = self._needed([info.name for info in infos])
+        return helper.make_graph(nodes, f"{self._prefix}branch", [], infos, constants)
+
+    def _needed(self, outputs: Iterable[str]) -> tuple[list[Any], list[Any]]:
+        """The nodes and constants on which outputs depend; values of branches are included."""
+        wanted, nodes = set(outputs), []
+        for node in reversed(self._nodes):
+            if wanted.intersection(node.output):
+                nodes.append(node)
+                wanted.update(_read_by(node))
+        return nodes[::-1], [one for one in self._constants if one.name in wanted]
 
     def model(
         self,
@@ -184,15 +244,16 @@ class Graph:
 
         if not isinstance(inputs, Mapping):
             inputs = {name: ["rows"] for name in inputs}
+        nodes, constants = self._needed([*outputs, *inputs])
         graph = helper.make_graph(
-            self._nodes,
+            nodes,
             "soilml",
             [
                 helper.make_tensor_value_info(n, BOOL if n == SET_SWITCH else FLOAT, s)
                 for n, s in inputs.items()
             ],
             [helper.make_tensor_value_info(n, k, shape) for n, (k, shape) in outputs.items()],
-            self._constants,
+            constants,
         )
         model = helper.make_model(
             graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="soilml"
@@ -200,6 +261,13 @@ class Graph:
         model.ir_version = IR_VERSION
         checker.check_model(model, full_check=True)
         return model
+
+
+def _read_by(node: Any) -> set[str]:
+    """Names of the values that a node reads, also in its branches."""
+    branches = [a.g for a in node.attribute if a.HasField("g")]
+    inside = (_read_by(inner) for branch in branches for inner in branch.node)
+    return set(node.input).union(*inside, *({o.name for o in b.output} for b in branches))
 
 
 def session_of(model: Any) -> Any:

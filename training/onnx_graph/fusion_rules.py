@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.builder import Graph
-from training.onnx_graph.value import Value, add_all, concat, reciprocal, sqrt
+from training.onnx_graph.value import Value, concat, reciprocal, sqrt
 
 Floats = NDArray[np.float64]
 
@@ -35,15 +35,21 @@ def add_best_linear_fusion(
     tuple of str
         Names of mean and standard deviation (n, q).
     """
-    mean_values, std_values = _doubles(graph, means), _doubles(graph, stds)
-    mean = add_all([mean * weights[i] for i, mean in enumerate(mean_values)])
-    weighted_std = [std * weights[i] for i, std in enumerate(std_values)]
-    terms = []
-    for i in range(len(means)):
-        for j in range(i, len(means)):
-            multiplicity = 1.0 if i == j else 2.0  # the pairs (i, j) and (j, i)
-            terms.append(weighted_std[i] * weighted_std[j] * (correlation[:, i, j] * multiplicity))
-    return mean.name, sqrt(add_all(terms)).name
+    mean, std = (concat(_doubles(graph, values), axis=1) for values in (means, stds))  # (n, m q)
+    m, q = weights.shape
+    # one product sums estimates, and one the products of all pairs of their standard deviations
+    quantity = np.arange(q)
+    first, second = np.triu_indices(m)
+    columns = np.arange(m * q).reshape(m, q)
+    of_pairs = np.zeros((len(first), q, q))
+    multiplicity = np.where(first == second, 1.0, 2.0)  # the pairs (i, j) and (j, i)
+    of_pairs[:, quantity, quantity] = (
+        weights[first] * weights[second] * correlation[:, first, second].T * multiplicity[:, None]
+    )
+    left, right = (std.take(columns[k].reshape(-1).tolist(), axis=1) for k in (first, second))
+    variance = (left * right) @ of_pairs.reshape(-1, q)
+    of_estimates = (weights[:, :, None] * np.eye(q)).reshape(-1, q)
+    return (mean @ of_estimates).name, sqrt(variance).name
 
 
 def add_rowwise_fusion(

@@ -170,12 +170,18 @@ class Value:
         axes = [] if axis is None else [self.indices([axis])]
         return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
 
+    def within(self, branch: Graph) -> Value:
+        """The value as a branch of its graph reads it."""
+        return Value(branch, self.name, self.dtype)
+
     def named(self, name: str) -> Value:
         """The value under the name of a graph output; only for the output of the last node."""
         self.graph.rename_last(self.name, name)
         return self._output(name)
 
     def _binary(self, kind: str, left: Operand, right: Operand) -> Value:
+        if kind in ("Mul", "Div") and isinstance(right, float) and right == 1.0:
+            return self
         first, second = self.operand(left), self.operand(right)
         return self._output(self.graph.op(kind, first.name, second.name))
 
@@ -260,9 +266,13 @@ def concat(values: Sequence[Value], axis: int) -> Value:
     return Value(first.graph, name, first.dtype)
 
 
-def add_all(values: Sequence[Value]) -> Value:
-    """The sum of several values, as one node."""
-    return values[0].node("Sum", *values[1:])
+def stack_rows(values: Sequence[Value]) -> Value:
+    """Values (n,) or (1, n) as the rows of a matrix; parts of a matrix become that matrix again."""
+    first = values[0]
+    whole = first.graph.whole_of([value.name for value in values], 0)
+    if whole is not None:
+        return Value(first.graph, whole, first.dtype)
+    return concat(values, axis=0).reshape(len(values), -1)
 
 
 def gemm(

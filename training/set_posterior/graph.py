@@ -30,7 +30,10 @@ from training.set_posterior.sampler.importance_sampler import add_importance_sam
 from training.set_posterior.sampler.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.sampler.posterior_summary import add_posterior_outputs
 from training.set_posterior.sampler.residual_system import add_residual_rows
-from training.set_posterior.sampler.sensor_errors import integrate_out_errors
+from training.set_posterior.sampler.sensor_errors import (
+    integrate_out_if_any,
+    integrate_out_sensor_errors,
+)
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
@@ -113,9 +116,10 @@ class SetPosteriorGraph:
             if basis is None:  # the first round is but a start: it takes the model as right
                 earlier, _ = memory.split([terms + of_sensors, of_model], axis=1)
                 system = concat([earlier, rows.system_at(basis)], axis=0)
-                return integrate_out_errors(system, terms, of_sensors)
+                return integrate_out_sensor_errors(system, terms)
             system = concat([memory, rows.system_at(basis)], axis=0).named(outputs[0])
-            return integrate_out_errors(system, terms, of_sensors + of_model)
+            system = integrate_out_if_any(system, terms + of_sensors, of_model)
+            return integrate_out_sensor_errors(system, terms)
 
         consistency = add_consistency(counts, self.limits, self.family.targets)
         sample = add_importance_sampler(self.family, self.response, context, system_at, consistency)

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from datagen.engines.processes import process_map
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
-from training.onnx_graph.value import Value, gemm, tanh
+from training.onnx_graph.value import Value, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
 from training.regressors.tanh_network import TanhNetwork
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
@@ -90,27 +90,33 @@ class Response:
 
     def add_at_soil(self, features: Value) -> SoilValues:
         """Add the network to a graph, for the values of the channels at single soils."""
-        hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
+        hidden = features - self.scaling.mean[:, None]
         for weights, bias in self._inner_layers():
-            hidden = tanh(gemm(hidden, weights, bias))
+            hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
         return SoilValues.of(hidden, self.layers[-2:], len(self.terms))
 
-    def add_to(self, features: Value, directions: Floats) -> ResponseValues:
+    def add_to(self, features: Value, offset: Value, directions: Floats) -> ResponseValues:
         """Add the network to a graph, with its derivatives along directions of the features (d, f).
 
-        The derivatives are exact: each layer carries the tangents of its values.
+        The derivatives are exact: each layer carries the tangents of its values. The offset
+        (channels, rows) is subtracted from the channels.
         """
-        hidden = (features - self.scaling.mean) * (1.0 / self.scaling.scale)
-        tangent: Value | Floats = (directions / self.scaling.scale)[:, None]
+        hidden = features - self.scaling.mean[:, None]
+        tangent: Value | Floats = directions[:, :, None]
         for weights, bias in self._inner_layers():
-            hidden = tanh(gemm(hidden, weights, bias))
-            tangent = tangent @ weights * (1.0 - hidden * hidden)
+            hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
+            tangent = (weights @ tangent) * (1.0 - hidden * hidden)
         assert isinstance(tangent, Value)
-        return ResponseValues.of(hidden, tangent, self.layers[-2:], len(self.terms))
+        return ResponseValues.of(hidden, offset, tangent, self.layers[-2:], len(self.terms))
 
     def _inner_layers(self) -> list[tuple[Floats, Floats]]:
-        """Weights and biases of all layers but the last."""
-        return list(zip(self.layers[0:-2:2], self.layers[1:-2:2], strict=True))
+        """Weights (units, inputs) and biases (units, 1) of all layers but the last.
+
+        The first takes features without their mean, and scales them.
+        """
+        weights = [layer.T for layer in self.layers[0:-2:2]]
+        weights[0] = weights[0] / self.scaling.scale
+        return list(zip(weights, [bias[:, None] for bias in self.layers[1:-2:2]], strict=True))
 
 
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:

@@ -7,6 +7,8 @@ all rows, or feed what a failing sensor gives.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -20,25 +22,21 @@ from soilml.onboard.set_contract import (
     MEMORY_INPUTS,
     NOISE_OF_FILE,
     NOT_MEASURED,
+    OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
     READING_INPUTS,
     RESPONSE_CHANNELS,
-    STD_INPUTS,
 )
-from training.onnx_graph.value import (
-    Value,
-    absolute,
-    add_all,
-    concat,
-    constant,
-    maximum,
-    where,
-)
+from training.onnx_graph.value import Value, absolute, concat, constant, sqrt, where
 
-#: All standard deviations of a row, and those that may be zero.
-ROW_STDS = (*STD_INPUTS, *OPERATING_STD_INPUTS)
+#: Standard deviations of the noise of the channels, in their order.
+CHANNEL_STDS = tuple(f"{name}_std" for name in RESPONSE_CHANNELS)
+#: All standard deviations of a row, those of the channels first, and those that may be zero.
+ROW_STDS = (*CHANNEL_STDS, "torque_bias", *OPERATING_STD_INPUTS)
 MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
+#: All inputs by row in the order in which they are stacked: slip, load, channels, and the others.
+ROWS = (*READING_INPUTS, *ROW_STDS)
 #: Constant part and share of the reading of each noise of a file, by the names of `NOISE_NAMES`.
 FileNoise = Mapping[str, Sequence[float]]
 
@@ -50,6 +48,8 @@ LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
 LARGEST_READING = 1e12
 #: Slip of a row that is not finite: out of every range.
 IMPOSSIBLE_SLIP = -1.0
+#: Values of a row that is not finite.
+HARMLESS = np.asarray([[IMPOSSIBLE_SLIP if name == "slip" else 1.0] for name in ROWS])
 #: Readings below this share of the marker were not measured.
 MARKER_SHARE = 0.5
 #: Standard deviation of a reading that was not measured: on the scale of every response, also of
@@ -69,7 +69,7 @@ def default_values() -> dict[str, NDArray[Any]]:
 def complete_inputs(
     inputs: Mapping[str, Value], context: Sequence[str], noise: FileNoise
 ) -> dict[str, Value]:
-    r"""Inputs by row of one length (rows,), without markers, and everything finite.
+    r"""Inputs by row (1, rows), without markers, and everything finite.
 
     - An input of one element holds for all rows.
     - A row of which any input is not finite gets a slip that is out of range, and harmless values.
@@ -94,16 +94,18 @@ def complete_inputs(
         Noise of the file.
     """
     complete = dict(inputs)
-    of_rows = [inputs[name] for name in (*READING_INPUTS, *ROW_STDS)]
+    by_row = [inputs[name] for name in ROWS]
+    total = reduce(add, by_row)  # (rows,), also where some inputs have one element
+    rows = total.node("Shape")
     if context:
-        total = _sum([inputs[name] for name in context])
-        finite = absolute(total) <= LARGEST_CONTEXT
-        complete |= {name: where(finite, inputs[name], 1.0) for name in context}
-        of_rows.append(total)
-    finite = absolute(_sum(of_rows)) <= LARGEST_SUM  # (rows,)
-    for name in (*READING_INPUTS, *ROW_STDS):
-        harmless = IMPOSSIBLE_SLIP if name == "slip" else 1.0
-        complete[name] = where(finite, inputs[name], harmless)
+        values = concat([inputs[name] for name in context], axis=0)
+        of_set = values.sum(keepdims=True)  # (1,)
+        values = where(absolute(of_set) <= LARGEST_CONTEXT, values, 1.0)
+        complete |= zip(context, values.split(len(context), axis=0), strict=True)
+        total = total + of_set
+    finite = absolute(total) <= LARGEST_SUM
+    stacked = concat([value.node("Expand", rows) for value in by_row], axis=0)
+    stacked = where(finite, stacked.reshape(len(ROWS), -1), constant(stacked.graph, HARMLESS))
     memory, counts = (inputs[name] for name in MEMORY_INPUTS)
     squares = memory.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
     intact = squares <= LARGEST_MEMORY
@@ -111,31 +113,38 @@ def complete_inputs(
     complete |= zip(
         MEMORY_INPUTS, (where(intact, memory, 0.0), where(intact, counts, damaged)), strict=True
     )
-    return complete | _without_markers(complete, noise)
+    return complete | _without_markers(stacked, noise)
 
 
-def _without_markers(rows: Mapping[str, Value], noise: FileNoise) -> dict[str, Value]:
-    """Channels and all standard deviations (rows,) with their markers replaced."""
-    read = [_reading_of(name) for name in ROW_STDS]
-    reading = _stacked([rows[name] for name in read])  # (stds, rows)
-    std = _stacked([rows[name] for name in ROW_STDS])
+def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
+    """Slip and load as they are, channels and standard deviations without markers, (1, rows)."""
+    std = stacked.split([len(READING_INPUTS), len(ROW_STDS)], axis=0)[1]
+    read = [ROWS.index(_reading_of(name)) for name in ROW_STDS]
+    reading = stacked.take(read, axis=0)  # (stds, rows)
     parts = np.asarray([_noise_of(name, noise) for name in ROW_STDS])
     may_be_zero = np.asarray([[name in MAY_BE_ZERO] for name in ROW_STDS])
+    least = np.where(may_be_zero, 0.0, LEAST_STD)
     own = reading * parts[:, 1:]
-    own = (own * own + parts[:, :1] ** 2).node("Sqrt")
-    own = maximum(own, np.where(may_be_zero, 0.0, LEAST_STD))
+    own = sqrt(own * own + np.maximum(parts[:, :1], least) ** 2)
     std = where(std < np.where(may_be_zero, 0.0, LEAST_GIVEN_STD), own, std)
     marked = reading < MARKER_SHARE * NOT_MEASURED
-    reading = where(marked, constant(std.graph, ABSENT_READING), reading)
-    reading = reading.clip(-LARGEST_READING, LARGEST_READING)
     no_weight = constant(std.graph, np.where(may_be_zero, ABSENT_STD, NO_WEIGHT_STD))
     std = where(marked | (std >= ABSENT_STD), no_weight, std)
-    stds, readings = (
-        [part.reshape(-1) for part in value.split(len(ROW_STDS), axis=0)]
-        for value in (std, reading)
-    )
-    channels = {n: v for n, v in zip(read, readings, strict=True) if n in RESPONSE_CHANNELS}
-    return dict(zip(ROW_STDS, stds, strict=True)) | channels
+    channels = where(marked, constant(std.graph, ABSENT_READING), reading)
+    channels = channels.clip(-LARGEST_READING, LARGEST_READING)
+    k, others = len(RESPONSE_CHANNELS), len(ROW_STDS) - len(RESPONSE_CHANNELS)
+    groups = [
+        (OPERATING_NOISE, stacked.take([0, 1], axis=0)),
+        (RESPONSE_CHANNELS, channels.split([k, others], axis=0)[0]),
+    ]
+    of_channels, bias, of_operating = std.split([k, 1, others - 1], axis=0)
+    groups += [(CHANNEL_STDS, of_channels), (OPERATING_STD_INPUTS, of_operating)]
+    rows = {
+        name: row
+        for names, group in groups
+        for name, row in zip(names, group.split(len(names), axis=0), strict=True)
+    }
+    return rows | {"torque_bias": bias}
 
 
 def _reading_of(name: str) -> str:
@@ -150,11 +159,3 @@ def _noise_of(name: str, noise: FileNoise) -> tuple[float, float]:
     if reading in OPTIONAL_READINGS and not constant_part + share:
         return ABSENT_STD, 0.0
     return float(constant_part), float(share)
-
-
-def _sum(values: list[Value]) -> Value:
-    return add_all(values) if len(values) > 1 else values[0]
-
-
-def _stacked(values: list[Value]) -> Value:
-    return concat(values, axis=0).reshape(len(values), -1)

@@ -116,13 +116,13 @@ def test_every_parameter_abstains_by_itself(whole):
     assert found.abstains.any() and not found.abstains.all()
 
 
-def test_memory_is_packed_once_it_has_more_rows_than_terms(whole):
+def test_memory_never_has_more_rows_than_columns(whole):
     exact = whole.on(**EXACT)
     columns, memory = exact.sets.columns, exact.start()
     rows = many(3 * columns)
     for i in range(3 * columns):
         found, memory = exact.step(memory, **{name: v[i] for name, v in rows.items()})
-        assert len(memory.system) == min(i + 1, columns)
+        assert len(memory.system) <= min(i + 1, columns)
     assert memory.rows == found.rows_used == 3 * columns
     once = exact.run(**rows)
     assert (np.abs(found.mean - once.mean) < 0.05 * once.std).all()

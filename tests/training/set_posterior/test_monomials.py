@@ -57,7 +57,7 @@ def test_the_misfit_in_the_graph_is_that_of_all_factors_of_the_monomials(degree)
     system, x = rng.normal(size=(7, len(terms))), rng.uniform(-1.0, 1.0, (5, 2))
     graph = Graph()
     value = constant(graph, system)
-    residuals = PolynomialResiduals(value, value, terms, (1, 0))
+    residuals = PolynomialResiduals(value, value, (), terms, (1, 0))
     points = constant(graph, np.concatenate([np.ones((1, 5)), x.T[[1, 0]]]))
     residuals.squared_norm(residuals.basis(points)).named("misfit")
     found = session_of(graph.model({}, {"misfit": (1, [1, 5])})).run(None, {})[0][0]

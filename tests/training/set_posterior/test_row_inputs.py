@@ -56,7 +56,9 @@ def completed(noise, **feed):
     names = (*READING_INPUTS, *ROW_STDS, *MEMORY_INPUTS)
     complete = complete_inputs({name: Value(graph, name) for name in names}, (), noise)
     for name in names:
-        complete[name].node("Identity").named(f"{name}_out")
+        of_rows = name not in MEMORY_INPUTS
+        value = complete[name].reshape(-1) if of_rows else complete[name]
+        value.node("Identity").named(f"{name}_out")
     shapes = {name: ["rows"] for name in names} | {"memory": ["kept", 3], "counted": [3]}
     outputs = {f"{name}_out": (FLOAT, shape) for name, shape in shapes.items()}
     inputs = {name: ["n"] for name in names} | {"memory": ["kept", 3], "counted": [3]}

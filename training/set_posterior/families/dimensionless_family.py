@@ -18,7 +18,7 @@ from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
-from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
+from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, stack_rows
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.dimensionless_design import (
     BEARING_RANGE,
@@ -233,12 +233,12 @@ class DimensionlessFamily:
         of_context[:, 2] = [1.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]
         of_context[:, 3] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
         of_context[5, 4] = 1.0
-        shared = concat([log_context, n, n_log_radius], axis=0) @ of_context
-        operating = concat([readings["slip"], readings["load"]], axis=0)
-        log_operating = log(maximum(operating, SMALLEST)).reshape(2, -1)
+        shared = of_context.T @ concat([log_context, n, n_log_radius], axis=0).reshape(-1, 1)
+        operating = stack_rows([readings["slip"], readings["load"]])
+        log_operating = log(maximum(operating, SMALLEST))
         of_operating = np.asarray([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0]])
         torque, torque_slope = add_log_torque(readings, radius)
-        features = gemm(log_operating, of_operating, shared, transpose_a=True)
+        features = gemm(constant(graph, of_operating.T), log_operating, shared)
         target_scale = concat([readings[scales[0]], one, readings[scales[1]]], axis=0)
         return ContextValues(
             features=features,

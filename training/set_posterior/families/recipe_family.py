@@ -24,7 +24,7 @@ from soilml.onboard.set_contract import (
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from training.onnx_graph.value import Value, asinh, concat, constant, log, maximum, sqrt
+from training.onnx_graph.value import Value, asinh, log, maximum, sqrt, stack_rows
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.run_patterns import run_patterns
 from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
@@ -166,27 +166,25 @@ class RecipeFamily:
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
-        operating = concat([readings["slip"], readings["load"]], axis=0)
-        log_operating = log(maximum(operating, SMALLEST))
-        length = constant(operating.graph, 1.0)
-        torque, torque_slope = self._torque(readings, length)
+        operating = stack_rows([readings["slip"], readings["load"]])
+        torque, torque_slope = self._torque(readings)
         return ContextValues(
-            features=log_operating.reshape(2, -1).node("Transpose"),
+            features=log(maximum(operating, SMALLEST)),
             feature_slopes=np.eye(2),
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=0.0 if self.linear_torque else 1.0,
             usual_log_load=math.log(float(self.recipe.load.at(np.asarray(0.5)))),
             most_torque_noise=ANY_NOISE if self.linear_torque else MOST_RELATIVE_NOISE,
-            length=length,
-            target_scale=constant(operating.graph, np.ones((self.targets, 1))),
-            axis_std=constant(operating.graph, np.ones((len(self.axes), 1))),
+            length=1.0,
+            target_scale=None,
+            axis_std=None,
         )
 
-    def _torque(self, readings: dict[str, Value], length: Value) -> tuple[Value, Value]:
-        """Torque on the scale of the response, and the derivative of that scale, (rows,)."""
+    def _torque(self, readings: dict[str, Value]) -> tuple[Value, Value]:
+        """Torque on the scale of the response, and the derivative of that scale, (1, rows)."""
         if not self.linear_torque:
-            return add_log_torque(readings, length)
+            return add_log_torque(readings, 1.0)
         torque, twice = readings["torque"], 2.0 * self.linear_torque
         response = asinh(torque / twice)
         return response, 1.0 / sqrt(torque * torque + 4.0 * self.linear_torque**2)

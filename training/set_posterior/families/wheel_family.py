@@ -33,16 +33,16 @@ MOST_LOG_CORRECTION = 0.02
 class ContextValues:
     """Graph values that a family computes from its inputs, float32."""
 
-    features: Value  # (rows, f) inputs of the response surface
+    features: Value  # (f, rows) inputs of the response surface
     feature_slopes: Floats  # (2, f) derivatives of the features by log slip and log load
-    torque: Value  # (rows,) the torque reading on the scale of the response
-    torque_slope: Value  # (rows,) derivative of that scale by torque, 1 / (N m)
+    torque: Value  # (1, rows) the torque reading on the scale of the response
+    torque_slope: Value  # (1, rows) derivative of that scale by torque, 1 / (N m)
     torque_by_load: float  # derivative of the torque scale by log load, with its sign changed
     usual_log_load: float  # from which changes with the logarithm of load are counted
     most_torque_noise: float  # readings with more noise on that scale are left out
-    length: Value  # unit of sinkage, and of torque over load, m
-    target_scale: Value  # (q, 1) factors of the values of the estimated axes
-    axis_std: Value  # (p, 1) standard deviation of nearly known coordinates, 1 for all others
+    length: Value | float  # unit of sinkage, and of torque over load, m
+    target_scale: Value | None  # (q, 1) factors of the values of the estimated axes; None: 1
+    axis_std: Value | None  # (p, 1) std of nearly known coordinates, 1 for others; None: no such
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,8 @@ class SimulatedSets:
         )
 
 
-def add_log_torque(readings: dict[str, Value], length: Value) -> tuple[Value, Value]:
-    r"""Logarithm of torque over load and length (rows,), and its derivative by torque.
+def add_log_torque(readings: dict[str, Value], length: Value | float) -> tuple[Value, Value]:
+    r"""Logarithm of torque over load and length (1, rows), and its derivative by torque.
 
     .. math:: y = \log \frac{T}{W r} + \min\left(\tfrac12 \left(\sigma / T\right)^2, 0.02\right),
         \qquad \frac{dy}{dT} = \frac1T
@@ -188,7 +188,7 @@ class WheelFamily(Protocol):
         ...
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
-        """Add nodes that compute the context from readings (rows,) and from `inputs`."""
+        """Add nodes that compute the context from readings (1, rows) and from `inputs`."""
         ...
 
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:

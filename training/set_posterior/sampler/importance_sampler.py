@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.onnx_graph.cholesky import cholesky_columns
+from training.onnx_graph.shortcut import shortcut
 from training.onnx_graph.value import (
     Value,
     concat,
@@ -34,6 +37,7 @@ from training.set_posterior.sampler.polynomial_residuals import (
     NearlyKnown,
     PolynomialResiduals,
     gauss_newton,
+    within_box,
 )
 from training.set_posterior.sampler.proposals import (
     ProposalDraws,
@@ -41,6 +45,8 @@ from training.set_posterior.sampler.proposals import (
     prior_draws,
     sample_sizes,
 )
+
+Floats = NDArray[np.float64]
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.
@@ -127,18 +133,21 @@ def add_importance_sampler(
     bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
     unbounded = constant(graph, np.arctanh(bounded))
     rounds, count = [current], sizes.prior
-    one = constant(graph, np.ones(1))
-    variance = one
+    least = np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
+    variance = one = constant(graph, np.ones(1))
     samples = first_samples = _with_ones(unbounded, current, unknowns, count)
     for number in range(sizes.rounds):
-        moments = _moments(samples, rounds[-1].tempered_weights()[0])
+        moments = _moments(samples, rounds[-1].tempered_weights()[0], least)
         if number == sizes.rounds - 1:
             variance = excess_variance(least_misfit(rounds), consistency, family.targets)
             residuals = residuals.divided_by(sqrt(variance))
-            spread = softmax(rounds[0].misfit * -0.5 / variance, axis=1)
-            moments = where(variance > one, _moments(first_samples, spread), moments)
-        floored = moments + np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
-        proposal = cholesky_columns(floored, unknowns) @ draws.others
+            moments = shortcut(
+                variance <= 1.0,
+                lambda found, *_: found,
+                partial(_moments_of_likelihood, least=least),
+                *(moments, first_samples, rounds[0].misfit, variance),
+            )
+        proposal = cholesky_columns(moments, unknowns) @ draws.others
         unbounded, current = _adapted_round(family, residuals, proposal, draws)
         rounds.append(current)
         samples = _with_ones(unbounded, current, unknowns, sizes.adapted)
@@ -157,9 +166,17 @@ def _with_ones(unbounded: Value, current: WeightedRound, unknowns: int, count: i
     return concat([ones, unbounded, solved], axis=0)
 
 
-def _moments(samples: Value, weights: Value) -> Value:
-    """Second moments (1 + p, 1 + p) of weighted samples."""
-    return gemm(samples * weights, samples, transpose_b=True)
+def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
+    """Second moments (1 + p, 1 + p) of weighted samples, with their least variances added."""
+    return gemm(samples * weights, samples, floor, transpose_b=True)
+
+
+def _moments_of_likelihood(
+    moments: Value, samples: Value, misfit: Value, variance: Value, least: Floats
+) -> Value:
+    """Moments of samples with this misfit, if the noise has to be enlarged by a variance."""
+    enlarged = _moments(samples, softmax(misfit * -0.5 / variance, axis=1), least)
+    return where(variance > 1.0, enlarged, moments)
 
 
 def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:
@@ -201,10 +218,11 @@ def _prior_round(
 ) -> WeightedRound:
     """The round whose other coordinates are draws of the prior."""
     residual, slope = residuals.at_fixed_points(draws.others)
-    others = constant(residual.graph, draws.others[:-1])
+    ones = np.ones((1, len(draws.t)))
+    others = constant(residual.graph, np.concatenate([ones, draws.others[:-1]]))
     mode, precision = gauss_newton(constant(residual.graph, 0.0), residual, slope)
     for _ in range(PRIOR_STEPS - 1):
-        mode, precision = residuals.step(others, mode, len(draws.t))
+        mode, precision = residuals.step(concat([others, mode], axis=0), mode)
     return sample_round(residuals, family.axes, others, (mode, precision), draws)
 
 
@@ -222,9 +240,11 @@ def _adapted_round(
     `proposal` (1 + p, n) has 1, the unbounded coordinates, and the solved one by linear regression.
     """
     _, unbounded, mode = proposal.split([1, len(residuals.order) - 1, 1], axis=0)
-    others = tanh(unbounded)
-    log_jacobian = log(maximum(1.0 - others * others, 1.0 - LARGEST_TANH**2))
+    bounded = tanh(unbounded)
+    log_jacobian = log(maximum(1.0 - bounded * bounded, 1.0 - LARGEST_TANH**2))
+    ones = constant(bounded.graph, np.ones((1, len(draws.t))))
+    others = concat([ones, bounded], axis=0)
     for _ in range(ADAPTED_STEPS):
-        mode, precision = residuals.step(others, mode, len(draws.t))
+        mode, precision = residuals.step(concat([others, within_box(mode)], axis=0), mode)
     solved = (mode, precision)
     return unbounded, sample_round(residuals, family.axes, others, solved, draws, log_jacobian)

@@ -8,6 +8,7 @@ import numpy as np
 
 from training.onnx_graph.value import (
     Value,
+    absolute,
     concat,
     constant,
     floor,
@@ -80,7 +81,7 @@ def sample_round(
     axes : tuple of Coordinate
         The axes of the family, whose `tilt` is the lambda of their prior.
     others : Value
-        The other coordinates (p - 1, n).
+        1, and the other coordinates, within the box (p, n).
     solved : tuple of Value
         Mode and precision of the solved coordinate given the others, (1, n) each.
     draws : ProposalDraws
@@ -89,13 +90,12 @@ def sample_round(
         log(1 - x_i^2) of the other coordinates (p - 1, n).
     """
     mode, precision = solved
-    ones = constant(mode.graph, np.ones((1, len(draws.t))))
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
-    unlimited = concat([ones, others, proposed], axis=0)
-    points = within_box(unlimited)
+    inside = within_box(proposed)
+    points = concat([others, inside], axis=0)
     basis = residuals.basis(points)
     misfit = residuals.squared_norm(basis)
-    distance = (unlimited - points).reduce("ReduceL1", axis=0, keepdims=True)
+    distance = absolute(proposed - inside)
     # one matrix product adds up the parts of the log weight, with these coefficients
     parts = [
         (points, [0.0, *[axes[i].tilt for i in residuals.order]]),

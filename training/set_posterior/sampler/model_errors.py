@@ -8,12 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
-from training.onnx_graph.value import Value, concat, exp, log, maximum
+from training.onnx_graph.shortcut import shortcut
+from training.onnx_graph.value import (
+    Value,
+    concat,
+    exp,
+    gemm,
+    log,
+    maximum,
+    stack_rows,
+)
 from training.set_posterior.families.coordinates import Coordinate
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response
-from training.set_posterior.response_values import SoilValues
 
 #: The unknown that is a strength, beside the bearing modulus.
 COHESION = "cohesion"
@@ -21,59 +29,7 @@ COHESION = "cohesion"
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """Changes of the residuals with errors of the model, before weights."""
-
-    terms: Terms
-    cohesion: tuple[int, Coordinate] | None  # number of its axis, from 1, and the axis
-    profile: Value  # (1, rows, 3) log bearing modulus for one standard deviation of its errors
-    torque_change: Value  # (channels, rows, 1) of the torque's scale with the logarithm of torque
-    contact: SoilValues | None
-    contact_std: Value  # (1,)
-    scales: Value  # (channels, 1, 2) errors of sinkage and drawbar pull
-
-    def columns_at(self, load_slopes: Value, coefficients: Value, basis: Value) -> Value:
-        r"""Columns (channels, rows, errors) at a soil, in the order of `MODEL_ERROR_COLUMNS`.
-
-        Changes with the bearing modulus k follow from those with load W and cohesion c. On a soil
-        that is stronger by some factor, under a load that is larger by the same factor, T / W,
-        sinkage and P / W are what they were, for every law of stress in which strength is c, k or a
-        multiple of them:
-
-        .. math:: \frac{\partial f}{\partial \ln k} =
-            - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
-
-        A scale of torque without load changes with the logarithm of torque itself in addition.
-
-        Parameters
-        ----------
-        load_slopes : Value
-            Derivatives of the channels by log load (channels, rows, 1), at the same soil.
-        coefficients : Value
-            Coefficients of the channels (channels, rows, terms).
-        basis : Value
-            Monomials (terms, 1) of the soil.
-        """
-        change = self.torque_change - load_slopes
-        if self.cohesion is not None:
-            change = change - coefficients @ _by_log_value(basis, self.terms, *self.cohesion)
-        columns = [change * self.profile]
-        if self.contact is not None:
-            contact = (self.contact.at(basis) * self.contact_std).node("Transpose")
-            columns.append(contact.reshape(len(RESPONSE_CHANNELS), -1, 1))
-        else:
-            columns.append(change * 0.0)
-        columns.append(change * 0.0 + self.scales)
-        return concat(columns, axis=2)
-
-
-def add_model_errors(
-    family: WheelFamily,
-    response: Response,
-    context: ContextValues,
-    readings: Mapping[str, Value],
-    slope: Value,
-) -> ModelErrors:
-    """How residuals change with the errors of the model.
+    """Changes of the residuals with errors of the model, before weights.
 
     Parameters
     ----------
@@ -86,32 +42,88 @@ def add_model_errors(
     slope : Value
         Derivatives of the channels' scales by the readings, (channels, rows).
     """
-    stds, size = family.model_errors(), readings[MODEL_ERROR_INPUT]
-    slip, load = readings["slip"], readings["load"]
-    log_load = log(maximum(load, SMALLEST)) - context.usual_log_load
-    bearing = [
-        slip * 0.0 + stds["bearing"],
-        slip * stds["bearing_by_slip"],
-        log_load * stds["bearing_by_load"],
-    ]
-    profile = concat([part * size for part in bearing], axis=0).reshape(1, 3, -1)
-    of_torque = np.zeros((len(RESPONSE_CHANNELS), 1))
-    of_torque[0] = 1.0 - context.torque_by_load
-    scales = np.zeros((len(RESPONSE_CHANNELS), 1, 2))
-    scales[1, 0, 0], scales[2, 0, 1] = stds["sinkage"], stds["drawbar_pull"]
-    names = [axis.name for axis in family.axes]
-    known = COHESION in names
-    axis = names.index(COHESION) if known else 0
-    assert len(MODEL_ERROR_COLUMNS) == len(bearing) + 1 + scales.shape[-1]
-    return ModelErrors(
-        response.terms,
-        (axis + 1, family.axes[axis]) if known else None,
-        profile.node("Transpose", perm=[0, 2, 1]),
-        (slope * readings["torque"] * of_torque).reshape(len(RESPONSE_CHANNELS), -1, 1),
-        None if response.contact is None else response.contact.add_at_soil(context.features),
-        size * stds["contact"],
-        size.reshape(1, 1, 1) * scales,
-    )
+
+    family: WheelFamily
+    response: Response
+    context: ContextValues
+    readings: Mapping[str, Value]
+    slope: Value
+
+    def columns_at(self, slopes: Value, coefficients: Value, basis: Value) -> Value:
+        r"""Columns (errors, readings) at a soil, in the order of `MODEL_ERROR_COLUMNS`.
+
+        Changes with the bearing modulus k follow from those with load W and cohesion c. On a soil
+        that is stronger by some factor, under a load that is larger by the same factor, T / W,
+        sinkage and P / W are what they were, for every law of stress in which strength is c, k or a
+        multiple of them:
+
+        .. math:: \frac{\partial f}{\partial \ln k} =
+            - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
+
+        A scale of torque without load changes with the logarithm of torque itself in addition.
+        They are zero where the model is right, and then not computed.
+
+        Parameters
+        ----------
+        slopes : Value
+            Derivatives of the channels by log slip and log load, at the same soil,
+            (2, channels, rows).
+        coefficients : Value
+            Coefficients of the channels (terms, readings).
+        basis : Value
+            Monomials (terms, 1) of the soil.
+        """
+        size, errors = self.readings[MODEL_ERROR_INPUT], len(MODEL_ERROR_COLUMNS)
+        row = coefficients.split([1, len(self.response.terms) - 1], axis=0)[0]
+        return shortcut(
+            size <= 0.0,
+            lambda _, first, *others: first * np.zeros((errors, 1)),
+            self._columns,
+            size,
+            row,
+            *(slopes, coefficients, basis, self.slope, self.context.features),
+            *(self.readings[name] for name in ("slip", "load", "torque")),
+        )
+
+    def _columns(
+        self,
+        size: Value,
+        _: Value,
+        slopes: Value,
+        coefficients: Value,
+        basis: Value,
+        slope: Value,
+        features: Value,
+        *readings: Value,
+    ) -> Value:
+        """The columns of a model that has errors."""
+        stds, channels = self.family.model_errors(), len(RESPONSE_CHANNELS)
+        slip, load, torque = readings
+        log_load = log(maximum(load, SMALLEST)) - self.context.usual_log_load
+        bearing = [
+            slip * 0.0 + stds["bearing"],
+            slip * stds["bearing_by_slip"],
+            log_load * stds["bearing_by_load"],
+        ]
+        profile = stack_rows(bearing).reshape(3, 1, -1)
+        of_torque = np.zeros((channels, 1))
+        of_torque[0] = 1.0 - self.context.torque_by_load
+        change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
+        names = [axis.name for axis in self.family.axes]
+        if COHESION in names:
+            number = names.index(COHESION)
+            by_log = _by_log_value(basis, self.response.terms, number + 1, self.family.axes[number])
+            of_cohesion = gemm(by_log, coefficients, transpose_a=True)
+            change = change - of_cohesion.reshape(1, channels, -1)
+        none = change * 0.0
+        contact = none
+        if self.response.contact is not None:
+            at_soil = self.response.contact.add_at_soil(features).at(basis)
+            contact = at_soil.reshape(1, channels, -1) * stds["contact"]
+        scales = np.zeros((2, channels, 1))
+        scales[0, 1], scales[1, 2] = stds["sinkage"], stds["drawbar_pull"]
+        columns = concat([change * profile, contact, none + scales], axis=0) * size
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
 
 
 def _by_log_value(basis: Value, terms: Terms, number: int, axis: Coordinate) -> Value:

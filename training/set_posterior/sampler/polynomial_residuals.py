@@ -32,7 +32,8 @@ class PolynomialResiduals:
     """
 
     system: Value  # A, (m, terms)
-    with_derivative: Value  # A, and A D of the derivative along the solved axis, (2, m, terms)
+    slope: Value  # of the derivative along the solved axis, (m, fewer terms)
+    slope_terms: tuple[int, ...]  # numbers of its terms
     terms: Terms
     order: tuple[int, ...]
 
@@ -53,30 +54,33 @@ class PolynomialResiduals:
         names = [axis.name for axis in family.axes]
         solved = names.index("friction_angle") if "friction_angle" in names else 0
         order = (*(i for i in range(len(names)) if i != solved), solved)
-        slope = derivative(response.terms, solved + 1)
-        with_derivative = system @ np.stack([np.eye(len(slope)), slope])
-        return PolynomialResiduals(system, with_derivative, response.terms, order)
+        # each monomial's derivative is a multiple of one other monomial
+        rows, columns = np.nonzero(derivative(response.terms, solved + 1))
+        powers = derivative(response.terms, solved + 1)[rows, columns]
+        slope = system.take(rows.tolist(), axis=1) * powers
+        return PolynomialResiduals(system, slope, tuple(columns.tolist()), response.terms, order)
 
     def divided_by(self, std: Value) -> PolynomialResiduals:
         """The same residuals for noise whose standard deviation is larger by a factor (1,)."""
-        return replace(self, system=self.system / std, with_derivative=self.with_derivative / std)
+        return replace(self, system=self.system / std, slope=self.slope / std)
 
     def squared_norm(self, basis: Value) -> Value:
         """The misfit |A b|^2 (1, n), which is -2 log likelihood up to a constant."""
         return (self.system @ basis).sum_of_squares(axis=0, keepdims=True)
 
     def at_fixed_points(self, points: Floats) -> tuple[Value, Value]:
-        """Residuals and their derivative (1, m, n) at fixed coordinates (p, n), in this order."""
-        basis = monomials(points[np.argsort(self.order)].T, self.terms)
-        residual, slope = (self.with_derivative @ basis.T).split(2, axis=0)
-        return residual, slope
+        """Residuals and their derivative (m, n) at fixed coordinates (p, n), in this order."""
+        basis = monomials(points[np.argsort(self.order)].T, self.terms).T
+        return self.system @ basis, self.slope @ basis[list(self.slope_terms)]
 
-    def step(self, others: Value, solved: Value, count: int) -> tuple[Value, Value]:
-        """The solved coordinate after a Gauss-Newton step, and its precision, (1, n) each."""
-        ones = constant(solved.graph, np.ones((1, count)))
-        points = within_box(concat([ones, others, solved], axis=0))
-        residual, slope = (self.with_derivative @ self.basis(points)).split(2, axis=0)
-        return gauss_newton(solved, residual, slope)
+    def step(self, points: Value, solved: Value) -> tuple[Value, Value]:
+        """The solved coordinate after a Gauss-Newton step, and its precision, (1, n) each.
+
+        `points` (1 + p, n) lie in the box; the last coordinate is the solved one.
+        """
+        basis = self.basis(points)
+        slope = self.slope @ basis.take(self.slope_terms, axis=0)
+        return gauss_newton(solved, self.system @ basis, slope)
 
     def basis(self, points: Value) -> Value:
         """Monomials (terms, n) at points (1 + p, n), as products of pairs of coordinates."""
@@ -97,7 +101,7 @@ def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, V
 
     .. math:: \kappa = |r'|^2 + \sigma_0^{-2}, \qquad s \leftarrow s - \frac{r^T r'}{\kappa}
 
-    with r the residuals and r' their derivative (1, m, n), and the damping :math:`\sigma_0`.
+    with r the residuals and r' their derivative (m, n), and the damping :math:`\sigma_0`.
     Steps stay within the box.
 
     Returns
@@ -105,8 +109,8 @@ def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, V
     tuple of Value
         The new s and the precision kappa of its conditional posterior, (1, n) each.
     """
-    precision = slope.sum_of_squares(axis=1, keepdims=False) + DAMPING_STD**-2
-    gradient = (residual * slope).sum(axis=1, keepdims=False)
+    precision = slope.sum_of_squares(axis=0, keepdims=True) + DAMPING_STD**-2
+    gradient = (residual * slope).sum(axis=0, keepdims=True)
     return within_box(solved - gradient / precision), precision
 
 
@@ -131,7 +135,7 @@ class NearlyKnown:
     def of(family: WheelFamily, response: Response, context: ContextValues) -> NearlyKnown | None:
         """Of a family; None where nothing is nearly known."""
         unknowns, free, terms = len(family.axes), family.free, response.terms
-        if free == unknowns:
+        if context.axis_std is None:
             return None
         powers = np.asarray(
             [[term.count(axis) for term in terms] for axis in range(1, unknowns + 1)]

@@ -52,12 +52,15 @@ def add_posterior_outputs(
     names = ("mean", "std", "low", "high")
     estimated = concat([mean, std, interval], axis=1)  # (q, 4)
     fallback = np.stack([prior[name] for name in names], axis=1)
-    chosen = where(enough, estimated, fallback) * context.target_scale
+    chosen, scale = where(enough, estimated, fallback), context.target_scale
+    if scale is not None:
+        chosen = chosen * scale
     for name, column in zip(names, chosen.split(4, axis=1), strict=True):
         column.reshape(q).named(f"{prefix}{SET_PREFIX}{name}")
-    scales = gemm(context.target_scale, context.target_scale, transpose_b=True)
     chosen = where(enough, covariance, np.diag(prior["std"] ** 2))
-    (chosen * scales).named(f"{prefix}{SET_PREFIX}covariance")
+    if scale is not None:
+        chosen = chosen * gemm(scale, scale, transpose_b=True)
+    chosen.named(f"{prefix}{SET_PREFIX}covariance")
     consistent.reshape(1).named(f"{prefix}{SET_PREFIX}in_range")
     _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]

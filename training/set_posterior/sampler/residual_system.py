@@ -7,13 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.onboard.set_contract import (
-    ERROR_COLUMNS,
     OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
-    SENSOR_ERROR_COLUMNS,
 )
-from training.onnx_graph.value import Value, absolute, concat, constant, gemm, log, maximum, sqrt
+from training.onnx_graph.value import (
+    Value,
+    absolute,
+    concat,
+    constant,
+    gemm,
+    log,
+    maximum,
+    sqrt,
+    stack_rows,
+)
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
@@ -22,11 +30,12 @@ from training.set_posterior.families.wheel_family import (
 )
 from training.set_posterior.response_surface import Response
 from training.set_posterior.response_values import ResponseValues
-from training.set_posterior.sampler.model_errors import ModelErrors, add_model_errors
+from training.set_posterior.sampler.model_errors import ModelErrors
 from training.set_posterior.sampler.sensor_errors import (
+    Operating,
     SensorErrors,
+    add_offsets,
     add_sensor_errors,
-    whiten_rows,
 )
 
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
@@ -46,12 +55,14 @@ class ResidualRows:
     A row of the system is (w a, w g): the coefficients a of a channel's polynomial less the
     reading, over the standard deviation 1 / w of the noise, and the changes g of that residual with
     one standard deviation of each error that all rows share, in the order of `ERROR_COLUMNS`.
+
+    Until the system is complete its columns are kept as rows (columns, readings), where a reading
+    is one channel of one row: so they are joined without a copy of each.
     """
 
-    terms: int
-    residuals: Value  # (channels, rows, terms) without weights
-    weight: Value  # (channels, rows, 1), 0 for readings that are left out
-    used: Value  # (channels * rows,) whether a reading takes part
+    fixed: Value  # (terms + offsets, readings) columns that are the same at all soils, unweighted
+    weight: Value  # (1, readings), 0 for readings that are left out
+    used: Value  # (readings,) whether a reading takes part
     values: ResponseValues  # the response surface at the rows, with slopes by log slip and load
     sensor_errors: SensorErrors
     model_errors: ModelErrors
@@ -74,16 +85,12 @@ class ResidualRows:
         """
         slopes = self.values.slopes_at(basis)
         common, of_row = self.sensor_errors.columns_at(slopes)
-        parts, columns = [self.residuals, common], self.terms + len(SENSOR_ERROR_COLUMNS)
+        parts = [self.fixed, common]
         if basis is not None:
-            load_slopes = slopes.take([1], axis=0).reshape(len(RESPONSE_CHANNELS), -1, 1)
-            coefficients = self.values.coefficients
-            parts.append(self.model_errors.columns_at(load_slopes, coefficients, basis))
-            columns = self.terms + len(ERROR_COLUMNS)
-        system = concat([*parts, of_row], axis=2) * self.weight
-        of_each = len(OPERATING_STD_INPUTS)
-        whitened = whiten_rows(system, columns + of_each, of_each)
-        return whitened.reshape(-1, columns).node("Compress", self.used, axis=0)
+            parts.append(self.model_errors.columns_at(slopes, self.values.coefficients, basis))
+        system = concat(parts, axis=0) * self.weight
+        whitened = self.sensor_errors.whitened(system, of_row * self.weight)
+        return whitened.node("Transpose").node("Compress", self.used, axis=0)
 
 
 def add_residual_rows(
@@ -98,73 +105,58 @@ def add_residual_rows(
     Readings out of range, or with too much noise for a logarithm, are left out.
     """
     context = family.add_context(readings)
-    in_range = _in_range(response, context.features)
-    one = constant(context.features.graph, 1.0)
+    operating, outside = _operating(readings), _outside(response, context.features)
+    within = _all_below(response, outside)  # (1, rows) float32
+    in_range = within.astype(np.bool_).reshape(-1)
+    one = constant(outside.graph, 1.0)
     sinkage = maximum(readings["sinkage"], SMALLEST)
     per_load = one / readings["load"]
     # derivatives of the three scales by torque, sinkage and drawbar pull
-    slope = _channel_rows([context.torque_slope, one / sinkage, per_load])
-    noise = _channel_rows([readings[f"{name}_std"] for name in RESPONSE_CHANNELS]) * slope
+    slope = stack_rows([context.torque_slope, one / sinkage, per_load])
+    noise = stack_rows([readings[f"{name}_std"] for name in RESPONSE_CHANNELS]) * slope
     log_sinkage = log(sinkage / context.length)
-    y = _channel_rows([context.torque, log_sinkage, readings["drawbar_pull"] * per_load])
+    y = stack_rows([context.torque, log_sinkage, readings["drawbar_pull"] * per_load])
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
-    used = (noise < most_noise) & in_range
-    used_float = used.astype(np.float32)
-    weight = used_float / sqrt(noise * noise + response.error[:, None] ** 2)
-    values = response.add_to(context.features, context.feature_slopes)
-    # -y is added to the constant term, the first
-    first = np.zeros(len(response.terms))
-    first[0] = 1.0
-    channels = len(RESPONSE_CHANNELS)
-    residuals = values.coefficients - y.reshape(channels, -1, 1) * first
+    used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
+    weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
+    values = response.add_to(context.features, y, context.feature_slopes)
+    # rows may be out of range by their noise: a slip at the end of the range is so half the time
+    margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
+    outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
     counts = [
-        used_float.sum().reshape(1),
+        used.sum().reshape(1),
         in_range.node("Shape").astype(np.float32),
-        _within_noise(response, context, readings).astype(np.float32).sum(),
+        _all_below(response, outside_noise).sum().reshape(1),
     ]
     return context, ResidualRows(
-        len(response.terms),
-        residuals,
-        weight.reshape(channels, -1, 1),
-        used.reshape(-1),
+        concat([values.coefficients, add_offsets(readings, slope)], axis=0),
+        weight.reshape(1, -1),
+        used.reshape(-1).astype(np.bool_),
         values,
-        add_sensor_errors(context, readings, slope, y),
-        add_model_errors(family, response, context, readings, slope),
+        add_sensor_errors(context, readings, operating, y),
+        ModelErrors(family, response, context, readings, slope),
         in_range,
         concat(counts, axis=0),
     )
 
 
-def _in_range(response: Response, features: Value, margin: Value | float = 0.0) -> Value:
-    """Whether features (rows, f) lie in the box of the designs of the response surface, (rows,).
+def _operating(readings: dict[str, Value]) -> Operating:
+    """Slip and load, and their noise."""
+    values = maximum(stack_rows([readings[name] for name in OPERATING_NOISE]), SMALLEST)
+    stds = stack_rows([readings[name] for name in OPERATING_STD_INPUTS])
+    return Operating(values, stds, stds / values)
 
-    Features that are not numbers, of a wheel without size, do not. The box is enlarged by a margin
-    (rows, f) on each side.
+
+def _outside(response: Response, features: Value) -> Value:
+    """Distances (f, rows) of features from the middle of the designs of the response surface."""
+    return absolute(features - 0.5 * (response.upper + response.lower)[:, None])
+
+
+def _all_below(response: Response, distance: Value) -> Value:
+    """1 where all distances (f, rows) are within the box of the designs, else 0, (1, rows).
+
+    Distances that are not numbers, of a wheel without size, are not.
     """
-    tolerance = BOX_TOLERANCE * (response.upper - response.lower)
-    middle = 0.5 * (response.upper + response.lower)
-    half_width = 0.5 * (response.upper - response.lower)
-    inside = absolute(features - middle) - margin <= half_width + tolerance
-    all_inside = inside.astype(np.int32).reduce("ReduceMin", axis=1, keepdims=False)
-    return all_inside.astype(np.bool_)
-
-
-def _within_noise(response: Response, context: ContextValues, readings: dict[str, Value]) -> Value:
-    """Whether rows are in range, or out of it by no more than the noise of slip and load, (rows,).
-
-    Readings of a slip at the end of the range are out of it in half of all cases.
-    """
-    noise = concat(
-        [
-            readings[std] / maximum(readings[name], SMALLEST)
-            for std, name in zip(OPERATING_STD_INPUTS, OPERATING_NOISE, strict=True)
-        ],
-        axis=0,
-    ).reshape(len(OPERATING_STD_INPUTS), -1)
-    margin = gemm(noise, NOISE_MARGIN * np.abs(context.feature_slopes), transpose_a=True)
-    return _in_range(response, context.features, margin)
-
-
-def _channel_rows(values: list[Value]) -> Value:
-    """Values (rows,) of each channel as the rows of a matrix (channels, rows)."""
-    return concat(values, axis=0).reshape(len(values), -1)
+    half_width = (0.5 + BOX_TOLERANCE) * (response.upper - response.lower)
+    inside = (distance <= half_width[:, None]).astype(np.float32)
+    return inside.reduce("ReduceMin", axis=0, keepdims=True)

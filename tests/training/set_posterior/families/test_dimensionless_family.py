@@ -61,8 +61,9 @@ def test_features_in_the_graph_are_those_of_the_training(any_posterior):
     inputs = {name: Value(graph, name) for name in names}
     family.add_context(inputs).features.node("Identity").named("features")
     shapes = {n: ["rows"] if n in sets.readings else [1] for n in names}
-    session = session_of(graph.model(shapes, {"features": (1, ["rows", 5])}))
+    session = session_of(graph.model(shapes, {"features": (1, [5, "rows"])}))
     feed = {n: v.astype(np.float32) for n, v in sets.rows(2).items()}
     feed |= {n: np.asarray([v], np.float32) for n, v in sets.context_of(2).items()}
     wanted = family.features(sets.origin.designs[2])
-    assert session.run(None, feed)[0] == pytest.approx(wanted, abs=2e-5)
+    (found,) = session.run(None, feed)
+    assert pytest.approx(wanted, abs=2e-5) == found.T

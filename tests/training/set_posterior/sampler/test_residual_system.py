@@ -65,10 +65,12 @@ def test_errors_of_a_row_are_integrated_out_of_its_channels_alone():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(3, 4, 5)), rng.normal(size=(3, 4, 2)), rng.normal(size=5)
     graph = Graph()
-    whiten_rows(Value(graph, "system"), 7, 2).named("out")
-    session = session_of(graph.model({"system": [3, "rows", 7]}, {"out": (1, [3, "rows", 5])}))
-    system = np.concatenate([a, g], axis=2).astype(np.float32)
-    found = session.run(None, {"system": system})[0] @ b
+    whiten_rows(Value(graph, "system"), Value(graph, "errors")).named("out")
+    shapes = {"system": [5, "readings"], "errors": [2, "readings"]}
+    session = session_of(graph.model(shapes, {"out": (1, [5, "readings"])}))
+    feed = {"system": a.reshape(12, 5).T, "errors": g.reshape(12, 2).T}
+    found = session.run(None, {name: value.astype(np.float32) for name, value in feed.items()})[0]
+    found = (b @ found).reshape(3, 4)
     for row in range(4):
         covariance = np.eye(3) + g[:, row] @ g[:, row].T
         own = a[:, row] @ b

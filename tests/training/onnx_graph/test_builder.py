@@ -1,0 +1,68 @@
+"""Graphs hold nothing twice and nothing that no output needs, and take shortcuts where they are."""
+
+import numpy as np
+import pytest
+
+from training.export.one_step import _without_branches
+from training.onnx_graph.builder import SHORTCUT, Graph, session_of
+from training.onnx_graph.shortcut import shortcut
+from training.onnx_graph.value import Value, constant, stack_rows
+
+
+def test_a_constant_and_a_node_are_added_once():
+    graph = Graph()
+    x = Value(graph, "x")
+    assert graph.constant(np.ones(3)) == graph.constant(np.ones(3))
+    assert graph.constant(np.ones(3)) != graph.constant(np.ones((3, 1)))
+    assert ((x + 2.0) * 3.0).name == ((x + 2.0) * 3.0).name
+    assert x.node("ReduceSum", keepdims=0).name != x.node("ReduceSum", keepdims=1).name
+
+
+def test_what_no_output_needs_is_left_out():
+    graph = Graph()
+    x = Value(graph, "x")
+    unused = constant(graph, np.arange(4.0)) * x
+    (x + 1.0).named("y")
+    model = graph.model({"x": [1]}, {"y": (1, [1])})
+    assert [node.op_type for node in model.graph.node] == ["Add"]
+    assert unused.name not in {node.output[0] for node in model.graph.node}
+    assert len(model.graph.initializer) == 1
+
+
+def test_parts_of_a_matrix_become_that_matrix_again():
+    graph = Graph()
+    matrix = Value(graph, "x")
+    parts = matrix.split(2, axis=0)
+    assert stack_rows(parts).name == "x"
+    assert stack_rows(parts[::-1]).name != "x"
+
+
+@pytest.fixture
+def model():
+    """y is x where the sum of x is not positive, else x + 2, within two branches."""
+    graph = Graph()
+    x = Value(graph, "x")
+
+    def general(inner: Value) -> Value:
+        return shortcut(inner.sum() <= 100.0, lambda v: v + 2.0, lambda v: v + 3.0, inner)
+
+    (shortcut(x.sum() <= 0.0, lambda v: v, general, x) * 1.5).named("y")
+    return graph.model({"x": [2]}, {"y": (1, [2])})
+
+
+@pytest.mark.parametrize("x", [(-1.0, 0.5), (1.0, 0.5), (99.0, 2.0)])
+def test_a_shortcut_is_taken_where_its_condition_is_true(model, x):
+    added = 0.0 if sum(x) <= 0.0 else 2.0 if sum(x) <= 100.0 else 3.0
+    found = session_of(model).run(None, {"x": np.asarray(x, np.float32)})[0]
+    assert found == pytest.approx(1.5 * (np.asarray(x) + added))
+
+
+def test_without_branches_the_general_way_is_left(model):
+    assert model.graph.node[2].doc_string == SHORTCUT
+    nodes, constants, renamed = _without_branches(model.graph.node)
+    assert "If" not in {node.op_type for node in nodes}
+    assert [node.op_type for node in nodes].count("Add") == 1
+    values = {one.name: one for one in constants}
+    (added,) = [node for node in nodes if node.op_type == "Add"]
+    assert np.frombuffer(values[added.input[1]].raw_data, np.float32) == 3.0
+    assert len(renamed) == 2
