@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults mutation bounds endurance release lock sbom licences audit-packages docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-browser check models limit kls1 gap-real bench bench-gap fuzz faults disk-faults mutation bounds endurance release lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -81,6 +81,9 @@ fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make 
 
 faults: $(VENV)/.ready ## kill commands at random moments and run them again: make faults FAULT_KILLS=200
 	@$(BIN)/python tests/faults/fault_run.py --kills $(or $(FAULT_KILLS),200)
+
+disk-faults: $(VENV)/.ready ## run commands on a disk that is full or read-only, as root
+	@$(BIN)/python tests/faults/disk_run.py
 
 mutation: $(VENV)/.ready ## change the source at random places and see whether a test fails: make mutation MUTANTS=12
 	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)

@@ -59,8 +59,7 @@ PARTS = (
     Part(
         "summary",
         "At a glance",
-        "The best of several calls in one run, on the machine named above. The sections below have "
-        "the details.",
+        "The best of several calls in one run, on the machine named above; details stand below.",
         lambda folder: summary.text(),
     ),
     Part(

@@ -107,6 +107,12 @@ def test_nothing_is_unpickled():
         assert not re.search(r"allow_pickle\s*=\s*True|\bpickle\.loads?\(", text), file
 
 
+def test_no_module_reads_the_time_of_day():
+    """A clock that jumps must change no result, no name of a file and no waiting time."""
+    reading = re.compile(r"\btime\.time\(|\bdatetime\.(now|today|utcnow)\(|\bdate\.today\(")
+    assert not [str(file) for file in FILES if reading.search(file.read_text())]
+
+
 def test_importing_soilml_loads_nothing_else():
     code = "import sys, soilml; print(*sorted(m for m in sys.modules if m.split('.')[0] in "
     code += "('numpy', 'scipy', 'torch', 'sklearn', 'onnxruntime', 'soilml')))"
