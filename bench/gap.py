@@ -28,8 +28,8 @@ from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
 #: Seed of the published sets, on which nothing was tuned; the method was tuned on sets of others
-#: (0, 1, 2, 3, 7).
-SEED = 4
+#: (0, 1, 2, 3, 4, 7).
+SEED = 5
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
