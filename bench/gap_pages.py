@@ -74,8 +74,8 @@ def _speed(sets: Sequence[Judged]) -> str:
         return ""
     return (
         f"; while the analyses ran, one core made {np.median(rates):,.0f} forward solutions of the "
-        "wheel in a second; the gates in seconds are for a faster machine, with which *At a glance* "
-        "compares this one"
+        "wheel in a second; the gates in seconds are for a faster machine, with which *At a "
+        "glance* compares this one"
     )
 
 
