@@ -10,6 +10,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from endurance_run import run_day
 
+from soilml.onboard.estimator import Estimator
+
+ROOT = Path(__file__).parents[2]
+
 #: Prints the resident memory of the later soils above that of the earlier ones, bytes, by medians.
 #: The halves are 1000 readings apart, whose memories alone are 18 MB. It is a process of its own:
 #: one that has run other tests takes from what they have left.
@@ -48,7 +52,8 @@ def growth(kind):
 
 def test_estimates_do_not_drift():
     result = run_day(steps=4000, per_soil=2000, seed=3)
-    assert len(set(result.bytes_of_memory)) == 1
+    columns = Estimator.load(ROOT / "exported" / "wheel.onnx").sets.columns
+    assert max(result.bytes_of_memory) <= 8 * columns**2 + 4 * 3  # a square system, and counts
     assert result.counts["refused"] == result.counts["not finite"] + result.counts["impossible"] > 0
     assert result.flagged == 0
     assert np.max(result.errors) < 5.0
