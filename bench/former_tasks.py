@@ -1,7 +1,8 @@
 """Seconds of a few tasks by the version of soilml whose root is the working folder, as JSON.
 
 Run by `former.py` in a process of its own for each version; only names that all versions have are
-used. The tasks that take less than a second are repeated, and the fastest counts.
+used. Tasks are repeated after a first call that does not count; the fastest counts, and on board
+the median.
 """
 
 from __future__ import annotations

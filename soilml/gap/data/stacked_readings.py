@@ -63,7 +63,7 @@ class StackedReadings:
         return np.asarray(self.at.load)[self.row]
 
     @property
-    def law_terms(self) -> tuple[Floats, Floats]:
+    def log_slip_and_load(self) -> tuple[Floats, Floats]:
         """Logarithms of slip and load, each (m,), whose coefficients are the shapes of laws.
 
         They are zero at the slip and load where the size of an effect is its parameter's value.

@@ -161,7 +161,7 @@ def shape_directions(problem: FitProblem, fit: GapFit) -> list[Floats]:
     ]
     if not signatures:
         return []
-    s, w = problem.readings.law_terms
+    s, w = problem.readings.log_slip_and_load
     s, w = s - s.mean(), w - w.mean()
     columns = np.stack(signatures, axis=1)
     return [columns * term[:, None] for term in (s * s, s * w, w * w)]
@@ -172,7 +172,7 @@ def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
     fit = candidate.catalogue_law.fit
     whiten = problem.discrepancy.whiten(candidate.catalogue_law.evidence.amplitude)
     signatures = fit.derivatives[:, len(problem.soil) :]
-    terms = (problem.readings.slip, *problem.readings.law_terms)
+    terms = (problem.readings.slip, *problem.readings.log_slip_and_load)
     columns = np.column_stack([signatures * term[:, None] for term in terms])
     projected = project_out(whiten @ columns, fit.jacobian)
     basis = column_space(projected, relative_tolerance=ROUNDING)

@@ -60,7 +60,7 @@ def free_law_gains(
     """
     whiten = problem.discrepancy.whiten(candidate.amplitude)
     fit = fit.whitened_by(whiten)
-    slip, load = problem.readings.law_terms
+    slip, load = problem.readings.log_slip_and_load
     gains = {}
     for s in signatures:
         columns = s.column[:, None] * np.column_stack([np.ones_like(slip), slip, load])

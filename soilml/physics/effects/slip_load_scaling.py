@@ -32,8 +32,8 @@ class SlipLoadScaling(Effect):
 
     All three exponents are zero unless they were fitted to data. The power describes effects that
     need slip (exponent near 1), the exponential those that saturate or grow steeply at high slip.
-    `law_terms` are the exponents that may be fitted: an effect of the gear alone does not depend on
-    slip.
+    `law_terms` are the exponents that may be fitted: the deflection of a wheel, for one, does not
+    depend on slip.
     """
 
     law_terms: ClassVar[tuple[str, ...]] = ("slip_power", "by_slip", "by_load")
