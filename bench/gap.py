@@ -27,9 +27,9 @@ from datagen.engines.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
-#: Seed of the published sets, on which nothing was tuned; the method was tuned on sets of others
-#: (0, 1, 2, 3, 4, 7).
-SEED = 5
+#: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
+#: (0, 1, 2, 3, 4, 5, 7).
+SEEDS = (6, 8)
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
@@ -38,7 +38,7 @@ def run() -> None:
     """Draw, analyse, judge, print; and write where that is asked for."""
     args = _arguments()
     if args.table:
-        sets = from_json(json.loads(Path(args.table).read_text()))
+        sets = [s for file in args.table for s in from_json(json.loads(Path(file).read_text()))]
     else:
         sets = _judge(_plans(args), args.jobs, args.keep)
     text = gap_pages.text(sets)
@@ -53,8 +53,9 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    own = " and ".join(map(str, SEEDS))
     parser.add_argument(
-        "--seed", type=int, default=SEED, help=f"{SEED}, the default, is the benchmark's own"
+        "--seed", type=int, nargs="+", default=SEEDS, help=f"the benchmark's own are {own}"
     )
     parser.add_argument(
         "--factorial", action="store_true", help="the 1593 sets without discrepancy instead"
@@ -64,15 +65,20 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--design", help="only sets of this design")
     parser.add_argument("--jobs", type=int, help="analyses at a time (default: cores)")
     parser.add_argument("--keep", metavar="FILE.json", help="write the record of every set")
-    parser.add_argument("--table", metavar="FILE.json", help="print the pages of kept records")
+    parser.add_argument(
+        "--table", nargs="+", metavar="FILE.json", help="print the pages of kept records"
+    )
     parser.add_argument("--write", action="store_true", help="write BENCHMARKS.md and its picture")
     return parser.parse_args()
 
 
 def _plans(args: argparse.Namespace) -> list[Plan]:
-    plans = plan_matrix(True, args.seed) if args.factorial else benchmark_plans(args.seed)
+    drawn = [
+        plan_matrix(True, seed) if args.factorial else benchmark_plans(seed) for seed in args.seed
+    ]
     return [
         plan
+        for plans in drawn
         for plan in plans[:: args.every]
         if args.tier in (None, plan.tier) and args.design in (None, plan.design)
     ]

@@ -47,6 +47,7 @@ from soilml.gap.verdict.decision import (
     with_refused_outside,
 )
 from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagree
+from soilml.gap.verdict.estimate_spread import among_candidates, by_undetected_effects
 from soilml.gap.verdict.remaining_discrepancy import (
     discrepancy_amplitudes,
     remaining_discrepancy,
@@ -233,6 +234,10 @@ def _build_report(
     alike = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     intervals = with_uncertain_discrepancy(problem, after)
     left = discrepancy_amplitudes(problem, after) if smooth_gap else None
+    if smooth_gap:
+        spread = among_candidates(intervals, result.candidates, result.posterior)
+    else:
+        spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
     report = GapReport(
         status=decision.status,
         sentence="",
@@ -244,12 +249,10 @@ def _build_report(
         reasons=reasons(decision, obstacles, conflicts or alike),
         gap=figures,
         soil_before=soil_estimates(result.soil),
-        soil_after=soil_estimates(
-            intervals, result.candidates if smooth_gap else (), result.posterior
-        ),
+        soil_after=soil_estimates(intervals, spread),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable={u.name: u.reason for u in result.untestable},
-        notes=(*checks.notes, *analysis_notes(analysis, after.fit, alike)),
+        notes=(*checks.notes, *analysis_notes(analysis, after.fit, shown.fit, alike)),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,

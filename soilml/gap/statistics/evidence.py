@@ -13,6 +13,7 @@ from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
 from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
 from soilml.gap.statistics.linearised_fit import LinearisedFit, ProcessDivisions
+from soilml.gap.statistics.prior_bounds import outside_bounds
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.numerics.prior import UNIFORM_PRECISION
 
@@ -132,6 +133,7 @@ class DiscrepancyModel:
         for size, own in zip(step[len(fit.x) :], precision[len(fit.x) :], strict=True):
             curvature, _, density = _size_prior(float(size), two_sided=False)
             value += density + float(np.log((own - WEAK_PRECISION + curvature) / own))
+        value += outside_bounds(fit, *problem.slope_and_curvature(amplitude))
         return Evidence(value, amplitude, step, expected)
 
 

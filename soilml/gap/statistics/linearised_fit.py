@@ -102,11 +102,20 @@ class LinearisedFit:
 
     def step_and_precision(self, amplitude: Floats) -> tuple[Floats, Floats]:
         """Step (p,) to the optimum at amplitudes (channels,), and marginal precisions (p,)."""
+        _, step, h = self._solve(self._product(amplitude)[None])
+        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
+
+    def slope_and_curvature(self, amplitude: Floats) -> tuple[Floats, Floats]:
+        """Gradient (p,) and curvature (p, p) of ln p at amplitudes (channels,), bounds ignored."""
+        p, product = len(self.pull), self._product(amplitude)
+        return product[:p, p] - self.pull, product[:p, :p] + np.diag(self.precision)
+
+    def _product(self, amplitude: Floats) -> Floats:
+        """Products (p + 1, p + 1) of Jacobian and residual under amplitudes (channels,)."""
         t = amplitude[self.divisions.channel]
         factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * self.divisions.gram * t)
         reduced = np.linalg.solve(factor, t[:, None] * self.cross)
-        _, step, h = self._solve((self.plain - reduced.T @ reduced)[None])
-        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
+        return np.asarray(self.plain - reduced.T @ reduced)
 
     def _solve(self, product: Floats) -> tuple[Floats, Floats, Floats]:
         """Evidence (b,) without ln|V|, steps (b, p) and curvature (b, p, p).

@@ -17,34 +17,24 @@ from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.score_test import score_test
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.statistics.smooth_basis import regions
+from soilml.gap.verdict.estimate_spread import EstimateSpread
 from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
 
 
-def soil_estimates(
-    fit: GapFit, candidates: Sequence[CandidateFit] = (), posterior: Posterior | None = None
-) -> dict[str, EstimatedValue]:
+def soil_estimates(fit: GapFit, spread: EstimateSpread | None = None) -> dict[str, EstimatedValue]:
     """The soil parameters of a fit, by name.
 
-    With `candidates`, each standard deviation includes the spread of their estimates about this
-    one, weighted by their posterior probabilities (Hoeting et al., Statist. Sci. 14(4), 1999,
-    section 1).
+    With `spread`, each standard deviation is that of the normal distribution whose 90 % interval
+    is as wide as the one over all explanations.
     """
     values, stds = fit.values(), fit.stds()
-    weights = [posterior.weight(c.names) if posterior else 0.0 for c in candidates]
-    total = max(sum(weights), 1e-300)
-    others = [c.fit.values() for c in candidates]
-
-    def spread(path: str) -> float:
-        squares = [(other[path] - values[path]) ** 2 for other in others]
-        return float(np.sqrt(np.dot(weights, squares) / total)) if squares else 0.0
-
+    if spread is not None:
+        stds = {path: spread.std(path, own) for path, own in stds.items()}
     return {
-        c.name: EstimatedValue(
-            values[c.path], float(np.hypot(stds[c.path], spread(c.path))), c.unit
-        )
+        c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
         for c in fit.coordinates
         if isinstance(c, SoilCoordinate)
     }

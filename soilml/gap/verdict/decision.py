@@ -25,6 +25,10 @@ MAX_SIZE_DEVIATION = 3.0
 #: Objective above that of the soil alone up to which an effect is suspected where runs cannot name
 #: a cause: tempered odds of 1 to 3, which the report states.
 SUSPECT_MARGIN = 4.0
+#: Amplitude of a remaining discrepancy, in usual ones, from which the model is wrong in a way that
+#: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
+#: cause is stated all the same: tempered odds of 1100 to 1.
+LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
 #: Why an explanation that the evidence supports is not claimed.
@@ -32,6 +36,10 @@ IMPLAUSIBLE_FAULT = "the fault of a sensor or of the rig would have to be implau
 OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
     "one that the catalogue lacks"
+)
+NOT_CATALOGUED = (
+    "a discrepancy of at least four times the usual error of a model is left in the {}, which no "
+    "effect of the catalogue explains"
 )
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
@@ -87,6 +95,8 @@ def decide(
         return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
     if _far_from_catalogue(best):
         return Decision("suspected", (), best, OTHER_LAW.format(" + ".join(best.names)))
+    if left := _large_remainder(problem, result, best):
+        return Decision("suspected", (), _first_suspect(result), NOT_CATALOGUED.format(left))
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:
@@ -94,6 +104,15 @@ def decide(
     if best.shape_supported and law_matters(problem, best):
         return Decision("form-open", accepted, best)
     return Decision("named", accepted, best)
+
+
+def _large_remainder(problem: FitProblem, result: SearchResult, best: CandidateFit) -> str:
+    """The channel with a large remainder beside an explanation of little evidence, or empty."""
+    none, worst = result.none, int(np.argmax(best.amplitude))
+    if none is None or none.objective >= best.objective + DECISIVE_GAIN:
+        return ""
+    name = problem.readings.channels[worst].replace("_", " ")
+    return name if best.amplitude[worst] >= LARGE_REMAINDER else ""
 
 
 def _likelier_than_none(result: SearchResult, margin: float = 0.0) -> bool:

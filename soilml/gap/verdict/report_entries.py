@@ -6,7 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate, predict_readings
+from soilml.gap.fitting.coordinates import (
+    EffectCoordinate,
+    FitCoordinate,
+    SoilCoordinate,
+    predict_readings,
+)
 from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.report_parts import (
     CandidateSummary,
@@ -19,11 +24,12 @@ from soilml.gap.search.iteration import Analysis
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import REJECTION_THRESHOLD
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.statistics.evidence import LARGEST_SIZE, Evidence
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.gap.statistics.repeats import overstated_noise_notes
 from soilml.gap.verdict.cross_validation import gap_reduction, held_out
 from soilml.quantities import column
+from soilml.report.numbers import format_quantity
 
 #: Outliers that a note lists by name.
 LISTED_OUTLIERS = 6
@@ -60,10 +66,13 @@ def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
     """The soil alone beside a smooth discrepancy, which model.toml has where nothing is claimed.
 
     At the largest amplitude that is tried, a discrepancy of any size is cheap, and the soil would
-    go wherever the rest looks smoothest; it then stays where noise and scatter alone put it.
+    go wherever the rest looks smoothest; it then stays where noise and scatter alone put it, as it
+    does where no gap was found.
     """
     problem, none = analysis.problem, analysis.result.none
-    if none is None or not none.amplitude.any():
+    if none is None:
+        return MarginalFit(analysis.result.soil, problem.discrepancy.evidence(analysis.result.soil))
+    if not none.amplitude.any():
         return soil_marginal(analysis)
     if none.amplitude.max() < AMPLITUDES[-1]:
         return none.best
@@ -127,10 +136,13 @@ def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
     return [*accepted, *rivals][:2] if accepted else rivals[:3]
 
 
-def analysis_notes(analysis: Analysis, after: GapFit, alike: Sequence[str]) -> list[str]:
-    """Notes on outliers, estimates at a bound, repeats, noise and run-to-run variation.
+def analysis_notes(
+    analysis: Analysis, after: GapFit, shown: GapFit, alike: Sequence[str]
+) -> list[str]:
+    """Notes on outliers, estimates at a bound, sizes, repeats, noise and run-to-run variation.
 
-    `after` is the fit that model.toml contains, `alike` says which repeats disagree.
+    `after` is the fit that model.toml contains, `shown` that of the explanation whose figures are
+    shown; `alike` says which repeats disagree.
     """
     readings = analysis.problem.readings
     components = analysis.problem.covariance.components
@@ -145,6 +157,7 @@ def analysis_notes(analysis: Analysis, after: GapFit, alike: Sequence[str]) -> l
         )
         notes.append(f"{many} excluded: {listed}")
     notes += _bound_notes(after.coordinates, after.x.tolist())
+    notes += size_notes(shown.coordinates, shown.x.tolist())
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
             notes.append(f"the noise of {column(name)} is {scale:.2g} times as large as declared")
@@ -173,6 +186,20 @@ def _bound_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> li
                 notes.append(f"{c.path} is at a bound of its prior")
         elif value > c.upper - AT_BOUND * (c.upper - c.lower):
             notes.append(f"{c.path} is at its upper bound")
+    return notes
+
+
+def size_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> list[str]:
+    """Notes on effects that would have to be far larger than they usually are."""
+    notes = []
+    for c, size in zip(coordinates, x, strict=True):
+        if isinstance(c, EffectCoordinate) and not c.is_shape and abs(size) > LARGEST_SIZE:
+            value, usual = c.prior.at(np.asarray([size, 1.0]))
+            notes.append(
+                f"{c.name} of {c.effect} would have to be {format_quantity(value, c.unit)}, "
+                f"{abs(size):.2g} times its usual size ({format_quantity(usual, c.unit)}): the gap "
+                "is of this kind, but the law of the catalogue does not explain how large it is"
+            )
     return notes
 
 

@@ -7,7 +7,7 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.braking_law import displacement_direction, displacement_slip
+from soilml.physics.gears.braking_law import displacement_direction
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.operating_point import Operating
 
@@ -55,7 +55,7 @@ class LinearWheel(RigidWheel):
         angle = xp.stack([leave, peak], axis=0)
         passed = entry - angle
         peak_depth = geometry.radius * (cos(peak) - cos(entry))
-        travelled = 1.0 - displacement_slip(at.slip, self.braking)
+        travelled = geometry.travelled(at.slip, self.braking)
         displacement = geometry.shear_radius * (passed - travelled * (sin(entry) - sin(angle)))
         return Contact(
             depth=xp.stack([xp.full_like(peak, SMALLEST_DEPTH), peak_depth], axis=0),

@@ -9,7 +9,7 @@ from typing import Annotated, final
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.gears.arc import entry_angle
-from soilml.physics.gears.braking_law import BrakingLaw, check_law
+from soilml.physics.gears.braking_law import BrakingLaw, check_law, displacement_slip
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils.soil import Soil
 from soilml.row_status import Status
@@ -33,6 +33,12 @@ class WheelArc:
     shear_radius: Real  # m, radius at which soil is sheared; larger than the rim's with lugs
     lever: Real  # m, lever arm of the shear stress about the axle
     width: Real  # m
+    #: radius by which the slip is reckoned, over the shear radius
+    travel: Real = 1.0
+
+    def travelled(self, slip: Array, law: BrakingLaw) -> Array:
+        """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""
+        return (1.0 - displacement_slip(slip, law)) * self.travel
 
 
 @dataclass(frozen=True, kw_only=True)

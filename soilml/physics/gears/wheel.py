@@ -13,7 +13,6 @@ from soilml.physics.gears.arc import differences_from_entry
 from soilml.physics.gears.braking_law import (
     BrakingLaw,
     displacement_direction,
-    displacement_slip,
 )
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.gears.shear_reversal import reversals
@@ -144,7 +143,7 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
     def points(value: Array) -> Array:
         return xp.reshape(value, (2 * count, -1))
 
-    travelled = 1.0 - displacement_slip(at.slip, law)
+    travelled = rim.travelled(at.slip, law)
     displacement = points(surface_travel - (shear_radius * travelled) * sin_difference)
     area = weight * (rim.radius * rim.width * length)[:, None, :]
     depth = rim.radius * cos_difference
@@ -173,7 +172,7 @@ def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) 
     nodes = crowded_ends(count)
     x, weight = columns(nodes, rim.entry)
     front, rear = rim.entry - rim.peak, rim.peak - rim.exit
-    travelled = 1.0 - displacement_slip(at.slip, law)
+    travelled = rim.travelled(at.slip, law)
     ends = xp.stack(_braking_part_ends(rim, 1.0 - travelled), axis=0)
     low, high = ends[:-1, :], ends[1:, :]  # (parts, batch)
     length, ratio = high - low, front / rear
@@ -264,7 +263,7 @@ def contact_at(
     xp = namespace(passed)
     sin_entry, cos_entry = xp.sin(rim.entry), xp.cos(rim.entry)
     sin_difference, cos_difference = differences_from_entry(sin_entry, cos_entry, passed)
-    travelled = 1.0 - displacement_slip(at.slip, law)
+    travelled = rim.travelled(at.slip, law)
     displacement = rim.shear_radius * (passed - travelled * sin_difference)
     area = rim.radius * rim.width * arc
     return Contact(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven
+from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap import gap
@@ -15,6 +15,7 @@ from soilml.gap.report_parts import GapReduction, Suspect
 from soilml.gap.results import GapReport
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.verdict.decision import decide, unclaimed_effects
+from soilml.gap.verdict.report_entries import size_notes
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 
@@ -167,3 +168,53 @@ def test_figures_are_those_of_the_suspect_that_is_listed_first():
         gap={"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")},
     )
     assert "With a, mean squared residual 8.80 -> 1.0" in verdict_sentence(report, ())
+
+
+@pytest.mark.parametrize(("height", "said"), [(0.08, True), (0.02, False)])
+def test_lugs_that_would_have_to_be_far_larger_than_lugs_are_remarked_on(height, said):
+    case = case_of()
+    problem = fit_problem(case, driven(case, [EFFECTS["grousers"](height=height)], noise=0.0))
+    coordinates = [*problem.soil, *problem.size_coordinates(["grousers"])]
+    fit = problem.fit(problem.with_effects(["grousers"]), coordinates, {})
+    notes = size_notes(fit.coordinates, fit.x.tolist())
+    expected = (
+        "height of grousers would have to be 80.0 mm, 8 times its usual size (10.0 mm): the gap is "
+        "of this kind, but the law of the catalogue does not explain how large it is"
+    )
+    assert [n.replace("\N{NO-BREAK SPACE}", " ") for n in notes] == [expected] * said
+
+
+def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
+    """Four times the usual error of a model is left: the catalogue lacks something."""
+
+    def candidate(names, objective, amplitude):
+        fit = SimpleNamespace(x=np.zeros(0), precision=np.zeros(0), coordinates=())
+        return SimpleNamespace(
+            names=names,
+            objective=objective,
+            amplitude=np.asarray([0.0, amplitude]),
+            fit=fit,
+            shape_deviation=0.0,
+            shape_supported=False,
+        )
+
+    problem = SimpleNamespace(readings=SimpleNamespace(channels=("torque", "drawbar_pull")))
+
+    def status(gain, amplitude):
+        best, none = candidate(("a",), -gain, amplitude), candidate((), 0.0, 25.0)
+        found = Posterior({("a",): -0.01, (): -5.0})
+        result = SimpleNamespace(
+            has_gap=True,
+            adequate=False,
+            none=none,
+            likeliest=best,
+            accepted=(best,),
+            candidates=(best, none),
+            posterior=found,
+        )
+        decision = decide(problem, result, (), ())
+        return decision.status, "drawbar pull" in decision.reason
+
+    assert status(20.0, 4.0) == ("suspected", True)
+    assert status(20.0, 2.5) == ("partly-named", False)
+    assert status(30.0, 4.0) == ("partly-named", False)

@@ -11,6 +11,7 @@ from soilml.gap.search.problem import StartedFit, fit_many
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.gap.statistics.evidence import LARGEST_SIZE, _size_prior
+from soilml.gap.statistics.prior_bounds import outside_bounds
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 
@@ -57,9 +58,11 @@ def test_the_evidence_is_that_of_dense_algebra(problem, soil):
         residual = soil.reading - soil.prediction
         h = soil.derivatives.T @ inverse @ soil.derivatives + UNIFORM_PRECISION * np.eye(3)
         inside = (soil.x > 0.0) & (soil.x < 1.0)  # coordinates at a bound stay there
-        gradient = (soil.derivatives.T @ inverse @ residual)[inside]
+        slope = soil.derivatives.T @ inverse @ residual
+        gradient = slope[inside]
         step = np.linalg.solve(h[np.ix_(inside, inside)], gradient)
         value = residual @ inverse @ residual - gradient @ step
+        value += outside_bounds(soil, slope, h)
         value += np.linalg.slogdet(matrix)[1] - np.linalg.slogdet(base)[1]
         return value + np.linalg.slogdet(h)[1] + amplitude_penalty(amplitude[None, :])[0]
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Model, Operating, Wheel, soil
+from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
 from soilml.physics.contact import Contact, Stress, stress
 from soilml.physics.effects.soil.sidewall_shear import buried
 from soilml.physics.load_case import LoadCase
@@ -58,6 +58,20 @@ def test_bulldozing_costs_drawbar_pull_alone_and_as_its_formula_says():
     z, b = plain.sinkage, 0.12
     expected = b * (0.67 * SAND.cohesion * z * k_c + 0.5 * z**2 * SAND.unit_weight * k_gamma)
     np.testing.assert_allclose(plain.drawbar_pull - force.drawbar_pull, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("gear", [GEAR, LinearWheel(radius=0.15, width=0.12)])
+@pytest.mark.parametrize("slip", [0.2, 0.0, -0.03, -0.4])
+def test_the_slip_of_a_lugged_rim_is_converted_to_that_of_the_shear_radius(gear, slip):
+    ground = replace(SAND, a1=0.0)  # the maximum stress does not move with slip
+    ratio = 0.15 / (0.15 + 0.5 * 0.01)
+    lugs = EFFECTS["grousers"](height=0.01, shearing=0.5)
+    of_rim = (Model(gear) + replace(lugs, rim_slip=1.0))(ground, Operating(slip=slip, load=60.0))
+    # v / (r omega) = 1 - s while driving and 1 / (1 + s) while braking
+    travel = ratio * (1 - slip if slip >= 0 else 1 / (1 + slip))
+    converted = 1 - travel if travel <= 1 else 1 / travel - 1
+    of_lugs = (Model(gear) + lugs)(ground, Operating(slip=converted, load=60.0))
+    same(of_rim, of_lugs)
 
 
 def test_lugs_move_the_shearing_radius():
