@@ -69,7 +69,10 @@ def with_warnings(
         )
     if undeclared:
         names = ", ".join(column(c.name) for c in data.channels if not c.declared)
-        texts.append(f"noise of {names} is not declared: estimated from the residuals")
+        texts.append(
+            f"noise of {names} is not declared: estimated from the residuals; declare it in "
+            f'[noise] as {names.split(", ")[0]} = "2 %" or in its unit'
+        )
     texts += [
         f"{name} is not used: its noise is not declared in [noise]"
         for name in data.excluded_channels

@@ -220,7 +220,7 @@ def test_noise_that_nobody_declared_is_bad_data_with_a_hint(inputs, tmp_path, ca
     files = (str(inputs / "quiet.toml"), str(inputs / "runs.csv"))
     found = analysed(inputs, tmp_path, capsys, *files)
     assert found["status"] == "bad-data"
-    assert "give [noise] torque_Nm, or torque_Nm_std" in found["reasons"][0]
+    assert 'give [noise] torque_Nm, as in torque_Nm = "2 %"' in found["reasons"][0]
 
 
 def heavy(inputs, tmp_path):

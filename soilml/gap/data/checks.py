@@ -87,7 +87,7 @@ def _check_channels(data: CheckedData) -> Iterator[Finding]:
             yield (
                 Severity.ERROR,
                 f"the noise of {key} is not declared and there are no repeated rows to estimate "
-                f"it from: give [noise] {key}, or {key}_std",
+                f'it from: give [noise] {key}, as in {key} = "2 %", or a column {key}_std',
             )
         values = readings.reading[in_channel]
         largest = float(np.abs(values).max(initial=0.0))

@@ -29,6 +29,11 @@ ODD_RATIO, ODD_PRESSURE = 6.0, 500.0
 LISTED = 4
 
 
+def _kpa(stress: float) -> str:
+    """A stress in Pa as a number in kPa."""
+    return f"{1e-3 * stress:.3g}"
+
+
 def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
     """Remarks on plate tests."""
     largest = max(float(test.pressure.max()) for test in fit.tests)
@@ -40,8 +45,8 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
     for size in fit.sizes[:LISTED]:
         p = fit.pressure_at_depth(size)
         yield (
-            f"at {fit.depth:.3g} m the plate of {size:.3g} m has a pressure of {p.value:.3g} Pa, "
-            f"{p.place_range[0]:.3g} to {p.place_range[1]:.3g} at another place"
+            f"at {fit.depth:.3g} m the plate of {size:.3g} m has a pressure of {_kpa(p.value)} "
+            f"kPa, {_kpa(p.place_range[0])} to {_kpa(p.place_range[1])} at another place"
         )
     depths = [float(test.sinkage[-1]) for test in fit.tests]
     yield (
@@ -104,8 +109,8 @@ def shear_remarks(fit: ShearFit) -> Iterator[str]:
         )
     if fit.cohesion is None:
         yield (
-            f"one normal stress ({fit.stresses[0]:.4g} Pa): cohesion and friction angle cannot be "
-            f"told apart, only c + sigma tan(phi) = {fit.strength.value:.4g} Pa there"
+            f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle cannot "
+            f"be told apart, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there"
         )
     elif fit.cohesion.value == 0.0:
         yield "the failure line meets the axis below zero: cohesion is set to zero"
@@ -114,8 +119,8 @@ def shear_remarks(fit: ShearFit) -> Iterator[str]:
         (c0, phi0), (c1, phi1) = fit.halves
         yield (
             "the failure line is curved: cohesion and friction angle depend on the normal stress, "
-            f"c = {c0:.0f} Pa and phi = {math.degrees(phi0):.1f} deg in the lighter half of the "
-            f"tests, {c1:.0f} Pa and {math.degrees(phi1):.1f} deg in the heavier; the ranges "
+            f"c = {_kpa(c0)} kPa and phi = {math.degrees(phi0):.1f} deg in the lighter half of the "
+            f"tests, {_kpa(c1)} kPa and {math.degrees(phi1):.1f} deg in the heavier; the ranges "
             "contain both"
         )
     if fit.modulus_trend:
@@ -139,7 +144,7 @@ def _repeats_of_shear(fit: ShearFit) -> Iterator[str]:
         near = strength[is_level(sigma, level)]
         if near.size > 1:
             yield (
-                f"{near.size} tests at {level:.4g} Pa differ by a factor "
+                f"{near.size} tests at {_kpa(level)} kPa differ by a factor "
                 f"{near.max() / near.min():.2f} in strength"
             )
     if len(fit.tests) == len(fit.stresses):
@@ -153,7 +158,9 @@ def _shapes(fit: ShearFit) -> Iterator[str]:
     pairs = list(zip(fit.tests, fit.curves, strict=True))
     peaked = [(t, c) for t, c in pairs if c.peak > NOTABLE_PEAK * c.end]
     if peaked:
-        falls = ", ".join(f"{t.name} {c.peak:.4g} to {c.end:.4g} Pa" for t, c in peaked[:LISTED])
+        falls = ", ".join(
+            f"{t.name} {_kpa(c.peak)} to {_kpa(c.end)} kPa" for t, c in peaked[:LISTED]
+        )
         yield (
             f"the stress passes a peak and falls to a residual ({falls}); the curve of Janosi and "
             "Hanamoto has none: its strength lies between. The effect shear-softening describes it"
