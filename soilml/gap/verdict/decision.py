@@ -37,10 +37,7 @@ OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
     "one that the catalogue lacks"
 )
-NOT_CATALOGUED = (
-    "a discrepancy of at least four times the usual error of a model is left in the {}, which no "
-    "effect of the catalogue explains"
-)
+NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
 
@@ -96,7 +93,11 @@ def decide(
     if _far_from_catalogue(best):
         return Decision("suspected", (), best, OTHER_LAW.format(" + ".join(best.names)))
     if left := _large_remainder(problem, result, best):
-        return Decision("suspected", (), _first_suspect(result), NOT_CATALOGUED.format(left))
+        shown = _first_suspect(result) or best
+        reason = NOT_CATALOGUED.format(" + ".join(best.names), left)
+        if shown is not best:
+            reason += f", and the evidence for {' + '.join(shown.names)} is not decisive"
+        return Decision("suspected", (), shown, reason)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:

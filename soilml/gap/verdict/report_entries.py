@@ -197,8 +197,8 @@ def size_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> list
             value, usual = c.prior.at(np.asarray([size, 1.0]))
             notes.append(
                 f"{c.name} of {c.effect} would have to be {format_quantity(value, c.unit)}, "
-                f"{abs(size):.2g} times its usual size ({format_quantity(usual, c.unit)}): the gap "
-                "is of this kind, but the law of the catalogue does not explain how large it is"
+                f"{abs(size):.3g} times its usual size ({format_quantity(usual, c.unit)}): the law "
+                "of the catalogue does not explain the gap by an effect of plausible size"
             )
     return notes
 

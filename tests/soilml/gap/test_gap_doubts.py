@@ -178,8 +178,8 @@ def test_lugs_that_would_have_to_be_far_larger_than_lugs_are_remarked_on(height,
     fit = problem.fit(problem.with_effects(["grousers"]), coordinates, {})
     notes = size_notes(fit.coordinates, fit.x.tolist())
     expected = (
-        "height of grousers would have to be 80.0 mm, 8 times its usual size (10.0 mm): the gap is "
-        "of this kind, but the law of the catalogue does not explain how large it is"
+        "height of grousers would have to be 80.0 mm, 8 times its usual size (10.0 mm): the law of "
+        "the catalogue does not explain the gap by an effect of plausible size"
     )
     assert [n.replace("\N{NO-BREAK SPACE}", " ") for n in notes] == [expected] * said
 
