@@ -93,7 +93,7 @@ def test_errors_far_from_zero_leave_what_integration_of_the_model_gives(case, me
     table = Table({"slip": SLIPS, "load_N": LOADS, **rows})
     data = replace(read_observations(case, table), shared_errors={"bearing": 0.4})
     fit = method(case, data, select_free(case, None))
-    grid = np.meshgrid(np.linspace(10.0, 5990.0, 300), np.linspace(-1.6, 1.6, 80), indexing="ij")
+    grid = np.meshgrid(np.linspace(10.0, 5990.0, 150), np.linspace(-1.6, 1.6, 60), indexing="ij")
     cohesion, e = (axis.ravel() for axis in grid)
     squares = [
         (((y - rows[key]) / std[key]) ** 2).sum(axis=1) for key, y in predicted(cohesion, e).items()
