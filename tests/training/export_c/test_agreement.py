@@ -110,7 +110,7 @@ def test_one_reading(name, compiler, compiled):
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", ["wheel", "any_wheel"])
 def test_sets(name, compiler, compiled):
-    compare_sets(compiled(name, compiler), name, 120 if compiler == COMPILERS[0] else 60, 2)
+    compare_sets(compiled(name, compiler), name, 120 if name == "wheel" else 60, 2)
 
 
 @pytest.mark.slow
