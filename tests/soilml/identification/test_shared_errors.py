@@ -193,7 +193,8 @@ def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, mon
         return predict(density, u)
 
     monkeypatch.setattr(PosteriorDensity, "predict", counted)
+    monkeypatch.setattr(joint_sample, "MOST_SOLUTIONS", 150_000)
     fit = identify(case, Table(columns | {"torque_Nm": torque}), None, "posterior", as_usual=True)
     assert fit.misfit > 20.0 and any(EXCESS_RESIDUALS in text for text in fit.warnings)
     # a single search, with the noise that the residuals ask for
-    assert sum(solved) < joint_sample.MOST_SOLUTIONS + 2048 * len(table)
+    assert sum(solved) < 150_000 + 2048 * len(table)
