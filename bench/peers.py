@@ -85,7 +85,7 @@ def tables(folder: Path) -> str:
 def _ways(folder: Path) -> list[Way]:
     ways = [
         Way("scipy, quad and brentq row by row", _scipy, TOLERANCES, 1e-7, 10),
-        Way("numpy, trapezoid and bisection", _plain, PLAIN_POINTS, 201, 10_000),
+        Way("numpy, trapezoid and bisection", _plain, PLAIN_POINTS, 201, 1000),
         Way("soilml", _soilml, POINTS, wheel.DRIVING_NODES, SIZES[-1]),
     ]
     for name, flags in (("C, -O3", peers_c.STRICT), ("C, -O3 -ffast-math", peers_c.FAST)):
