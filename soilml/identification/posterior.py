@@ -154,8 +154,7 @@ def posterior_samples(
     misfit = 0.0 if optimum is None else _misfit(density, optimum.u, len(free))
     limit = misfit_limit(data.reading_count - len(free))
     if misfit <= limit:
-        sample = _sampled(density, None, optimum)
-        misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], len(free))
+        sample, misfit = _with_misfit(density, optimum, len(free))
         if misfit <= limit:
             return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
         start = sample if misfit < SIMILAR_NOISE**2 else None
@@ -167,6 +166,26 @@ def posterior_samples(
 def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
     """The same samples of the first p parameters alone."""
     return replace(sample, u=sample.u[:, :p])
+
+
+def sample_posterior(
+    case: Case, data: Observations, free: Sequence[FreeParameter]
+) -> tuple[ImportanceSample, float]:
+    """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
+
+    The noise is as declared, whatever the misfit at the sample of largest weight. Raises `FitError`
+    as `posterior` does.
+    """
+    density = PosteriorDensity(case, data, free)
+    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    return _with_misfit(density, optimum, len(free))
+
+
+def _with_misfit(
+    density: PosteriorDensity, optimum: Optimum | None, parameters: int
+) -> tuple[ImportanceSample, float]:
+    sample = _sampled(density, None, optimum)
+    return sample, _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
 
 
 def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
