@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +14,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 import advice
 import board
 import c_export
+import generation
 import identification
 import learning
 import lssvm_scale
 import model_errors
+import peers
 import physics
 import prospects
 import slip
@@ -27,19 +27,11 @@ import streams
 import summary
 import systems
 import training_time
+import wall_time
 import wrong_worlds_identified
 from benchmarks_file import FILE, MARK, ROOT, machine
 
 from soilml.io.atomic_files import save_text
-
-
-def wall_time(target: str) -> str:
-    """Wall time (s) of a make target, in an environment that is installed already."""
-    subprocess.run(["make", ".venv/.ready"], cwd=ROOT, capture_output=True, check=False)
-    started = time.perf_counter()
-    done = subprocess.run(["make", target], cwd=ROOT, capture_output=True, check=False)
-    state = "" if done.returncode == 0 else " (failed)"
-    return f"| `make {target}` | {time.perf_counter() - started:.0f}{state} |"
 
 
 @dataclass(frozen=True)
@@ -78,6 +70,8 @@ PARTS = (
         "`wheel`; it drives where nothing else is said.",
         lambda folder: physics.speed(),
     ),
+    Part("peers", "The forward model beside other ways", peers.ABOUT, peers.tables),
+    Part("generation", "Synthetic data on all cores", generation.ABOUT, generation.section),
     Part(
         "comparison",
         "Estimators and analytic methods relative to the Bayes limit",
@@ -237,9 +231,7 @@ PARTS = (
         "time",
         "Wall time",
         "In an environment that is installed already.",
-        lambda folder: "\n".join(
-            ["| | seconds |", "|---|---:|", wall_time("demo"), wall_time("test")]
-        ),
+        lambda folder: wall_time.table(),
     ),
 )
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from filelock import FileLock
 from scipy.stats import qmc
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -20,6 +18,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from compiled_c_fixtures import compiled as compiled
 from compiled_c_fixtures import exported as exported
+from compiled_c_fixtures import library as library
+from shared_files import shared_folder
 
 #: The reference wheel on dry sand.
 WHEEL_ON_SAND = """\
@@ -113,23 +113,6 @@ def model_file(tmp_path: Path) -> Path:
     path = tmp_path / "model.toml"
     path.write_text(MODEL)
     return path
-
-
-def shared_folder(
-    factory: pytest.TempPathFactory, name: str, fill: Callable[[Path], object]
-) -> Path:
-    """A folder that the first of all workers fills, and that the others read."""
-    root = factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        root = root.parent
-    folder = root / name
-    with FileLock(root / f"{name}.lock"):
-        if not folder.exists():
-            part = root / f"{name}.part"
-            part.mkdir()
-            fill(part)
-            part.rename(folder)
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ Written from the printed equations alone; shares no line with the package.
 
 from __future__ import annotations
 
+import math
 import warnings
 from itertools import pairwise
 
@@ -27,12 +28,12 @@ def stresses(theta, theta1, theta2, row):
     if theta < theta_m:
         at = theta1 - (theta - theta2) / (theta_m - theta2) * (theta1 - theta_m)
     # cos a - cos b as a product keeps the digits that a small arc would lose
-    sink = 2.0 * np.sin(0.5 * (theta1 + at)) * np.sin(0.5 * (theta1 - at))
+    sink = 2.0 * math.sin(0.5 * (theta1 + at)) * math.sin(0.5 * (theta1 - at))
     sigma = k * max(r * sink, 0.0) ** row["n"]
     ratio = travel_ratio(s, law)
-    j = r * (theta1 - theta - ratio * (np.sin(theta1) - np.sin(theta)))
-    tau = (row["cohesion"] + sigma * np.tan(row["friction_angle"])) * (
-        1.0 - np.exp(-abs(j) / row["shear_modulus"])
+    j = r * (theta1 - theta - ratio * (math.sin(theta1) - math.sin(theta)))
+    tau = (row["cohesion"] + sigma * math.tan(row["friction_angle"])) * (
+        1.0 - math.exp(-abs(j) / row["shear_modulus"])
     )
     driven = s >= 0 if law == "slip-sign" else j >= 0
     return sigma, (tau if driven else -tau)
@@ -55,9 +56,11 @@ def turning_points(theta1, theta2, s, law="displacement-sign"):
     ]
 
 
-def forces(theta1, row, theta2=0.0):
-    """(W, DP, T) at an entry angle, relative accuracy about 1e-10."""
-    r, b = row["radius"], row["width"]
+def _integral(theta1, theta2, row):
+    """Integral over the contact of a function of angle and stresses, accuracy about 1e-10."""
+    # plain numbers: scalars of numpy are several times slower
+    row = {name: v if isinstance(v, str) else float(v) for name, v in row.items()}
+    theta1, theta2, r = float(theta1), float(theta2), row["radius"]
     theta_m = (row["a0"] + row["a1"] * row["slip"]) * theta1
     law = row.get("braking", "displacement-sign")
     # the shear curve bends within this angle
@@ -79,20 +82,30 @@ def forces(theta1, row, theta2=0.0):
                 if hi - lo > 1e-15
             )
 
-    def projected(f):
-        return integral(lambda t: f(t, *stresses(t, theta1, theta2, row)))
+    return lambda f: integral(lambda t: f(t, *stresses(t, theta1, theta2, row)))
 
-    load = r * b * projected(lambda t, sg, ta: sg * np.cos(t) + ta * np.sin(t))
-    pull = r * b * projected(lambda t, sg, ta: ta * np.cos(t) - sg * np.sin(t))
-    torque = r * r * b * projected(lambda t, sg, ta: ta)
-    return load, pull, torque
+
+def load_carried(theta1, row, theta2=0.0):
+    """W at an entry angle."""
+    integral = _integral(theta1, theta2, row)
+    area = row["radius"] * row["width"]
+    return area * integral(lambda t, sg, ta: sg * math.cos(t) + ta * math.sin(t))
+
+
+def forces(theta1, row, theta2=0.0):
+    """(W, DP, T) at an entry angle."""
+    r, b = row["radius"], row["width"]
+    integral = _integral(theta1, theta2, row)
+    pull = r * b * integral(lambda t, sg, ta: ta * math.cos(t) - sg * math.sin(t))
+    torque = r * r * b * integral(lambda t, sg, ta: ta)
+    return load_carried(theta1, row, theta2), pull, torque
 
 
 def equilibrium(row, near=None):
     """(theta1, DP, T) where the load is carried; searched around `near` where that is given."""
 
     def f(th):
-        return forces(th, row)[0] - row["load"]
+        return load_carried(th, row) - row["load"]
 
     lo, hi = (1e-5, np.pi / 2) if near is None else (near * 0.98, min(near * 1.02, np.pi / 2))
     theta1 = brentq(f, lo, hi, xtol=1e-13, rtol=1e-12)

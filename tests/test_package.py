@@ -31,7 +31,7 @@ def board(wheel, tmp_path_factory):
     """The programs of an environment that holds the wheel and what it asks for."""
     folder = tmp_path_factory.mktemp("board")
     venv.create(folder, with_pip=True)
-    command = [folder / "bin" / "python", "-m", "pip", "install", "--quiet"]
+    command = [folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--no-compile"]
     command += ["--constraint", ROOT / "constraints.txt", wheel]
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
     subprocess.run([str(part) for part in command], check=True, env=environment)

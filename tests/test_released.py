@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -74,8 +75,10 @@ DEVIATION = {"kls1_wheel": 0.08}
 STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 
 
-def runs(recipe, rows, steady, count=400):
+@cache
+def runs(recipe_name, rows, steady, count=250):
     """Columns (runs, rows) of runs in which something is steady."""
+    recipe = read_recipe(recipe_name)
     recipe = replace(recipe, blocks=(Block(rows, 1.0, steady),)).sized(rows * count, seed=777)
     parts = list(simulate_pieces(recipe))
     return {k: np.concatenate([p[k] for p in parts]).reshape(count, rows) for k in parts[0]}
@@ -101,8 +104,8 @@ def coverage(estimator, columns, copies=1):
 def test_intervals_hold_in_every_pattern_of_run(name, steady):
     recipe = read_recipe(RELEASED[name][0])
     estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), recipe.case)
-    for rows in (2, 7, 18, 40):
-        valid, inside = coverage(estimator, runs(recipe, rows, steady))
+    for rows in (2, 12, 40):
+        valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, steady))
         assert valid > 0.97
         assert (np.abs(inside - 0.9) < DEVIATION.get(name, 0.06)).all(), (rows, inside)
 
@@ -113,7 +116,7 @@ def test_repeated_readings_do_not_reduce_the_uncertainty(name):
     recipe = read_recipe(RELEASED[name][0])
     estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), recipe.case)
     for rows, copies in ((1, 32), (3, 10)):
-        valid, inside = coverage(estimator, runs(recipe, rows, ()), copies)
+        valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, ()), copies)
         assert valid > 0.97
         assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)
 
@@ -130,7 +133,7 @@ def test_the_file_for_any_wheel_is_as_good_as_that_of_the_reference_wheel(rows):
     recipe = read_recipe("wheel")
     one = for_simulated_case(Estimator.load(ROOT / "exported" / "wheel.onnx"), recipe.case)
     many = for_simulated_case(Estimator.load(ROOT / "exported" / "any_wheel.onnx"), recipe.case)
-    columns = runs(recipe, rows, ())
+    columns = runs("wheel", rows, ())
     truth = np.stack([columns[column(n)][:, 0] for n in one.names], axis=1)
     error = []
     for estimator in (one, many):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from packaging.requirements import Requirement
 from packaging.version import Version
 
@@ -91,18 +92,23 @@ def find_python(version):
 
 
 @pytest.fixture(scope="module", params=PARAMETERS)
-def board(request, tmp_path_factory):
-    """The interpreter of an environment with these versions."""
+def board(request):
+    """The interpreter of an environment with these versions, kept for later runs of the tests."""
     version, runtime, numpy = request.param
     interpreter = find_python(version)
-    require_registry()
-    folder = tmp_path_factory.mktemp("board")
-    subprocess.run([interpreter, "-m", "venv", folder], check=True)
-    wanted = [f"onnxruntime=={runtime}", *([f"numpy=={numpy}"] if numpy else [])]
-    wanted += ["tomli"] if version == "3.10" else []
-    own = folder / "bin" / "python"
-    command = [own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted]
-    subprocess.run([str(part) for part in command], check=True)
+    name = f"board-{version}-{runtime}-{numpy}"
+    folder = request.config.cache.mkdir(name) / "environment"
+    own, complete = folder / "bin" / "python", folder / "complete"
+    with FileLock(folder.with_suffix(".lock")):
+        if complete.exists():
+            return own
+        require_registry()
+        subprocess.run([interpreter, "-m", "venv", "--clear", folder], check=True)
+        wanted = [f"onnxruntime=={runtime}", *([f"numpy=={numpy}"] if numpy else [])]
+        wanted += ["tomli"] if version == "3.10" else []
+        command = [own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted]
+        subprocess.run([str(part) for part in command], check=True)
+        complete.touch()
     return own
 
 

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
+from soilml.identification.descent import Optimum
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.shared_errors.joint_sample import joint_sample
+from soilml.identification.shared_errors.joint_sample import joint_sample, most_probable
 from soilml.numerics.chi_squared import chi_squared_quantile
 from soilml.numerics.sampling.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
@@ -49,7 +50,8 @@ class PosteriorSamples:
     """Weighted samples of the posterior, as fractions of the priors, and the best one's misfit."""
 
     sample: ImportanceSample
-    #: squared residuals over declared variances, per degree of freedom, at the best sample
+    #: squared residuals over declared variances, per degree of freedom, at the best sample or, with
+    #: shared errors and inflated noise, at the optimum
     misfit: float
     #: factor on the declared noise: above 1 where the residuals exceed it significantly
     noise_scale: float
@@ -146,12 +148,18 @@ def posterior_samples(
 
     Raises `FitError` as `posterior` does.
     """
-    sample, misfit = sample_posterior(case, data, free)
-    if misfit <= misfit_limit(data.reading_count - len(free)):
-        return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
+    density, start = PosteriorDensity(case, data, free), None
+    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    # no sample of so many parameters fits much better than the optimum
+    misfit = 0.0 if optimum is None else _misfit(density, optimum.u, len(free))
+    limit = misfit_limit(data.reading_count - len(free))
+    if misfit <= limit:
+        sample, misfit = _with_misfit(density, optimum, len(free))
+        if misfit <= limit:
+            return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
+        start = sample if misfit < SIMILAR_NOISE**2 else None
     noise_scale = float(np.sqrt(misfit))
-    start = sample if noise_scale < SIMILAR_NOISE else None
-    sample, _ = sample_posterior(case, data, free, noise_scale, start)
+    sample = _sampled(PosteriorDensity(case, data, free, noise_scale), start, optimum)
     return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
 
 
@@ -161,30 +169,48 @@ def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
 
 
 def sample_posterior(
-    case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
-    noise_scale: float = 1.0,
-    start: ImportanceSample | None = None,
+    case: Case, data: Observations, free: Sequence[FreeParameter]
 ) -> tuple[ImportanceSample, float]:
     """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
 
-    Noise and discrepancy are multiplied by `noise_scale`. Samples of a similar posterior, `start`,
-    show the region.
-
-    The misfit is the sum of squared residuals over declared variances, per degree of freedom, at
-    the sample of largest weight; with a discrepancy, weighted by the inverse covariance. Raises
-    `FitError` as `posterior` does.
+    The noise is as declared, whatever the misfit at the sample of largest weight. Raises `FitError`
+    as `posterior` does.
     """
-    density = PosteriorDensity(case, data, free, noise_scale)
-    if density.errors:
-        sample: ImportanceSample | None = joint_sample(
-            density, least_squares_problem(case, data, free)
-        )
+    density = PosteriorDensity(case, data, free)
+    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    return _with_misfit(density, optimum, len(free))
+
+
+def _with_misfit(
+    density: PosteriorDensity, optimum: Optimum | None, parameters: int
+) -> tuple[ImportanceSample, float]:
+    sample = _sampled(density, None, optimum)
+    return sample, _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
+
+
+def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
+    """Squared residuals over declared variances, per degree of freedom, at fractions u (p,).
+
+    With a discrepancy, or errors that all rows share, weighted by the inverse covariance.
+    """
+    cost = density.squared_residuals(u[None, :]) + density.data.squares_within
+    return cost / max(density.data.reading_count - parameters, 1)
+
+
+def _sampled(
+    density: PosteriorDensity, start: ImportanceSample | None, optimum: Optimum | None
+) -> ImportanceSample:
+    """Weighted fractions of the priors, with those of shared errors behind.
+
+    Samples of a similar posterior, `start`, show the region; with shared errors, the optimum does.
+    Raises `FitError` as `posterior` does.
+    """
+    if optimum is not None:
+        sample: ImportanceSample | None = joint_sample(density, optimum)
     else:
         sample = _from_surface(density, start)
     if sample is None:
-        sample = importance_sample(density, len(free))
+        sample = importance_sample(density, len(density.free))
     if not np.isfinite(sample.evidence):
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
@@ -195,9 +221,7 @@ def sample_posterior(
             f"spread ({LEAST_USABLE_SIZE:.0f} needed): the posterior is too narrow a part of the "
             "prior; use --method nonlinear, or narrow [soil.prior]"
         )
-    cost = density.squared_residuals(sample.u[[int(np.argmax(sample.weights))]])
-    cost += data.squares_within
-    return sample, cost / max(data.reading_count - len(free), 1)
+    return sample
 
 
 def _from_surface(

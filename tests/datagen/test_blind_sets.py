@@ -90,7 +90,7 @@ def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
 )
 def test_a_cause_acts_and_without_size_does_not(tier, key):
     (cause,) = active_mechanisms(tier, key)
-    rows = batch(60, seed=4)
+    rows = batch(30, seed=4)
     bare = of_hidden(rows)
     if cause.form not in ("constant", "proportional"):
         assert apart(of_hidden(rows, ((cause, 0.0),)), bare).max() < 1e-9

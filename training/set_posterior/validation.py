@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -82,7 +82,7 @@ def calibrate_misfit_limits(
 
 def _misfits(posterior: SetPosteriorGraph, rows: int) -> tuple[Floats, Floats]:
     """Number of readings (sets,) and misfit (sets,) of simulated sets of one size."""
-    session = posterior_session(posterior)
+    session = posterior_session(posterior, ("counted_out", "set_misfit"))
     sets = posterior.family.sets(LIMIT_SETS, rows, LIMIT_SEED)
     found = [graph_outputs(session, posterior.response, sets, k) for k in range(len(sets.truth))]
     readings, misfit = ([one[key][0] for one in found] for key in ("counted_out", "set_misfit"))
@@ -155,11 +155,15 @@ def _prior_std(family: WheelFamily, sets: SimulatedSets) -> Floats:
     return np.asarray(prior_summary(family)["std"] * scale)
 
 
-def posterior_session(posterior: SetPosteriorGraph) -> Any:
-    """An onnxruntime session of a graph that has the set posterior only."""
+def posterior_session(posterior: SetPosteriorGraph, outputs: Sequence[str] = ()) -> Any:
+    """An onnxruntime session of a graph that has the set posterior only.
+
+    With `outputs`, it computes these alone, to the same bits in less time.
+    """
     graph = Graph()
     posterior.add_to(graph)
-    return session_of(graph.model(posterior.inputs, posterior.outputs))
+    wanted = {name: posterior.outputs[name] for name in outputs or posterior.outputs}
+    return session_of(graph.model(posterior.inputs, wanted))
 
 
 def graph_outputs(
@@ -169,7 +173,7 @@ def graph_outputs(
     index: int,
     errors: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """All outputs for one simulated set without memory, by name.
+    """All outputs of the session for one simulated set without memory, by name.
 
     Slip and load are taken as exact, and `COMMON_ERROR_INPUTS` as 0 where `errors` lacks them.
     """

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.identification.descent import LeastSquaresProblem, descend, global_optimum
+from soilml.identification.descent import (
+    LeastSquaresProblem,
+    Optimum,
+    descend,
+    global_optimum,
+)
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.sampling.surface_sampling import surface_sample
+from soilml.numerics.sampling.surface_sampling import MOST_ROUNDS, surface_sample
 from soilml.numerics.sampling.surrogate_density import Region
 
 Floats = NDArray[np.float64]
@@ -18,28 +23,31 @@ SAMPLES, WIDER = 2048, 1.2
 #: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
 #: and rounds after which they must be accurate enough for the density itself.
 FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
+#: Factor on the noise from which on rows are explained by neither soil nor errors, and most rounds
+#: then: an answer that nobody should believe takes little time.
+UNEXPLAINED, FEW_ROUNDS = 2.0, 4
 #: Standard deviations from the middle at which the region ends in which the model is sampled.
 REACH = 6.0
 #: Most rows where the model is sampled, which bounds the time.
 MOST_SAMPLED_ROWS = 128
-#: Effective sample size at which sampling of the model ends.
-ENOUGH = 1250.0
+#: Effective sample size at which sampling of the model ends, and the number of solutions, but not
+#: of samples, at which it ends anyway.
+ENOUGH, MOST_SOLUTIONS, FEWEST_SAMPLES = 1250.0, 500_000, 4096
 
 
-def joint_sample(density: PosteriorDensity, problem: LeastSquaresProblem) -> ImportanceSample:
+def joint_sample(density: PosteriorDensity, optimum: Optimum) -> ImportanceSample:
     """Weighted fractions (n, p) of the priors of soil and errors.
 
     The region is that of the linearised posterior at the most probable parameters. Polynomials take
     the place of the model where they soon turn out to be accurate there; otherwise the model is
-    sampled, of many rows at some that are chosen at random.
-
-    Raises `FitError` where the model has no equilibrium at the measured loads.
+    sampled, of many rows at some that are chosen at random, and for a bounded number of solutions.
     """
-    start = normal_start(problem, density.noise_scale)
+    start = normal_start(density, optimum)
     density.linearise_at_mean(start)
     rows, p = len(density.data.slip), len(density.free)
     if rows >= FEWEST_ROWS:
-        found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS)
+        most = FEW_ROUNDS if density.noise_scale > UNEXPLAINED else MOST_ROUNDS
+        found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS, most_rounds=most)
         if found is not None and density.linearise_at_mean(found):
             found = surface_sample(density, p, found)
         if found is not None:
@@ -50,16 +58,20 @@ def joint_sample(density: PosteriorDensity, problem: LeastSquaresProblem) -> Imp
     return _of_model(density, start)
 
 
-def normal_start(problem: LeastSquaresProblem, noise_scale: float) -> ImportanceSample:
-    """Samples of a normal distribution about the most probable parameters, with equal weights.
+def most_probable(problem: LeastSquaresProblem) -> Optimum:
+    """The most probable parameters, with normal priors of the same variances.
 
-    That of the linearised posterior, with normal priors of the same variances. Raises `FitError`
-    as `joint_sample` does.
+    Raises `FitError` where the model has no equilibrium at the measured loads.
     """
     optimum = global_optimum(problem)
-    optimum = descend(problem.with_noise_at(optimum), optimum.u, with_prior=True)
-    precision = optimum.jacobian.T @ optimum.jacobian / noise_scale**2
-    root = np.linalg.cholesky(np.linalg.inv(precision + np.diag(problem.prior_precision)))
+    return descend(problem.with_noise_at(optimum), optimum.u, with_prior=True)
+
+
+def normal_start(density: PosteriorDensity, optimum: Optimum) -> ImportanceSample:
+    """Samples of the linearised posterior about the most probable parameters, of equal weights."""
+    precision = optimum.jacobian.T @ optimum.jacobian / density.noise_scale**2
+    prior = np.diag([f.fraction_precision for f in density.free])
+    root = np.linalg.cholesky(np.linalg.inv(precision + prior))
     normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.u)))
     u = optimum.u + WIDER * normal @ root.T
     u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
@@ -79,7 +91,11 @@ def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceS
 
     p = len(density.free)
     found = importance_sample(
-        log_density, p, least_effective_size=ENOUGH, middle_std=0.5 / region.half_width
+        log_density,
+        p,
+        least_effective_size=ENOUGH,
+        middle_std=0.5 / region.half_width,
+        most_samples=max(MOST_SOLUTIONS // len(density.data.slip), FEWEST_SAMPLES),
     )
     kept = found.weights > 0.0
     u, weights = region.points(found.u[kept]), found.weights[kept]

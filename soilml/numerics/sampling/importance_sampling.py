@@ -66,6 +66,7 @@ def importance_sample(
     seed: int = 0,
     least_effective_size: float = LEAST_EFFECTIVE_SIZE,
     middle_std: float | None = None,
+    most_samples: float = math.inf,
 ) -> ImportanceSample:
     r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
@@ -93,6 +94,8 @@ def importance_sample(
         Standard deviation of a density about the middle of the cube that is similar to this one.
         The first round is then drawn from it: in many dimensions hardly any point of a Latin
         hypercube is where the density is.
+    most_samples
+        Number of samples at which sampling ends anyway.
 
     References
     ----------
@@ -112,7 +115,8 @@ def importance_sample(
     proposals = uniform + sum((LATER_ROUND * m.density(u) for m in mixtures), np.zeros(len(u)))
     sample = _weighted(u, logs, proposals)
     for _ in range(MOST_ROUNDS):
-        if sample.effective_size >= least_effective_size or not np.isfinite(logs).any():
+        enough = sample.effective_size >= least_effective_size or len(u) >= most_samples
+        if enough or not np.isfinite(logs).any():
             break
         mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
         new = _inside(mixture.draw(LATER_ROUND, rng))

@@ -54,6 +54,7 @@ def surface_sample(
     start: ImportanceSample | None = None,
     seed: int = 0,
     tempered_rounds: int = MOST_ROUNDS,
+    most_rounds: int = MOST_ROUNDS,
 ) -> ImportanceSample | None:
     """Weighted samples of a density over the unit cube, from few evaluations of its model.
 
@@ -75,6 +76,8 @@ def surface_sample(
         Of the random numbers.
     tempered_rounds
         Rounds after which polynomials must be accurate enough for the density, not a power of it.
+    most_rounds
+        Rounds after which it ends in any case.
 
     Returns
     -------
@@ -91,8 +94,8 @@ def surface_sample(
     rng = np.random.default_rng(seed)
     points, predictions = [], []
     samples, surrogate, reach = start, None, REACH
-    for turn in range(1, MOST_ROUNDS + 1):
-        later = MOST_ROUNDS - turn  # rounds that may follow
+    for turn in range(1, most_rounds + 1):
+        later = most_rounds - turn  # rounds that may follow
         if samples is None:
             u = latin_hypercube(POINTS_IN_CUBE * p, p, rng)
         else:

@@ -113,12 +113,12 @@ def test_methods_agree_where_the_model_has_an_error(case):
 def test_intervals_hold_the_truth_although_the_error_has_other_lengths(case):
     rng = np.random.default_rng(8)
     inside = {"with": [], "without": []}
-    for _ in range(40):
+    for _ in range(24):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         noisy, table = measured(case, truth, rng)
         for name, discrepancy in (("with", USUAL), ("without", {})):
             low, high = identify(replace(noisy, discrepancy=discrepancy), table).interval
             inside[name].append((low <= list(truth.values())) & (high >= list(truth.values())))
-    # 0.90 expected of 120 intervals, which are correlated in threes: 0.80 is two sigma below
-    assert np.mean(inside["with"]) > 0.80
-    assert np.mean(inside["without"]) < 0.80
+    # 0.90 expected of 72 intervals, which are correlated in threes: 0.78 is two sigma below
+    assert np.mean(inside["with"]) > 0.78
+    assert np.mean(inside["without"]) < 0.78

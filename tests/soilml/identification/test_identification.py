@@ -44,7 +44,7 @@ def test_recovers_the_truth_from_rows_without_noise(case):
 def test_nine_of_ten_truths_lie_in_the_interval_and_the_std_says_how_far(case):
     rng = np.random.default_rng(1)
     inside, error, claimed = [], [], []
-    for k in range(80):
+    for k in range(40):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         fit = identify(case, measured(case, truth, SLIPS, LOADS, noise=0.02, seed=k))
         off = np.abs(fit.values - list(truth.values()))
@@ -77,7 +77,7 @@ def test_the_std_holds_where_the_prior_holds_another_parameter(case):
     rng = np.random.default_rng(11)
     slip, load = np.full(3, 0.3), np.asarray([40.0, 70.0, 110.0])
     far = []
-    for k in range(80):
+    for k in range(40):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
         far.append(np.abs(fit.values - list(truth.values())) / fit.std)

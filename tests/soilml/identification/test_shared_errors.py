@@ -10,9 +10,12 @@ from soilml.cli import main
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.identification.data.observations import read_observations
+from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.free_parameters import select_free
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
+from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.shared_errors import joint_sample
 from soilml.identification.shared_errors.effect import ModelledErrors
 from soilml.identification.shared_errors.sizes import usual_errors
 from soilml.io.table import Table
@@ -93,7 +96,7 @@ def test_errors_far_from_zero_leave_what_integration_of_the_model_gives(case, me
     table = Table({"slip": SLIPS, "load_N": LOADS, **rows})
     data = replace(read_observations(case, table), shared_errors={"bearing": 0.4})
     fit = method(case, data, select_free(case, None))
-    grid = np.meshgrid(np.linspace(10.0, 5990.0, 300), np.linspace(-1.6, 1.6, 80), indexing="ij")
+    grid = np.meshgrid(np.linspace(2010.0, 3990.0, 100), np.linspace(-1.6, 1.6, 80), indexing="ij")
     cohesion, e = (axis.ravel() for axis in grid)
     squares = [
         (((y - rows[key]) / std[key]) ** 2).sum(axis=1) for key, y in predicted(cohesion, e).items()
@@ -177,3 +180,21 @@ def test_the_command_gives_both_answers_and_says_which_one_to_believe(
     assert "as usual" in shown
     assert "believe the second answer" in shown
     assert '"as_usual"' in out.read_text()
+
+
+def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, monkeypatch):
+    table = measured(case, rng := np.random.default_rng(3))
+    columns = {name: table[name] for name in table.columns}
+    torque = columns["torque_Nm"] * rng.uniform(0.4, 1.6, len(table))
+    solved, predict = [], PosteriorDensity.predict
+
+    def counted(density, u):
+        solved.append(len(u) * len(density.data.slip))
+        return predict(density, u)
+
+    monkeypatch.setattr(PosteriorDensity, "predict", counted)
+    monkeypatch.setattr(joint_sample, "MOST_SOLUTIONS", 150_000)
+    fit = identify(case, Table(columns | {"torque_Nm": torque}), None, "posterior", as_usual=True)
+    assert fit.misfit > 20.0 and any(EXCESS_RESIDUALS in text for text in fit.warnings)
+    # a single search, with the noise that the residuals ask for
+    assert sum(solved) < 150_000 + 2048 * len(table)

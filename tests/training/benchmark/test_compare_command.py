@@ -20,7 +20,7 @@ from training.benchmark.suite import (
 @pytest.mark.slow
 def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
     out = tmp_path / "results"
-    assert main(["compare", str(small_model), "--sets", "3", "--out", str(out)]) == 0
+    assert main(["compare", str(small_model), "--sets", "1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
     rows = list(csv.DictReader((out / "benchmark.csv").open()))

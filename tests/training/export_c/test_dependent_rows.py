@@ -21,7 +21,7 @@ def test_rows_of_released_files_depend_on_the_memory(name):
 @pytest.mark.slow
 def test_the_answer_from_the_memory_alone_is_near_that_of_the_step(compiled):
     model, rng = compiled("any_wheel"), np.random.default_rng(7)
-    for _ in range(20):
+    for _ in range(8):
         context = context_of(rng)
         memory = model.start(**context)
         for count in (3, 17, 32):

@@ -30,21 +30,19 @@ def run(program, given=""):
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_the_c_example(compiler, exported, tmp_path):
-    folder, program = exported("wheel"), tmp_path / "board"
-    sources = [EXAMPLES / "main.c", folder / "wheel.c"]
-    build([compiler, *WARNINGS, "-O1", f"-I{folder}", *sources, "-lm", "-o", program])
+def test_the_c_example(compiler, exported, library, tmp_path):
+    folder, program, made = exported("wheel"), tmp_path / "board", library("wheel", compiler)
+    command = [compiler, *WARNINGS, f"-I{folder}", EXAMPLES / "main.c", made]
+    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
     *_, last = run(program).splitlines()
     assert last == "answered"
 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler")
-def test_the_cpp_example(exported, tmp_path):
-    folder, program, made = exported("any_wheel"), tmp_path / "board", tmp_path / "any_wheel.o"
-    build([COMPILERS[0], *WARNINGS, "-O1", "-c", folder / "any_wheel.c", "-o", made])
-    warnings = ["-std=c++11", *WARNINGS[1:]]
-    source = EXAMPLES / "main.cpp"
-    build(["g++", *warnings, f"-I{folder}", source, made, "-lm", "-o", program])
+def test_the_cpp_example(exported, library, tmp_path):
+    folder, program, made = exported("any_wheel"), tmp_path / "board", library("any_wheel")
+    command = ["g++", "-std=c++11", *WARNINGS[1:], f"-I{folder}", EXAMPLES / "main.cpp", made]
+    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
     lines = run(program).splitlines()
     assert len(lines) == 2 and all(line.endswith(", in range") for line in lines)
 

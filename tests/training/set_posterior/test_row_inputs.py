@@ -238,7 +238,7 @@ def test_no_input_gives_an_output_that_is_not_finite(sets, single, any_wheel, se
         return np.where(rng.random(count) < 0.4, special, values).astype(np.float32)
 
     names = (*READING_INPUTS, *STD_INPUTS)
-    for _ in range(300):
+    for _ in range(120):
         rows = {name: np.tile(np.asarray(values, np.float32), 3) for name, values in ROWS.items()}
         for name in map(str, rng.choice(names, 3, replace=False)):
             values = np.full(12, 0.05, np.float32) if name not in rows else rows[name]

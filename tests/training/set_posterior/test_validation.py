@@ -39,3 +39,17 @@ def test_few_sound_rows_are_refused(wheel_posterior):
     alone = readings == 1.0
     assert alone.sum() > 600
     assert (misfit[alone] > limits.misfit[0]).mean() < 0.01
+
+
+def test_fewer_outputs_are_the_same_to_the_last_bit(wheel_posterior):
+    few, full = (
+        posterior_session(wheel_posterior, ("set_misfit",)),
+        posterior_session(wheel_posterior),
+    )
+    sets = wheel_posterior.family.sets(20, 5, 3)
+    for k in range(20):
+        found, whole = (
+            graph_outputs(session, wheel_posterior.response, sets, k) for session in (few, full)
+        )
+        assert set(found) == {"set_misfit"} < set(whole)
+        assert found["set_misfit"] == whole["set_misfit"]

@@ -79,7 +79,7 @@ def test_an_effect_that_is_given_no_size_is_neutral(name):
 @pytest.mark.parametrize("gear", RIGID)
 @every
 def test_finite_over_the_whole_box_or_flagged(name, gear):
-    box, known = input_box(512, seed=8), known_to(512)
+    box, known = input_box(256, seed=8), known_to(256)
     for share in (0.5, 2.0):
         effect = sized(name, share)
         force = solved(box, [effect], GEARS[gear], **known)

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from datagen.recipe import read_recipe
-from soilml.quantities import SHEAR
 from training.benchmark.sets.exact_posterior import exact_set_posterior
 from training.benchmark.sets.stream_posterior import posterior_of_memory
-from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.response_surface import ResponseSettings, fit_response
 from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.validation import graph_outputs, posterior_session
 
@@ -17,10 +13,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def triples():
+def triples(wheel_posterior):
     """(output of the graph, posterior of its memory, exact posterior) of sets; small response."""
-    family = RecipeFamily.of(read_recipe("wheel"), SHEAR)
-    response = fit_response(family, ResponseSettings(1024, 32, 250, 0), lambda *args: None)
+    family, response = wheel_posterior.family, wheel_posterior.response
     free = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
     session = posterior_session(SetPosteriorGraph(family, response, free))
     found = []
