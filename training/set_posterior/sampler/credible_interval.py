@@ -21,9 +21,9 @@ LEAST_SHARE = 1e-6
 def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> Value:
     r"""The quantiles (q, 2) at `INTERVAL` of q deviations from a mean.
 
-    The weighted distribution function F is evaluated at grid points :math:`g_i`, which are multiples
-    of the spacing h, and inverted by linear interpolation. The weight of a sample at :math:`d_j`
-    is shared by the grid points around it:
+    The weighted distribution function F is evaluated at multiples :math:`g_i` of the spacing h, and
+    inverted by linear interpolation. The weight of a sample at :math:`d_j` is shared by the grid
+    points around it:
 
     .. math:: F(g_i) = \sum_j w_j \left[\frac{1}{2} + \frac{g_i - d_j}{h}\right]_0^1
 
