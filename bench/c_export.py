@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -74,23 +75,23 @@ def latency_table(models: dict[str, CompiledModel]) -> str:
     case = read_recipe("wheel").case
     for name, model in models.items():
         estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), case)
-        for what, by_runtime, by_c in _tasks(name, model, estimator):
-            times = (*timed(by_runtime, CALLS), *timed(by_c, CALLS))
+        for what, outputs, feed, by_c in tasks(name, model, estimator):
+            run = partial(estimator.session.run, outputs, feed)
+            times = (*timed(run, CALLS), *timed(by_c, CALLS))
             lines.append(f"| {name} | {what} | {' | '.join(f'{t:.0f}' for t in times)} |")
     return "\n".join(lines)
 
 
-def _tasks(name, model, estimator):  # type: ignore[no-untyped-def]
-    """What is timed: a name, a call of onnxruntime, and a call of the C library."""
-    library, reference = model.library, ctypes.byref
-    session, work = estimator.session, reference(model.work)
+def tasks(name, model, estimator):  # type: ignore[no-untyped-def]
+    """What is timed: a name, outputs and inputs of onnxruntime, and a call of the C library."""
+    library, reference, work = model.library, ctypes.byref, ctypes.byref(model.work)
     sets = estimator.sets
     if not (sets and sets.sets_only):
         feed = {n: np.asarray([v], np.float32) for n, v in reading().items()}
         row, estimate = model.row(**reading()), model.new("estimate")
         single = getattr(library, f"{name}_single")
         arguments = reference(row), reference(estimate), work
-        yield "one reading", lambda: session.run(OUTPUTS, feed), lambda: single(*arguments)
+        yield "one reading", OUTPUTS, feed, lambda: single(*arguments)
     if sets is None or name == "kls1_wheel":  # the rows are of another wheel
         return
     names = [*(SET_PREFIX + output for output in SET_OUTPUTS), *MEMORY_OUTPUTS]
@@ -111,7 +112,7 @@ def _tasks(name, model, estimator):  # type: ignore[no-untyped-def]
             ctypes.memmove(reference(own), kept, len(kept))
             update(reference(own), given, count, None, reference(found), work)
 
-        yield what, lambda feed=feed: session.run(names, feed), by_c
+        yield what, names, feed, by_c
 
 
 def differences_table(models: dict[str, CompiledModel]) -> str:

@@ -12,10 +12,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 import advice
-import board
 import c_export
 import generation
 import identification
+import latency_floor
 import learning
 import lssvm_scale
 import model_errors
@@ -171,7 +171,7 @@ PARTS = (
         "Median and 99th percentile (p99) in microseconds, one thread. Goals: 60 us for one "
         "reading, 150 us for a set of 16 (`any_wheel.onnx`: 350 us), 0.2 s to the first estimate, "
         "0.5 MB per file.",
-        lambda folder: f"{board.latency()}\n\n{board.steps()}\n\n{board.cold_start()}",
+        latency_floor.section,
     ),
     Part(
         "c",

@@ -10,7 +10,7 @@ from soilml.onboard.set_contract import SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, sqrt, where
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
-from training.set_posterior.sampler.credible_interval import INTERVAL, add_standardised_quantiles
+from training.set_posterior.sampler.credible_interval import INTERVAL, add_quantiles
 from training.set_posterior.sampler.importance_sampler import WeightedSample
 from training.set_posterior.sampler.misfit_test import Consistency
 
@@ -44,8 +44,7 @@ def add_posterior_outputs(
     covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
     variance = (covariance * np.eye(q)).sum(axis=1, keepdims=True)
     std = sqrt(variance)
-    quantiles = add_standardised_quantiles(deviation / std, sample.weights, sample.count)
-    interval = mean + std * quantiles
+    interval = mean + add_quantiles(deviation, std, sample.weights, sample.count)
     enough = consistency.enough.reshape(1, 1)
     consistent = enough & (sample.misfit <= consistency.limit).reshape(1, 1)
     prior = prior_summary(family)
