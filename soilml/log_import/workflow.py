@@ -17,6 +17,7 @@ from soilml.log_import.channels.runs import Run, runs_of
 from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of
 from soilml.log_import.checks.irregular import irregular_windows
+from soilml.log_import.checks.lifted_wheel import lifted_at_the_end
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.sensors import dead_sensors, untared_load, untared_sensors
 from soilml.log_import.checks.table_hints import table_hints
@@ -226,7 +227,8 @@ class _Wheel:
                 for role, why in dead.items()
             ]
         found += untared_sensors(self.wheel, self.inputs)
-        return found + untared_load(self.wheel, self.inputs)
+        found += untared_load(self.wheel, self.inputs)
+        return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
 
     def series(self, i: int) -> WheelSeries:
         """Quantities and stretches of one run."""

@@ -130,7 +130,9 @@ def _add(inputs: Inputs, channel: Channel, sampled: list[Floats]) -> None:
     elif role == "slip":
         inputs.values[role] = our_slip(channel.scale * sampled[0], channel.definition)
     else:
-        inputs.values[role] = channel.scale * sampled[0]
+        # cells that carry the wheel together add up, sensors of one sinkage are averaged
+        total = channel.scale * sum(sampled[1:], start=sampled[0])
+        inputs.values[role] = total / len(sampled) if role == "sinkage" else total
 
 
 def our_slip(given: Any, definition: str) -> Any:

@@ -9,8 +9,9 @@ from soilml.log_import.recording import Floats
 
 #: Most points of a grid, and its shortest step in s.
 MOST_POINTS, SHORTEST_STEP = 20_000, 0.002
-#: A gap is bridged up to this many sampling intervals, or this many seconds.
-_BRIDGED_SAMPLES, _BRIDGED_SECONDS = 3.5, 0.05
+#: A gap is bridged up to this many sampling intervals, long intervals (the 90th percentile), or
+#: seconds.
+_BRIDGED_SAMPLES, _BRIDGED_LONG, _BRIDGED_SECONDS = 3.5, 2.0, 0.05
 
 
 def sampling_interval(times: Floats, values: Floats) -> float:
@@ -51,7 +52,9 @@ def on_grid(grid: Floats, times: Floats, values: Floats, continuous: bool = Fals
 
 def _in_gap(grid: Floats, times: Floats, interval: float) -> NDArray[np.bool_]:
     """Points of a grid that lie in a gap between samples, or outside of them, (n,)."""
-    bridged = max(_BRIDGED_SAMPLES * interval, _BRIDGED_SECONDS)
+    # intervals of a channel that is sampled irregularly vary: long ones are no gaps
+    usual = _BRIDGED_LONG * float(np.percentile(np.diff(times), 90))
+    bridged = max(_BRIDGED_SAMPLES * interval, usual, _BRIDGED_SECONDS)
     after = np.clip(np.searchsorted(times, grid), 1, times.size - 1)
     in_gap = times[after] - times[after - 1] > bridged
     on_sample = np.minimum(np.abs(grid - times[after]), np.abs(grid - times[after - 1]))

@@ -83,10 +83,16 @@ def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
 
     Raises `InputError` where files cannot be matched, or time is missing.
     """
-    return [
-        _with_times(own_name, part, log_map)
+    found = [
+        (name, label, part)
         for name, members in matched_files(logs, log_map.files).items()
-        for own_name, part in _divided(name, members, log_map)
+        for label, part in _divided(name, members, log_map)
+    ]
+    labels = [label for _, label, _ in found]
+    # several files may number their runs alike
+    return [
+        _with_times(label if labels.count(label) == 1 else f"{name}_{label}", part, log_map)
+        for name, label, part in found
     ]
 
 

@@ -70,6 +70,7 @@ def restarts(recordings: Sequence[Recording], column: str) -> int:
     for recording in recordings:
         if column in recording.columns:
             values = recording.columns[column]
+            values = values[np.isfinite(values)]
             steps = np.diff(values)
             back = steps < -0.2 * np.nanmax(np.abs(values - values[0]))
             return int(back.sum()) if back.sum() == np.sum(steps < 0.0) else 0

@@ -22,6 +22,7 @@ from soilml.log_import.guesses.columns.assignment import Assignment, assign, axl
 from soilml.log_import.guesses.columns.candidates import (
     candidates_of,
     describe,
+    describe_texts,
     liveliest,
 )
 from soilml.log_import.guesses.columns.column_words import words_of
@@ -122,7 +123,7 @@ class _MapText:
         lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
         drafts = {
-            name: draft_channels(self.found.shared | own, self.run, self.stated, self.found.axes)
+            name: draft_channels(self.found.shared | own, self.run, self.stated, self.found.parts)
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
@@ -167,6 +168,7 @@ class _MapText:
             lines.append("# Plate or shear tests, it seems: `soilml bevameter` takes those.")
         if len(self.columns) > len(listed[:_MOST_LISTED]):
             lines.append(f"#   and {len(self.columns) - len(listed[:_MOST_LISTED])} more")
+        lines += [f"#   {line}" for line in describe_texts(self.run.recordings)]
         notes = dict.fromkeys(note for log in self.logs for r in log for note in r.notes)
         return lines + [f"# Note: {note}" for note in list(notes)[:5]]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from soilml.config.measurement_noise import Noise
@@ -31,6 +32,12 @@ ROLES: dict[str, tuple[str, str]] = {
 GEARED = ("wheel_speed", "wheel_angle", "torque", "motor_current")
 #: What a log may call slip: ours; the ratio of travel to rim speed; (r omega - v) / v.
 SLIP_DEFINITIONS = ("1 - v/(r omega)", "v/(r omega)", "(r omega - v)/v")
+#: How many columns a channel may have, where more than one: x, y, z; cells that are added up;
+#: sensors of which the mean is taken.
+_SEVERAL: dict[str, Sequence[int]] = {
+    "position": (1, 2, 3), "slope": (1, 3), "load": range(1, 9), "drawbar_pull": range(1, 9),
+    "sinkage": range(1, 5),
+}  # fmt: skip
 _EXACT, _NOTHING = Uncertain(1.0), Uncertain(0.0)
 _NEEDED = "a number, '2 %' of the reading, or '2 % + 0.05'"
 
@@ -156,10 +163,10 @@ def _columns(settings: Settings, role: str) -> tuple[str, ...]:
     if "column" not in settings:
         settings.permit(["column"])
         return ()
-    needed = "the name of a column in quotes, or a list of three for x, y, z"
+    needed = "the name of a column in quotes, or a list of them"
     given = settings.take("column", (str, list), needed)
     names = [given] if isinstance(given, str) else given
-    several = {"position": (1, 2, 3), "slope": (1, 3)}.get(role, (1,))
+    several = _SEVERAL.get(role, (1,))
     if len(names) not in several or not all(isinstance(name, str) and name for name in names):
         settings.fail(
             f"column is {given!r}; needed is {needed if len(several) > 1 else needed[:32]}"

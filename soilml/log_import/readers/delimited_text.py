@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.log_import.readers.long_table import signals_of
+from soilml.log_import.readers.text_blocks import BLOCK, find_blocks
 from soilml.log_import.readers.text_encoding import decode_text
 from soilml.log_import.readers.text_layout import MISSING, TextLayout, find_layout, split_line
 from soilml.log_import.recording import Floats, Recording
@@ -19,6 +21,9 @@ from soilml.log_import.recording import Floats, Recording
 _LOOKED, _NUMBERS = 300, 0.5
 _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
+#: A mark between thousands that is no decimal mark: a hard or thin space, an apostrophe.
+_GROUPED = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))")
+_SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?")
 
 
@@ -31,6 +36,7 @@ def read_delimited_text(path: Path) -> list[Recording]:
     Raises `InputError` where the file has no samples.
     """
     text, encoding = decode_text(path.read_bytes(), path)
+    text = _GROUPED.sub("", text)
     lines = text.splitlines()
     layout = find_layout(lines)
     if layout is None:
@@ -38,7 +44,8 @@ def read_delimited_text(path: Path) -> list[Recording]:
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
-    rows, bad = _rows(lines[layout.first :], layout)
+    samples, blocks = find_blocks(lines[layout.first :], layout)
+    rows, bad = _rows(samples, layout)
     notes = []
     if encoding not in ("utf-8", "utf-8-sig"):
         notes.append(f"read as {encoding}")
@@ -46,22 +53,23 @@ def read_delimited_text(path: Path) -> list[Recording]:
         notes.append("numbers have decimal commas")
     if bad:
         notes.append(f"{bad} lines have a wrong number of cells and are left out")
-    columns, texts = _columns(rows, layout)
+    if blocks:
+        notes.append(f"the header stands {len(set(blocks))} times: a run below each ({BLOCK!r})")
+    columns, texts = _columns([row for row, _ in rows], layout)
+    if blocks:
+        texts[BLOCK] = [blocks[i] for _, i in rows]
     units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
-    return [
-        Recording("", path, columns, texts, units, about=layout.about, notes=tuple(notes)),
-    ]
+    whole = Recording("", path, columns, texts, units, about=layout.about, notes=tuple(notes))
+    return signals_of(whole)
 
 
-def _rows(lines: list[str], layout: TextLayout) -> tuple[list[list[str]], int]:
-    """The cells of all samples, and how many lines are left out."""
+def _rows(lines: list[str], layout: TextLayout) -> tuple[list[tuple[list[str], int]], int]:
+    """The cells of all samples with the index of their line, and how many lines are left out."""
     width, bad = len(layout.names), 0
-    rows: list[list[str]] = []
+    rows: list[tuple[list[str], int]] = []
     quoted = '"' in "".join(lines[:50])
     simple = layout.separator != " " and not quoted
-    for line in lines:
-        if not line or line.isspace():
-            continue
+    for i, line in enumerate(lines):
         try:
             cells = line.split(layout.separator) if simple else split_line(line, layout.separator)
         except csv.Error:
@@ -77,7 +85,7 @@ def _rows(lines: list[str], layout: TextLayout) -> tuple[list[list[str]], int]:
                 bad += 1
                 continue
             cells = cells[:width]
-        rows.append(cells)
+        rows.append((cells, i))
     return rows, bad
 
 
@@ -115,7 +123,10 @@ def as_numbers(cells: list[str], decimal_comma: bool = False) -> tuple[Floats, i
 
 
 def without_thousands(cells: list[str], decimal_comma: bool) -> list[str]:
-    """The cells with 12,345.6 (or 12.345,6) as 12345.6, where all marks are of that kind."""
+    """The cells with 12,345.6 (or 12.345,6, 12 345.6) as 12345.6, where all marks are of a kind."""
+    if any(_SPACED.fullmatch(cell.strip()) for cell in cells):
+        cells = [cell.replace(" ", "") if _SPACED.fullmatch(cell.strip()) else cell
+                 for cell in cells]  # fmt: skip
     mark, pattern = (".", _DOTS) if decimal_comma else (",", _COMMAS)
     marked = [cell for cell in cells if mark in cell]
     if not marked or not all(pattern.fullmatch(cell.strip().strip('"')) for cell in marked):

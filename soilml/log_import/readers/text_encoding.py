@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 from soilml.errors import InputError
@@ -14,10 +15,12 @@ _MARKS = (
 )
 #: Share of zero bytes at odd or even places from which text counts as UTF-16 without a mark.
 _ZERO_SHARE = 0.3
+#: Bytes above ASCII in a row, and the share of those in pairs or more that says Chinese.
+_HIGH, _PAIRED = re.compile(rb"[\x80-\xff]+"), 0.8
 
 
 def decode_text(data: bytes, file: Path) -> tuple[str, str]:
-    """The text and its encoding: UTF-8, UTF-16 with or without a mark, or Windows-1252.
+    """The text and its encoding: UTF-8, UTF-16 with or without a mark, GB 18030 or Windows-1252.
 
     Raises `InputError` for a file that is not text.
     """
@@ -37,4 +40,12 @@ def decode_text(data: bytes, file: Path) -> tuple[str, str]:
     try:
         return data.decode("utf-8"), "utf-8"
     except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace"), "cp1252"
+        pass
+    # letters with accents stand alone among ASCII, Chinese characters are two bytes each
+    runs = _HIGH.findall(data)
+    if sum(len(run) for run in runs if len(run) >= 2) > _PAIRED * sum(map(len, runs)):
+        try:
+            return data.decode("gb18030"), "gb18030"
+        except UnicodeDecodeError:
+            pass
+    return data.decode("cp1252", errors="replace"), "cp1252"

@@ -37,6 +37,7 @@ _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?")
 #: Thousands that cannot be taken for decimals: both marks, or two groups.
 _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}")
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
+_SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
@@ -96,6 +97,8 @@ def is_number(cell: str, decimal_comma: bool = False) -> bool:
     """Whether a cell is a number, or stands for a missing one."""
     text = cell.strip()
     if text.lower() in MISSING or _NUMBER.fullmatch(text):
+        return True
+    if _SPACES.fullmatch(text) and "," * decimal_comma in text:
         return True
     if decimal_comma:
         return bool(_COMMA_NUMBER.fullmatch(text) or _DOTS.fullmatch(text))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from soilml.log_import.guesses.columns.axes import axes_of
+from soilml.log_import.guesses.columns.axes import accelerations_of, axes_of
 from soilml.log_import.guesses.columns.candidates import Candidate
 from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, wheel_word, words_of
 
@@ -20,6 +20,8 @@ _MEASURED = 3.0
 #: Roles that each wheel has of its own.
 _PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_current", "load",
               "drawbar_pull", "sinkage", "slip")  # fmt: skip
+#: Roles of one wheel that several columns may have together, and most of them.
+_TOGETHER = {"load": 8, "drawbar_pull": 8, "sinkage": 4}
 #: Lowest score of a guess.
 _LEAST = 2.0
 _AXLES = {"f": "front", "r": "rear", "b": "rear", "m": "middle", "c": "middle"}
@@ -34,12 +36,15 @@ _SIDES = {
 
 @dataclass
 class Assignment:
-    """Columns by role: shared ones, those of each wheel, the runners-up, and y, z of the place."""
+    """Columns by role: shared ones, those of each wheel, the runners-up, and further parts.
+
+    Parts are y and z of a place, cells that carry one wheel together, sensors of one sinkage.
+    """
 
     shared: dict[str, Candidate] = field(default_factory=dict)
     wheels: dict[str, dict[str, Candidate]] = field(default_factory=dict)
     others: dict[str, list[Candidate]] = field(default_factory=dict)
-    axes: list[Candidate] = field(default_factory=list)
+    parts: dict[str, list[Candidate]] = field(default_factory=dict)
 
     def roles(self) -> set[str]:
         """All roles that have a column."""
@@ -59,8 +64,8 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         key=lambda p: (-p[0], -p[1]),
     )
     place = next((c for _, _, role, c in pairs if role == "position"), None)
-    found.axes = axes_of(place, candidates)[1:] if place is not None else []
-    taken = {candidate.address for candidate in found.axes}
+    axes = axes_of(place, candidates)[1:] if place is not None else []
+    taken = {candidate.address for candidate in axes}
     for _, _, role, candidate in pairs:
         if candidate.address in taken:
             continue
@@ -76,9 +81,12 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         for role in present:
             if role != best:
                 found.others.setdefault(role, []).insert(0, found.shared.pop(role))
-    if "position" not in found.shared or found.shared["position"] is not place:
-        found.axes = []
+    if axes and found.shared.get("position") is place:
+        found.parts["position"] = axes
     _take_wheels(found)
+    if not {"slope", "load"} & found.roles() and (gravity := accelerations_of(candidates)):
+        # the load follows from the mass, on the slope that they show
+        found.shared["slope"], found.parts["slope"] = gravity[0], gravity[1:]
     if {"wheel_speed", "wheel_angle", "rim_speed"} & found.roles() and (
         {"ground_speed", "position"} & found.roles()
     ):
@@ -106,6 +114,11 @@ def _take_wheels(found: Assignment) -> None:
                 alike[name] = other
         if len(alike) >= 2:
             groups[role] = alike
+    if groups and groups.keys() <= {*_TOGETHER}:
+        # nothing turns or drives for itself: cells and sensors of one wheel
+        for role, alike in groups.items():
+            _take_parts(found, role, list(alike.values()))
+        return
     names = {name for alike in groups.values() for name in alike}
     complete = [n for n in sorted(names) if all(n in alike for alike in groups.values())]
     if len(complete) < 2:
@@ -116,6 +129,16 @@ def _take_wheels(found: Assignment) -> None:
         found.others[role] = [c for c in found.others.get(role, []) if c.address not in members]
         for name in complete:
             found.wheels.setdefault(name, {})[role] = alike[name]
+
+
+def _take_parts(found: Assignment, role: str, members: list[Candidate]) -> None:
+    """Columns of one role whose names differ by a number or a place become one channel."""
+    if not 2 <= len(members) <= _TOGETHER[role] or len({c.kind for c in members}) > 1:
+        return
+    first, *others = sorted(members, key=lambda c: c.address)
+    found.shared[role], found.parts[role] = first, others
+    addresses = {c.address for c in members}
+    found.others[role] = [c for c in found.others.get(role, []) if c.address not in addresses]
 
 
 def _frame(candidate: Candidate) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
-"""The columns of a place in x, y and z, found by the name of one of them."""
+"""The columns of a place or of accelerations in x, y and z, found by the name of one of them."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -10,6 +11,10 @@ from soilml.log_import.guesses.columns.column_words import words_of
 
 #: Words of a place in the world, whose y may be constant where a rover drives straight.
 _OF_A_ROVER = {"odom", "odometry", "vo", "pose", "gps", "marker", "tracking"}
+_ACCELERATIONS = {"acc", "accel", "acceleration", "beschleunigung", "aceleracion", "aceleración"}
+_ACCELERATIONS |= {"accelerazione", "accélération", "ax", "accx", "accelx", "xacc", "acx"}
+#: Gravity as accelerometers show it: g, m/s^2, mg; and how far from it a resting one may be.
+_GRAVITY, _ABOUT = (1.0, 9.80665, 1000.0), 0.06
 _X = re.compile(r"[xX]")
 
 
@@ -32,3 +37,15 @@ def axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candidat
         if others:
             return [column, *others]
     return [column]
+
+
+def accelerations_of(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Three columns of an accelerometer that shows gravity, x first; empty where there are none."""
+    for candidate in candidates:
+        if not _ACCELERATIONS & {*words_of(candidate.address)}:
+            continue
+        found = axes_of(candidate, candidates)
+        size = math.sqrt(sum(c.about.middle**2 for c in found))
+        if len(found) == 3 and any(abs(size / g - 1.0) < _ABOUT for g in _GRAVITY):
+            return found
+    return []

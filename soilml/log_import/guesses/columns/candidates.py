@@ -11,7 +11,7 @@ from soilml.log_import.guesses.columns.column_words import name_scores, words_of
 from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension
-from soilml.log_import.units.unit_names import unit_in_name
+from soilml.log_import.units.unit_names import spelling, unit_in_name
 
 #: What a role's unit may be, beside that of `ROLES`.
 _ALSO = {
@@ -19,10 +19,14 @@ _ALSO = {
     "wheel_speed": ("count/s",),
     "position": ("count",),
     "load": ("kg",),
+    "torque": ("1",),
+    "motor_current": ("1",),
     "drawbar_pull": ("kg",),
 }
 #: Score from which a name says the role whatever the topic is called.
 _CLEAR = 4.0
+#: Most columns of text that are listed.
+_MOST_TEXTS = 12
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,8 @@ def _score(
     if kind is not None:
         if kind not in wanted and not (kind == "1" and role == "slip"):
             return 0.0
+        if kind == "1" and role != "slip" and spelling(unit) != "percent":
+            return 0.0
         score += 2.5 if kind not in ("1",) else 1.0
         if score <= 2.5 and not _unit_suffices(role, kind):
             return 0.0
@@ -151,3 +157,13 @@ def describe(columns: Sequence[Candidate]) -> list[str]:
         f"{c.about.high:<11.5g}" + (" constant" if c.about.constant else "")
         for c in columns
     ]
+
+
+def describe_texts(recordings: Sequence[Recording]) -> list[str]:
+    """A line for each column that holds text, which no channel can be."""
+    lines = []
+    for recording in recordings:
+        for name, cells in recording.texts.items():
+            shown = list(dict.fromkeys(cell[:20] for cell in cells if cell))[:3]
+            lines.append(f"{name[:44]}: text, such as {', '.join(map(repr, shown))}")
+    return lines[:_MOST_TEXTS]

@@ -19,15 +19,12 @@ _PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center"
 #: Words of topics and columns that say nothing of the quantity.
 _FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw")
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_WORD = re.compile(r"[^\W\d_]+|\d+")
 
 
 def words_of(name: str) -> list[str]:
     """The words of a column's name in small letters: `WheelSpeed_FL` -> wheel, speed, fl."""
-    parts = re.split(r"[^A-Za-zÀ-ÿ0-9]+", _CAMEL.sub(" ", name))
-    found: list[str] = []
-    for part in parts:
-        found += re.findall(r"[A-Za-zÀ-ÿ]+|\d+", part)
-    return [word.lower() for word in found]
+    return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns.candidates import Candidate
@@ -17,14 +17,14 @@ def draft_channels(
     chosen: dict[str, Candidate],
     run: Run,
     stated: dict[str, tuple[str, str]],
-    axes: Sequence[Candidate] = (),
+    parts: Mapping[str, Sequence[Candidate]] | None = None,
 ) -> dict[str, Draft]:
     """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
 
-    `axes` are the columns of y and z, where the chosen place is x.
+    `parts` are the further columns of a role: y and z, where the chosen place is x.
     """
     drafts = {
-        role: draft_of(role, column, run, stated, axes if role == "position" else ())
+        role: draft_of(role, column, run, stated, (parts or {}).get(role, ()))
         for role, column in chosen.items()
     }
     rotation_unit(drafts, stated)

@@ -12,26 +12,43 @@ from soilml.log_import.guesses.drafts.draft import Draft
 from soilml.log_import.guesses.drafts.unit_guess import guess_rotation_unit, guess_unit
 from soilml.log_import.units.conversion import dimension
 
+#: What several columns of a channel are.
+_SEVERAL = {
+    "load": "CHANGE: cells that carry the wheel together are added; leave out others",
+    "drawbar_pull": "CHANGE: cells that pull together are added; leave out others",
+    "sinkage": "the mean of them",
+    "slope": "CHANGE: accelerations forward, to the left and up",
+}
+
 
 def draft_of(
     role: str,
     column: Candidate,
     run: Run,
     stated: dict[str, tuple[str, str]],
-    axes: Sequence[Candidate],
+    more: Sequence[Candidate],
 ) -> Draft:
-    """The table of a channel; `axes` are the columns of y and z of a place."""
+    """The table of a channel; `more` are its other columns: y and z of a place, further cells."""
     draft = Draft(column=column)
-    draft.put("column", [c.address for c in (column, *axes)] if axes else column.address)
+    draft.put(
+        "column", [c.address for c in (column, *more)] if more else column.address,
+        _SEVERAL.get(role, "") if more else "",
+    )  # fmt: skip
     _, values = run.find(column.address)
     known = values[np.isfinite(values)]
     moving = float(np.percentile(np.abs(known), 90)) if known.size else 0.0
     if role in ("position", "wheel_angle", "sinkage") and known.size:
         moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
-                     (run.find(c.address)[1] for c in (column, *axes)))  # fmt: skip
+                     (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
+    if role == "slope" and more:
+        return draft  # an angle between accelerations, whatever their unit
     unit, why = guess_unit(role, column, moving)
     if role == "position" and dimension(unit) == "count":
         draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
+    elif dimension(unit) == "1" and role in ("torque", "motor_current"):
+        one = "0.01 N m" if role == "torque" else "0.01 A"
+        rated = "torque" if role == "torque" else "current"
+        draft.put("scale", one, f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
     elif dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
         known_turn = "counts_per_turn" in stated

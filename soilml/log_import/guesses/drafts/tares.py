@@ -54,21 +54,34 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs) -> None:
 
 
 def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Tare a load where the log starts with the wheel above the ground and reads an offset."""
+    """Where the log starts with the wheel above the ground: tare a load there that reads an offset,
+    and a sinkage not before the wheel has landed.
+    """
     rest = resting(inputs)
     if rest is None or "load" not in inputs.values or "load" not in drafts:
         return
     values, shortest = inputs.values["load"][rest], round(0.4 / inputs.step)
     driving = float(np.nanmedian(inputs.values["load"][moving(inputs)]))
     first = float(np.nanmedian(values[:shortest])) if values.size >= shortest > 0 else math.nan
-    if not _OFFSET * abs(driving) < abs(first) < 0.6 * abs(driving):
+    if not abs(first) < 0.6 * abs(driving):
         return
     landed = np.abs(values - first) > 0.25 * abs(driving - first)
     end = int(np.argmax(landed)) if landed.any() else values.size
     if end < shortest:
         return
     start, stop = float(inputs.time[0]), float(inputs.time[0] + 0.8 * end * inputs.step)
-    drafts["load"].put(
-        "tare", [round(start, 2), round(stop, 2)], f"CHANGE: from, until, s; it reads {first:.3g} "
-        f"there and {driving:.3g} while driving: right if the wheel was above the ground"
-    )  # fmt: skip
+    if abs(first) > _OFFSET * abs(driving):
+        drafts["load"].put(
+            "tare", [round(start, 2), round(stop, 2)], f"CHANGE: from, until, s; it reads "
+            f"{first:.3g} there and {driving:.3g} while driving: right if the wheel was above the "
+            "ground"
+        )  # fmt: skip
+    on_ground = np.abs(values - first) > 0.9 * abs(driving - first)
+    if drafts.get("sinkage", Draft()).keys.get("tare") == "rest" and on_ground.any():
+        down = start + int(np.argmax(on_ground)) * inputs.step
+        until = start + (values.size - 1) * inputs.step
+        if until - down > 0.4:
+            drafts["sinkage"].put(
+                "tare", [round((down + until) / 2, 2), round(until, 2)],
+                "from, until, s: the wheel stands on the ground and does not turn yet",
+            )  # fmt: skip

@@ -9,6 +9,8 @@ from soilml.log_import.guesses.columns.column_words import words_of
 
 #: Radius of the wheels of rovers and rigs, m: the usual one, and its range.
 _USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
+#: Masses that a scale shows, as forces; any other is taken for kg.
+_AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
 #: Words that say that a column counts the pulses of an encoder.
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
 
@@ -20,7 +22,8 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
     """
     if column.unit and column.kind is not None:
         if column.kind == "kg":
-            return "kgf", f"the log says {column.unit}; as a force that is kgf"
+            force = _AS_FORCE.get(column.unit.lower(), "kgf")
+            return force, f"the log says {column.unit}; as a force that is {force}"
         return column.unit, ""
     words = words_of(column.name)
     if role in ("wheel_angle", "wheel_speed") and _COUNTS & {*words}:
