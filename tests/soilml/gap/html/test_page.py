@@ -176,7 +176,9 @@ def bad():
 def test_every_status_gives_a_complete_page_with_its_meaning(status):
     # the picture of the curves is the same for all; it takes most of the time
     drawn = {} if status == "named" else {"curves": None}
-    html = page(bad() if status == "bad-data" else report(status, **drawn), "rover.toml", "runs.csv")
+    html = page(
+        bad() if status == "bad-data" else report(status, **drawn), "rover.toml", "runs.csv"
+    )
     seen = read(html)
     assert html.startswith("<!DOCTYPE html>\n<html lang=")
     assert len(set(seen.ids)) == len(seen.ids)
