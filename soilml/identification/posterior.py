@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
+from soilml.identification.descent import descend
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
@@ -173,14 +174,14 @@ def sample_posterior(
     show the region.
 
     The misfit is the sum of squared residuals over declared variances, per degree of freedom, at
-    the sample of largest weight; with a discrepancy, weighted by the inverse covariance. Raises
-    `FitError` as `posterior` does.
+    the sample of largest weight, and with shared errors at the optimum next to it; with a
+    discrepancy, weighted by the inverse covariance. Raises `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, data, free, noise_scale)
-    if density.errors:
-        sample: ImportanceSample | None = joint_sample(
-            density, least_squares_problem(case, data, free)
-        )
+    problem = least_squares_problem(case, data, free) if density.errors else None
+    sample: ImportanceSample | None
+    if problem is not None:
+        sample = joint_sample(density, problem)
     else:
         sample = _from_surface(density, start)
     if sample is None:
@@ -195,7 +196,13 @@ def sample_posterior(
             f"spread ({LEAST_USABLE_SIZE:.0f} needed): the posterior is too narrow a part of the "
             "prior; use --method nonlinear, or narrow [soil.prior]"
         )
-    cost = density.squared_residuals(sample.u[[int(np.argmax(sample.weights))]])
+    best = sample.u[[int(np.argmax(sample.weights))]]
+    cost = density.squared_residuals(best)
+    if problem is not None:
+        # samples of soil and errors have nearly one more squared residual for each of them
+        optimum = descend(problem, best[0])
+        optimum = descend(problem.with_noise_at(optimum), optimum.u)
+        cost = min(cost, density.squared_residuals(optimum.u[None]))
     cost += data.squares_within
     return sample, cost / max(data.reading_count - len(free), 1)
 
