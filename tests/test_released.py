@@ -76,7 +76,7 @@ STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 
 
 @cache
-def runs(recipe_name, rows, steady, count=250):
+def runs(recipe_name, rows, steady, count=400):
     """Columns (runs, rows) of runs in which something is steady."""
     recipe = read_recipe(recipe_name)
     recipe = replace(recipe, blocks=(Block(rows, 1.0, steady),)).sized(rows * count, seed=777)
