@@ -106,7 +106,10 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
         if f.path not in ("cohesion", *(unknown.path for unknown in unknowns))
     ]
     if not known:
-        warnings.append("noise is not declared: estimated from the residuals")
+        warnings.append(
+            "noise is not declared: estimated from the residuals; in [noise] of the model file "
+            "torque_Nm = '3 %' would declare it"
+        )
     return Fit(
         method="newton",
         names=tuple(f.path for f in unknowns),

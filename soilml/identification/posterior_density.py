@@ -49,9 +49,10 @@ class PosteriorDensity:
     ) -> None:
         undeclared = [column(c.name) for c in data.channels if not c.declared]
         if undeclared:
+            lines = ", ".join(f"{name} = '3 %'" for name in undeclared)
             raise FitError(
                 f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
-                "[noise]"
+                f"[noise] of the model file, such as {lines}"
             )
         self.case, self.free = with_modelled_errors(case, data, free)
         self.data, self.noise_scale = data, noise_scale

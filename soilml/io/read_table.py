@@ -163,7 +163,8 @@ def _known_columns(
         shown = ", ".join(f"{name!r} ({hint})" if hint else repr(name) for name, hint in hints)
         raise TableError(
             f"{file}: none of its columns is known: {shown}; a table of runs has the columns "
-            f"{', '.join(RUNS)}, in SI units; give other columns these names and units"
+            f"{', '.join(RUNS)}, in SI units; give other columns these names and units, "
+            "or let `soilml import --init` guess what they are"
         )
     for name in header:
         if header.count(name) > 1:

@@ -75,6 +75,11 @@ class ImportedLog:
     sources: tuple[str, ...] = ()
     map_name: str = "map"
 
+    @property
+    def runs(self) -> int:
+        """How many runs there are, each wheel's counted."""
+        return len(self.series) or len(set(self.table["run"]))
+
     def left_out(self) -> list[tuple[str, Stretch]]:
         """Runs and their stretches that are not in the table, with the reason."""
         return [(s.run, stretch) for s in self.series for stretch in s.stretches if stretch.why]

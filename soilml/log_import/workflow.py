@@ -25,6 +25,7 @@ from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_m
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Floats
 from soilml.log_import.result import ImportedLog, WheelSeries
+from soilml.log_import.row_import import import_rows
 from soilml.log_import.row_table import rows_as_table, unusable
 from soilml.log_import.window_rows import (
     WindowRow,
@@ -84,6 +85,8 @@ def import_log(
         tell("reading logs", i, len(files))
         recordings.append(read_log(Path(file)))
     tell("reading logs", len(files), len(files))
+    if found.each_row:
+        return import_rows(recordings, found, accept)
     runs = runs_of(recordings, found)
     analyses = [_Wheel(found, wheel, runs, tell) for wheel in found.wheels]
     wrong = [text for analysis in analyses for text in analysis.map_hints()]

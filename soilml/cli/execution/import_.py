@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     if is_terminal():
         _print_table(found)
     tell(
-        f"{len(found.table)} rows of {len(found.series)} runs written to {args.out}; "
+        f"{len(found.table)} rows of {found.runs} runs written to {args.out}; "
         f"report: {files[1]}; errors that all rows share: {files[3]}"
     )
     return 0
@@ -75,6 +75,8 @@ def _init(args: argparse.Namespace) -> int:
 def _print_remarks(found: ImportedLog) -> None:
     for text in (*found.implausible, *found.remarks):
         tell(f"! {text}")
+    if not found.series:
+        return
     short = sum(stop.stop - stop.start for _, stop in found.left_out())
     tell(f"{short:.0f} s were left out; the report says why")
 

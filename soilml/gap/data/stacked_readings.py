@@ -140,7 +140,8 @@ class StackedReadings:
             return self, []
         notes = [
             f"{column(self.channels[i])} is excluded: its noise is not declared and there are no "
-            "repeated rows to estimate it from"
+            "repeated rows to estimate it from; declare it in [noise], such as "
+            f"{column(self.channels[i])} = '3 %'"
             for i in sorted(unknown)
         ]
         kept = [i for i in range(len(self.channels)) if i not in unknown]

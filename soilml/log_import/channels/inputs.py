@@ -83,7 +83,7 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         if channel.columns:
             raw[role] = [run.find(address) for address in channel.columns]
         else:
-            constants[role] = _constant(run, channel)
+            constants[role] = channel_constant(run, channel)
     parts = [part for several in raw.values() for part in several]
     if not parts:
         raise InputError(f"run {run.name}: the map names no column")
@@ -159,7 +159,8 @@ def along_path(sampled: list[Floats]) -> Floats:
     return np.asarray(place if way[-1] >= way[0] else -place)
 
 
-def _constant(run: Run, channel: Channel) -> float:
+def channel_constant(run: Run, channel: Channel) -> float:
+    """A channel that no column is: a value, or a number that the log or its name states."""
     if channel.value is not None:
         return channel.value.value
     if channel.head_pattern is not None:

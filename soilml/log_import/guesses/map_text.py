@@ -32,6 +32,12 @@ from soilml.log_import.guesses.drafts.draft_inputs import fastest_ratio, inputs_
 from soilml.log_import.guesses.file_kinds import clocks_differ, guess_file_kinds
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.stated_constants import agreed_constants
+from soilml.log_import.guesses.steady_rows import (
+    add_errors,
+    is_error,
+    rows_are_runs,
+    run_of_rows,
+)
 from soilml.log_import.guesses.toml_value import toml_value
 from soilml.log_import.guesses.windows_guess import guess_windows
 from soilml.log_import.mapping.channel import ROLES
@@ -66,8 +72,9 @@ class _MapText:
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
         self.logs = logs
         first = [recording for log in logs[:4] for recording in log]
-        self.time_column, self.time_unit = guess_clock(first)
-        self.run_column, self.run_count = guess_run_column(logs[0])
+        self.steady = rows_are_runs(logs)
+        self.time_column, self.time_unit = ("", "") if self.steady else guess_clock(first)
+        self.run_column, self.run_count = ("", 0) if self.steady else guess_run_column(logs[0])
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
         self.structs = structs_are_runs(logs[0], self.time_column)
         self.pauses, self.longest = pauses(logs[0], self.time_column, self.time_unit)
@@ -83,8 +90,10 @@ class _MapText:
         self.runs = runs_of(logs, self._map(self.kinds))
         self.run = liveliest(self.runs[:_LOOKED])
         clocks = {self.time_column, *(kind.time_column for kind in self.kinds)}
-        self.columns = [c for c in candidates_of(self.run.recordings) if c.name not in clocks]
-        self.found: Assignment = assign(self.columns)
+        columns = candidates_of(self.run.recordings, self.steady > 0)
+        self.columns = [c for c in columns if c.name not in clocks]
+        self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
+        self.found: Assignment = assign([c for c in self.columns if c not in self.errors])
         self.run_names = [run.name for run in self.runs]
 
     def _map(self, kinds: Sequence[FileKind]) -> LogMap:
@@ -127,6 +136,7 @@ class _MapText:
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
+        add_errors(first, self.found, self.errors)
         lines += self._wheel(first)
         lines += load_lines(self.found, self.stated, self.heads, self.run_names)
         for role in ROLES:
@@ -145,7 +155,8 @@ class _MapText:
             for role in own:
                 draft = drafts[name][role].without(alike[role])
                 lines += self._table(f"[wheels.{name}.{role}]", role, draft)
-        lines += guess_windows(self.runs, first)
+        if not self.steady:
+            lines += guess_windows(self.runs, first)
         return "\n".join(lines) + "\n"
 
     def _head(self) -> list[str]:
@@ -186,6 +197,8 @@ class _MapText:
         return lines
 
     def _time_lines(self) -> list[str]:
+        if self.steady:
+            return []
         if self.time_column:
             column, unit = toml_value(self.time_column), toml_value(self.time_unit)
             return ["", "[time]", f"column = {column}", f"unit = {unit}"]
@@ -195,6 +208,15 @@ class _MapText:
         return ["", "[time]", f'rate = "{self.rate:g} Hz"  # {stated}']
 
     def _run_lines(self) -> list[str]:
+        if self.steady:
+            lines = [
+                "",
+                "[runs]",
+                f"each_row = true  # {self.steady} rows and no time: each is a run",
+            ]
+            name = run_of_rows(self.run.recordings)
+            why = "rows with one name were driven on one soil"
+            return [*lines, f"column = {toml_value(name)}  # {why}"] if name else lines
         if self.run_column:
             column = toml_value(self.run_column)
             return ["", "[runs]", f"column = {column}  # {self.run_count} values, one run each"]

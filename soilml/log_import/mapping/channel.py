@@ -68,6 +68,9 @@ class Channel:
         What stands between motor and wheel; the ratio is turns of the motor for one of the wheel.
     unwrap
         Range of an angle or counter that starts again at 0, in the log's unit; 0 where it does not.
+    std_column, std_scale, std_is_share
+        Column with the standard error of each row, where each row is a steady run; what its values
+        are multiplied by to be in the unit of soilml, or to be shares of the reading.
     definition
         What a slip that the log has is: one of `SLIP_DEFINITIONS`.
     """
@@ -88,6 +91,9 @@ class Channel:
     unwrap: float = 0.0
     definition: str = SLIP_DEFINITIONS[0]
     head_pattern: re.Pattern[str] | None = None
+    std_column: str = ""
+    std_scale: float = 1.0
+    std_is_share: bool = False
 
     @property
     def where(self) -> str:
@@ -139,6 +145,7 @@ def take_channel(settings: Settings, role: str) -> Channel:
         own["torque_constant"] = take_uncertain(settings, "torque_constant", "N m/A", lower=0.0)
         own["idle_current"] = take_uncertain(settings, "idle_current", "A", _NOTHING)
     unwrap = settings.number("wraps_at", 0.0) if role == "wheel_angle" else 0.0
+    std_column, std_scale, is_share = _std(settings, role, unit, scale)
     bias = _error(settings, "bias")
     channel = Channel(
         role,
@@ -153,6 +160,9 @@ def take_channel(settings: Settings, role: str) -> Channel:
         unwrap=unwrap,
         definition=_definition(settings, role),
         head_pattern=head_pattern,
+        std_column=std_column,
+        std_scale=std_scale,
+        std_is_share=is_share,
         **own,
     )
     settings.finish()
@@ -172,6 +182,18 @@ def _columns(settings: Settings, role: str) -> tuple[str, ...]:
             f"column is {given!r}; needed is {needed if len(several) > 1 else needed[:32]}"
         )
     return tuple(names)
+
+
+def _std(settings: Settings, role: str, unit: str, scale: float) -> tuple[str, float, bool]:
+    """Column of the standard errors, their scale, and whether they are shares of the reading."""
+    column = settings.text("std", "")
+    own = settings.text("std_unit", unit)
+    ours = ROLES[role][0]
+    if dimension(own) == "1" != ours:
+        return column, factor(own, "1", f"{settings.where} std_unit"), True
+    if own == unit:
+        return column, abs(scale), False
+    return column, factor(own, ours, f"{settings.where} std_unit"), False
 
 
 def _definition(settings: Settings, role: str) -> str:

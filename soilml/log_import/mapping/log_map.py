@@ -11,6 +11,12 @@ from typing import Any
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.log_import.mapping.channel import ROLES, Channel, take_channel
 from soilml.log_import.mapping.wheel_tables import shared_keys, with_shared_keys
+from soilml.log_import.mapping.window_tables import (
+    LeaveOut,
+    WindowSettings,
+    take_left_out,
+    take_windows,
+)
 from soilml.log_import.units.uncertain_value import Uncertain, take_uncertain
 
 _ZERO = Uncertain(0.0)
@@ -58,28 +64,6 @@ class WheelMap:
 
 
 @dataclass(frozen=True)
-class WindowSettings:
-    """How steady windows are found; times in s."""
-
-    shortest: float = 2.0
-    settle: float = 0.5
-    sensitivity: float = 1.0
-    largest_slip_change: float = 0.05
-    largest_torque_change: float = 0.15
-    within: tuple[float, float] = (-float("inf"), float("inf"))
-
-
-@dataclass(frozen=True)
-class LeaveOut:
-    """A stretch of a run that the user leaves out, in s after the start of the run."""
-
-    run: str
-    start: float
-    stop: float
-    why: str
-
-
-@dataclass(frozen=True)
 class LogMap:
     """How a log is read; see docs/import.md for the file."""
 
@@ -96,6 +80,7 @@ class LogMap:
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
+    each_row: bool = False
 
     @property
     def splits_by_time(self) -> bool:
@@ -131,6 +116,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     run_column = runs.text("column", "")
     at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
     each_struct = bool(runs.take("each_struct", bool, "true or false", False))
+    each_row = bool(runs.take("each_row", bool, "true or false", False))
     pause = take_uncertain(runs, "split_at_pauses_over", "s", Uncertain(math.inf), 0.0).value
     runs.finish()
     vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
@@ -175,8 +161,9 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         each_struct,
         pause,
         vehicle,
-        _take_windows(settings.table("windows")),
-        tuple(_take_left_out(entry) for entry in settings.tables("leave_out")),
+        take_windows(settings.table("windows")),
+        tuple(take_left_out(entry) for entry in settings.tables("leave_out")),
+        each_row,
     )
 
 
@@ -232,44 +219,6 @@ def _take_vehicle(settings: Settings) -> Vehicle:
     vehicle = Vehicle(mass, settings.count("wheels", 1), gravity, **lengths)
     settings.finish()
     return vehicle
-
-
-def _take_windows(settings: Settings) -> WindowSettings:
-    usual = WindowSettings()
-    within = usual.within
-    if "within" in settings:
-        needed = "two times in s after the start of a run, such as [5, 20]"
-        given = settings.take("within", list, needed)
-        if len(given) != 2 or not all(isinstance(x, int | float) for x in given):
-            settings.fail(f"within is {given!r}; needed is {needed}")
-        within = (float(given[0]), float(given[1]))
-    found = WindowSettings(
-        take_uncertain(settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0).value,
-        take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
-        settings.number("sensitivity", usual.sensitivity),
-        take_uncertain(
-            settings, "largest_slip_change", "1", Uncertain(usual.largest_slip_change)
-        ).value,
-        take_uncertain(
-            settings, "largest_torque_change", "1", Uncertain(usual.largest_torque_change)
-        ).value,
-        within,
-    )
-    if not found.sensitivity > 0.0:
-        settings.fail("sensitivity must be above zero; 1 is usual, 2 finds smaller changes")
-    settings.finish()
-    return found
-
-
-def _take_left_out(settings: Settings) -> LeaveOut:
-    found = LeaveOut(
-        settings.text("run", ""),
-        settings.number("from", 0.0),
-        settings.number("until", float("inf")),
-        settings.text("why", "left out by the map"),
-    )
-    settings.finish()
-    return found
 
 
 def _check_wheel(settings: Settings, wheel: WheelMap, vehicle: Vehicle | None) -> None:

@@ -78,7 +78,7 @@ def find_layout(lines: Sequence[str]) -> TextLayout | None:
     found = [f for f in found if f[3] > 0 and not (f[0] == "," and f[1])]
     if not found:
         return None
-    best = max(found, key=lambda f: (f[3] * min(f[4], 3), f[4]))
+    best = max(found, key=lambda f: (f[3] * min(f[4], 3), f[4], _numbers(head[f[2] :], f[0], f[1])))
     separator, comma, first, _, width = best
     names, units, header = _header(head[:first], separator, width)
     about = tuple(_plain(line) for line in head[:header] if _plain(line))
@@ -142,6 +142,15 @@ def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, in
         if all(run):
             return i, sum(like[i:]), max(k for k, fits in zip(kinds, like, strict=True) if fits)
     return 0, 0, 0
+
+
+def _numbers(lines: list[str], separator: str, comma: bool) -> int:
+    """How many cells are numbers: of two decimal marks, that of a few columns decides."""
+    try:
+        rows = [split_line(line, separator) for line in lines if line.strip()]
+    except csv.Error:
+        return 0
+    return sum(bool(cell) and is_number(cell, comma) for row in rows for cell in row)
 
 
 def _header(

@@ -83,7 +83,7 @@ def page(
 
 def summary(imported: ImportedLog) -> Report:
     """What every report says: question, verdict, what looks odd, what to do."""
-    rows, runs = len(imported.table), len(imported.series)
+    rows, runs = len(imported.table), imported.runs
     odd = (*imported.implausible, *imported.remarks)
     if imported.implausible:
         answer, tone = f"The map looks wrong: {odd[0]}", "bad-data"
@@ -98,8 +98,12 @@ def summary(imported: ImportedLog) -> Report:
         kind="import",
         title=f"Import report: {imported.map_name}",
         badge=f"{rows} row{'s'[: rows != 1]}",
-        meaning=f"from {runs} run{'s'[: runs != 1]}; {_kept_share(imported)} of the time is in "
-        "steady windows",
+        meaning=f"from {runs} run{'s'[: runs != 1]}; "
+        + (
+            f"{_kept_share(imported)} of the time is in steady windows"
+            if imported.series
+            else "each row of the table is a steady run"
+        ),
         answer=[answer],
         tone=tone,
         warnings=odd[1:],
@@ -120,7 +124,11 @@ def _rows(imported: ImportedLog) -> list[dict[str, Any]]:
             std = scale * float(table[f"{key}_std"][i]) if f"{key}_std" in table else np.nan
             cells.append(format_with_std(value, std) if np.isfinite(value) else "–")
         rows.append(
-            {"run": str(table["run"][i]), "time": f"{table['time_s'][i]:.1f}", "cells": cells}
+            {
+                "run": str(table["run"][i]),
+                "time": f"{table['time_s'][i]:.1f}" if "time_s" in table else "–",
+                "cells": cells,
+            }
         )
     return rows
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.log_import.mapping.log_map import LeaveOut, WindowSettings
+from soilml.log_import.mapping.window_tables import LeaveOut, WindowSettings
 from soilml.log_import.recording import Floats
 from soilml.log_import.windows.change_points import steady_pieces
 from soilml.log_import.windows.mean_errors import mean_error

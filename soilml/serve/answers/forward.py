@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.physics.forces import apply_input_effects
+from soilml.physics.gears.linear_wheel import LinearWheel
 from soilml.physics.operating_point import Operating
 from soilml.row_status import Status
 from soilml.serve.answers.chosen_case import forward_case, with_sliders
@@ -66,9 +67,12 @@ def _profile(case: Case, slip: float, load: float) -> dict[str, Any] | None:
     at = Operating(slip=slip, load=load)
     found = case.model.profile(case.soil, at, POINTS)
     angle, normal, shear = (np.asarray(v) for v in (found.angle, found.normal, found.shear))
-    if len(angle) < FEWEST_POINTS:  # a closed form, which has no profile to draw
-        return None
     soil = apply_input_effects(case.model.load_case(case.soil, at)[0]).soil
+    if isinstance(case.model.gear, LinearWheel):
+        peak_share = float(np.ravel(soil.a0)[0] + np.ravel(soil.a1)[0] * slip)
+        angle, normal, shear = _straight_lines(angle, normal, shear, peak_share)
+    elif len(angle) < FEWEST_POINTS:  # a closed form, which has no profile to draw
+        return None
     strength = np.ravel(soil.cohesion) + normal * np.tan(np.ravel(soil.friction_angle))
     used = float(np.trapezoid(np.abs(shear), -angle) / np.trapezoid(strength, -angle))
     return {
@@ -78,6 +82,27 @@ def _profile(case: Case, slip: float, load: float) -> dict[str, Any] | None:
         "strength": _digits(1e-3 * strength),
         "mobilised": used,
     }
+
+
+def _straight_lines(
+    angle: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    shear: NDArray[np.float64],
+    peak_share: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Stresses (points,) along straight lines, of those at exit and maximum (2,).
+
+    They go from entry, where there is none, to exit; the maximum is at this share of the entry
+    angle.
+    """
+    leave, peak = float(angle[0]), float(angle[1])
+    corners = np.array([leave, peak, peak / peak_share])
+    half = POINTS // 2 + 1
+    path = np.concatenate(
+        [np.linspace(corners[2], peak, half), np.linspace(peak, leave, POINTS - half + 1)[1:]]
+    )
+    lines = (np.interp(path, corners, [*values, 0.0]) for values in (normal, shear))
+    return path, *lines
 
 
 def _digits(values: Any) -> list[float]:

@@ -7,7 +7,7 @@ import pytest
 from simulated_rig import wandering
 
 from soilml.log_import.checks.irregular import irregular_windows
-from soilml.log_import.mapping.log_map import WindowSettings
+from soilml.log_import.mapping.window_tables import WindowSettings
 from soilml.log_import.window_rows import WindowRow
 from soilml.log_import.windows.change_points import change_points, steady_pieces
 from soilml.log_import.windows.mean_errors import autocorrelation_time, mean_error

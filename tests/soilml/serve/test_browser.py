@@ -54,6 +54,7 @@ def chromium():
 def tab(chromium, page):
     """The page in a fresh profile; no console message, error or request to elsewhere is allowed."""
     context = chromium.new_context(viewport={"width": 1280, "height": 900}, accept_downloads=True)
+    context.set_default_timeout(LONG)
     opened = context.new_page()
     said, asked = [], []
     opened.on("console", lambda message: said.append(message.text))
@@ -73,7 +74,7 @@ EXPECTED = "Failed to load resource: the server responded with a status of 422"
 
 def until(tab, expression):
     """Wait for an expression; `wait_for_function` would need what the page's policy forbids."""
-    for _ in range(600):
+    for _ in range(LONG // 50):
         if tab.evaluate(expression):
             return
         tab.wait_for_timeout(50)
@@ -189,8 +190,8 @@ def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     start.click()
     tab.locator("#gap-job").get_by_role("button", name="Cancel").click()
     tab.wait_for_selector("#gap-job", state="hidden")
-    assert tab.locator(".verdict").count() == 0
     until(tab, "!document.querySelector('#gap-start').disabled")
+    assert tab.locator(".verdict").count() == 0
     start.click()
     tab.wait_for_selector(".verdict", timeout=LONG)
     assert "slip-sinkage" in tab.locator(".verdict").inner_text()

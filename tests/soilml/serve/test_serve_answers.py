@@ -61,6 +61,18 @@ def test_shear_never_exceeds_the_strength_and_approaches_it_with_a_small_modulus
     assert shares == sorted(shares) and shares[-1] > 0.9
 
 
+@pytest.mark.parametrize("slip", [0.3, -0.3])
+def test_stresses_of_the_linear_wheel_are_straight_lines_that_sum_to_its_torque(slip):
+    text = MODEL.partition("[[effect]]")[0].replace('type = "wheel"', 'type = "linear-wheel"')
+    found = forward({"model": text, "values": {"slip": slip, "load": 60.0}})
+    profile = found["profile"]
+    angle, normal, shear = (np.asarray(profile[k]) for k in ("angle", "normal", "shear"))
+    assert normal[0] == shear[0] == 0.0 and angle[0] > angle[-1] == 0.0
+    torque = 0.1**2 * 0.08 * 1e3 * np.trapezoid(shear, -np.deg2rad(angle))
+    assert found["at"]["torque"] == pytest.approx(torque, rel=1e-3)
+    assert np.sum(np.abs(np.diff(normal, 2)) > 1e-3 * normal.max()) <= 1  # one corner
+
+
 @pytest.mark.parametrize("wheel", WHEELS)
 def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
     values = {path: c["value"] for path, c in sliders({"wheel": wheel}).items()}

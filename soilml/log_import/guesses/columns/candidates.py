@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns.behaviour import Behaviour, behaviour, looks_like_time
@@ -41,25 +41,27 @@ class Candidate:
     scores: dict[str, float]
 
 
-def candidates_of(recordings: Sequence[Recording]) -> list[Candidate]:
-    """All numeric columns, with their scores."""
+def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list[Candidate]:
+    """All numeric columns, with their scores; in a table of `steady` runs they may be constant."""
     counts: dict[str, int] = {}
     for recording in recordings:
         for name in recording.columns:
             counts[name] = counts.get(name, 0) + 1
     return [
-        _candidate(recording, name, counts[name] > 1)
+        _candidate(recording, name, counts[name] > 1, steady)
         for recording in recordings
         for name in recording.columns
     ]
 
 
-def _candidate(recording: Recording, name: str, ambiguous: bool) -> Candidate:
+def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:
     values = recording.columns[name]
     stated = recording.units.get(name, "")
     unit = stated if dimension(stated) else unit_in_name(name)
     kind = dimension(unit) if unit else None
     own = behaviour(values)
+    if steady:
+        own = replace(own, constant=False)
     # the name of a topic says what its fields are of: /motor/left: current
     topic = f"{recording.name} {name}" if recording.name else name
     scores = name_scores(topic)

@@ -22,13 +22,18 @@ export async function work(place, content) {
   box.replaceChildren(stage, bar, cancel);
   box.hidden = false;
   const alive = () => running.get(place) === token;
+  // Cancel works from the moment it is seen, also before the server has named the job
+  let id = null;
+  const stop = () => { if (id !== null) end(id).catch(() => {}); };
+  cancel.addEventListener("click", () => {
+    if (alive()) running.delete(place);
+    box.hidden = true;
+    stop();
+  });
   try {
     let job = await ask("/api/jobs", content);
-    cancel.addEventListener("click", async () => {
-      if (alive()) running.delete(place);
-      box.hidden = true;
-      await end(job.id).catch(() => {});
-    });
+    id = job.id;
+    if (!alive()) stop();
     while (job.state === "running") {
       if (!alive()) return null;
       const text = job.share === null ? job.stage : `${job.stage}, ${Math.round(100 * job.share)} %`;

@@ -8,7 +8,7 @@ const WIDTH = 420, HEIGHT = 292, RIM = 140, FAN = 64;
 /** Draw the wheel of an answer into an element; a gear that is no wheel has no picture. */
 export function wheelPicture(place, answer) {
   const { profile, radius, at } = answer;
-  const isWheel = answer.gear === "wheel" && profile && radius > 0;
+  const isWheel = answer.gear.endsWith("wheel") && profile && radius > 0;
   place.hidden = !isWheel;
   if (!isWheel) return;
   const scale = RIM / radius;

@@ -1,0 +1,180 @@
+"""Tables in which each row is one steady run already, under other names and in other units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.log_import.channels.inputs import channel_constant, our_slip
+from soilml.log_import.channels.runs import Run, run_names
+from soilml.log_import.channels.shared_errors import shared_errors
+from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.checks.map_hints import map_hints
+from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.mapping.channel import Channel
+from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.result import ImportedLog
+from soilml.log_import.row_table import rows_as_table, unusable
+from soilml.log_import.window_rows import AVERAGED, WindowRow, plain_constants, quantities_of
+from soilml.log_import.windows.steady import Stretch
+from soilml.quantities import column
+
+#: Channels that only samples over time can be.
+_OF_SAMPLES = ("wheel_angle", "position")
+
+
+def import_rows(
+    logs: Sequence[Sequence[Recording]], log_map: LogMap, accept: bool = False
+) -> ImportedLog:
+    """Bring tables of steady runs into our table of runs.
+
+    Standard deviations are those of the columns `std` of the map, with its `noise` in addition; a
+    remark names the quantities that have none.
+
+    Raises `InputError` where a column is missing, a channel needs samples over time, the map is
+    implausible (unless `accept`), or no row can be used.
+    """
+    names = run_names([log[0].file for log in logs])
+    groups: list[tuple[WheelMap, Run, Sequence[WindowRow]]] = []
+    left: list[str] = []
+    wrong: list[str] = []
+    rows_of_wheels: list[tuple[WheelMap, list[WindowRow]]] = []
+    for wheel in log_map.wheels:
+        rows: list[WindowRow] = []
+        every: list[WindowRow] = []
+        for name, log in zip(names, logs, strict=True):
+            for recording in log:
+                run = Run(name, (recording,), (np.arange(float(len(recording))),))
+                labels = _labels(run, log_map)
+                found = _rows(run, wheel, log_map)
+                every += found
+                for i, row in enumerate(found):
+                    if why := unusable(row, {}):
+                        left.append(f"row {i + 1} of {recording.file.name} is left out: {why}")
+                        continue
+                    groups.append((wheel, Run(labels[i], (recording,), run.times), [row]))
+                    rows.append(row)
+        wrong += map_hints(log_map, wheel, _columns(every))
+        rows_of_wheels.append((wheel, rows))
+    if wrong and not accept:
+        raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
+    if not groups:
+        raise InputError(f"{log_map.source}: no row can be used: {left[0] if left else 'empty'}")
+    table = rows_as_table(groups, log_map)
+    table = Table({k: v for k, v in table.columns.items() if k != "time_s"}, table.source)
+    wheel, rows = rows_of_wheels[0]
+    means = _means(rows)
+    bias, parts = shared_errors(
+        lambda constants: quantities_of(means, log_map, wheel, constants),
+        constants_of(wheel, log_map.vehicle),
+    )
+    radius = wheel.radius.value if wheel.radius else None
+    remarks = [*left[:5], *_without_errors(table), *table_hints(table.columns, radius)]
+    return ImportedLog(
+        table, bias, tuple(parts), (), tuple(dict.fromkeys(remarks)), tuple(wrong),
+        radius or float("nan"), tuple(str(log[0].file) for log in logs), log_map.source,
+    )  # fmt: skip
+
+
+def _labels(run: Run, log_map: LogMap) -> list[str]:
+    """Name of the run of each row: by [runs] column, or that of the file."""
+    (recording,) = run.recordings
+    name = log_map.run_column
+    if not name:
+        return [run.name] * len(recording)
+    if name in recording.texts:
+        return [cell or "unnamed" for cell in recording.texts[name]]
+    return [f"{value:g}" for value in run.find(name)[1]]
+
+
+def _rows(run: Run, wheel: WheelMap, log_map: LogMap) -> list[WindowRow]:
+    """The rows of a table with their standard deviations."""
+    count = len(run.recordings[0])
+    means: dict[str, Floats] = {}
+    errors: dict[str, Floats] = {}
+    for role, channel in wheel.channels.items():
+        if role in _OF_SAMPLES or channel.tare is not None:
+            raise InputError(
+                f"{log_map.source}: [{role}] needs samples over time, and [runs] each_row says "
+                "that each row is a steady run; needed is a speed or [slip], and no tare"
+            )
+        means[role], errors[role] = _channel(run, channel, count)
+    constants = plain_constants(log_map, wheel)
+    values = quantities_of(dict(means), log_map, wheel, constants)
+    std: dict[str, Floats] = {}
+    for role, error in errors.items():
+        if not np.any(error > 0.0):
+            continue
+        changed = means[role] + np.nan_to_num(error)
+        moved = quantities_of({**means, role: changed}, log_map, wheel, constants)
+        for name in ("slip", *AVERAGED):
+            if name in moved:
+                change = np.abs(moved[name] - values[name])
+                std[name] = np.hypot(std.get(name, np.zeros(count)), change)
+
+    def at(found: Mapping[str, Floats], i: int) -> dict[str, float]:
+        return {k: float(np.broadcast_to(v, (count,))[i]) for k, v in found.items()}
+
+    return [
+        WindowRow(
+            Stretch(float(i), float(i), ""), at(means, i), at(values, i),
+            {k: v for k, v in at(std, i).items() if v > 0.0},
+        )
+        for i in range(count)
+    ]  # fmt: skip
+
+
+def _channel(run: Run, channel: Channel, count: int) -> tuple[Floats, Floats]:
+    """Readings (rows,) in the units of soilml, and their standard errors, 0 where not known."""
+    if not channel.columns:
+        return np.full(count, channel_constant(run, channel)), np.zeros(count)
+    read = [run.find(address)[1] for address in channel.columns]
+    if channel.role == "slope" and len(read) == 3:
+        given = channel.scale * np.arctan2(read[0], np.hypot(read[1], read[2]))
+    else:
+        given = channel.scale * sum(read[1:], start=read[0])
+        given = given / len(read) if channel.role == "sinkage" else given
+    error = np.asarray(channel.noise.std(given), dtype=np.float64) * np.ones(count)
+    if channel.std_column:
+        stated = channel.std_scale * np.abs(run.find(channel.std_column)[1])
+        stated = stated * np.abs(given) if channel.std_is_share else stated
+        error = np.hypot(error, np.nan_to_num(stated))
+    if channel.role != "slip":
+        return given, error
+    ours = our_slip(given, channel.definition)
+    return ours, np.abs(our_slip(given + error, channel.definition) - ours)
+
+
+def _means(rows: Sequence[WindowRow]) -> dict[str, float | Floats]:
+    roles = dict.fromkeys(role for row in rows for role in row.means)
+    return {role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles}
+
+
+def _columns(rows: Sequence[WindowRow]) -> dict[str, Floats]:
+    names = dict.fromkeys(name for row in rows for name in row.values)
+    found = {n: np.asarray([row.values.get(n, np.nan) for row in rows]) for n in names}
+    if any("slope" in row.means for row in rows):
+        found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
+    return found
+
+
+def _without_errors(table: Table) -> list[str]:
+    """A remark on measured quantities that no column gives a standard error of."""
+    bare = [
+        name for name in ("torque", "drawbar_pull", "sinkage")
+        if column(name) in table and np.isfinite(table[column(name)]).any()
+        and f"{column(name)}_std" not in table
+    ]  # fmt: skip
+    if not bare:
+        return []
+    lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
+    shown = ", ".join(f"[{name}]" for name in bare)
+    return [
+        f"no standard errors of {shown}: name their columns (std = 'COLUMN'), write noise = '5 %' "
+        f"there, or declare them in the model file, as [noise] {lines}: estimates are no better "
+        "than this number"
+    ]
