@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from drawn_errors import DrawnErrors
+from drawn_errors import STD, DrawnErrors
 
 from datagen.blind_sets.catalogue import MECHANISMS
 from datagen.blind_sets.reference_wheel import solve_equilibrium
@@ -32,6 +32,7 @@ class World:
     name: str
     mechanism: tuple[str, float] | None = None
     bearing: float = 1.0  # true bearing pressure over that assumed
+    bearing_std: float = 0.0  # of the logarithm of that factor, drawn for each soil
     slip_offset: float = 0.0
     load_gain: float = 0.0
     torque_gain: float = 0.0
@@ -64,6 +65,9 @@ WORLDS = (
     World("bearing pressure x 2", bearing=2.0),
     World("all usual errors at once", usual=1.0),
 )
+#: An error of the usual size, as the answer that allows for it assumes, where `x 2` is one error of
+#: 1.7 standard deviations.
+USUAL_BEARING = World("usual error of bearing", bearing_std=STD["bearing"])
 #: Worlds whose noise of slip or load is declared.
 NOISE_OF_SLIP = tuple(World(f"slip std {s:g}", slip_std=s) for s in (0.01, 0.02, 0.04, 0.06))
 NOISE_OF_LOAD = tuple(World(f"load std {s:.0%}", load_std=s) for s in (0.02, 0.05))
@@ -86,7 +90,9 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         "slip": np.maximum(slip - world.slip_offset - errors.slip_offset, LEAST_SLIP),
         "load": load / (1.0 + world.load_gain + errors.load_gain),
     }
-    bearing = world.bearing * errors.factor_of_bearing(driven["slip"], driven["load"])
+    drawn = np.random.default_rng([seed, 2]).standard_normal((sets, 1))
+    bearing = world.bearing * np.exp(world.bearing_std * drawn)
+    bearing = bearing * errors.factor_of_bearing(driven["slip"], driven["load"])
     of_soil |= {name: bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
     state = WheelState(
         **{

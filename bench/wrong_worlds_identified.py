@@ -15,7 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from wrong_worlds import WORLDS, SimulatedDrives, simulate
+from scipy.stats import binom
+from wrong_worlds import USUAL_BEARING, WORLDS, SimulatedDrives, simulate
 
 from datagen.recipe import read_recipe
 from soilml import Table, identify
@@ -24,7 +25,7 @@ from soilml.quantities import SHEAR, column
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, rows of each set, and the seed of both.
-SETS, ROWS, SEED = 30, 16, 5
+SETS, ROWS, SEED = 30, 16, 8
 
 
 def scores(
@@ -50,7 +51,7 @@ def table() -> str:
         "score | all channels, first answer: 90 % | score | second answer: 90 % | score |",
         "|---|---|---:|---|---:|---|---:|---|---:|",
     ]
-    for world in WORLDS:
+    for world in (*WORLDS, USUAL_BEARING):
         drives, cells = simulate(world, SETS, ROWS, SEED), []
         for channels in (("torque",), ("torque", "sinkage", "drawbar_pull")):
             for as_usual in (False, True):
@@ -62,8 +63,15 @@ def table() -> str:
 
 
 def section() -> str:
-    """The table with its heading."""
-    return f"### Posterior of the full model\n\n{table()}"
+    """The table with its heading, and how far chance alone takes a cell."""
+    low, high = (100.0 * binom.ppf(q, SETS, 0.9) / SETS for q in (0.025, 0.975))
+    return (
+        "### Posterior of the full model\n\n"
+        "The second answer promises 90 % on average over errors of the usual sizes: of the last "
+        "two lines, and not of each single error above them. Bearing pressure x 2 is an error of "
+        f"1.7 standard deviations. By chance alone, 95 of 100 cells of {SETS} sets lie between "
+        f"{low:.0f} and {high:.0f} where the coverage is 90.\n\n{table()}"
+    )
 
 
 if __name__ == "__main__":

@@ -173,8 +173,8 @@ def sample_posterior(
 ) -> tuple[ImportanceSample, float]:
     """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
 
-    The noise is as declared, whatever the misfit at the sample of largest weight. Raises `FitError`
-    as `posterior` does.
+    The noise is as declared, whatever the misfit, which is that at the sample of largest weight, or
+    with shared errors at the optimum if it is less there. Raises `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, data, free)
     optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
@@ -185,7 +185,10 @@ def _with_misfit(
     density: PosteriorDensity, optimum: Optimum | None, parameters: int
 ) -> tuple[ImportanceSample, float]:
     sample = _sampled(density, None, optimum)
-    return sample, _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
+    misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
+    if optimum is not None:  # samples have nearly one more squared residual for each error
+        misfit = min(misfit, _misfit(density, optimum.u, parameters))
+    return sample, misfit
 
 
 def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:

@@ -141,6 +141,17 @@ def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):
     assert np.mean(before) < np.mean(held)
 
 
+def test_the_misfit_of_soil_and_errors_is_that_of_the_best_fit(case):
+    rng = np.random.default_rng(4)
+    for _ in range(3):
+        table = measured(case, rng, slip_offset=0.01, bearing=1.3)
+        sampled, fitted = (
+            identify(case, table, method=method, as_usual=True)
+            for method in ("posterior", "nonlinear")
+        )
+        assert sampled.misfit == pytest.approx(fitted.misfit, rel=0.1)
+
+
 def test_what_is_declared_or_unknown_is_no_usual_error(case):
     load = np.asarray([50.0, 100.0])
     usual = usual_errors(case, load, ["cohesion"])

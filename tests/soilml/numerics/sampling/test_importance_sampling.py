@@ -21,3 +21,23 @@ def test_samples_drawn_about_the_middle_have_the_moments_of_a_density_of_many_di
     spread = np.sqrt(found.mean((found.u - mean) ** 2))
     assert spread == pytest.approx(std, rel=0.1)
     assert found.evidence == pytest.approx(p * np.log(np.sqrt(2.0 * np.pi) * std), abs=0.1)
+
+
+def test_few_samples_for_each_component_do_not_cost_the_tails():
+    """Nine dimensions, of which the first scales the spread of the others."""
+    p, width, rate = 9, 1.0 / 12.0, 0.35
+
+    def log_density(u):
+        z = (u - 0.5) / width
+        squares = (z[:, 1:] ** 2).sum(axis=1) * np.exp(-2.0 * rate * z[:, 0])
+        return -0.5 * (z[:, 0] ** 2 + squares) - (p - 1) * rate * z[:, 0]
+
+    expected = np.append(1.0, np.full(p - 1, np.exp(rate**2)))
+    ratios = []
+    for seed in range(10):
+        found = importance_sample(
+            log_density, p, seed, least_effective_size=1250.0, middle_std=width
+        )
+        spread = np.sqrt(found.mean((found.u - found.mean(found.u)) ** 2))
+        ratios.append(spread / width / expected)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.022)
