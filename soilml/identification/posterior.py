@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
-from soilml.identification.descent import LeastSquaresProblem, Optimum, descend
+from soilml.identification.descent import Optimum
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter
@@ -148,22 +148,19 @@ def posterior_samples(
 
     Raises `FitError` as `posterior` does.
     """
-    density, p = PosteriorDensity(case, data, free), len(free)
-    limit = misfit_limit(data.reading_count - p)
-    sample, optimum, start = None, None, None
-    if density.errors:
-        optimum, misfit = _optimum_and_misfit(density, least_squares_problem(case, data, free))
+    density, start = PosteriorDensity(case, data, free), None
+    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    # no sample of so many parameters fits much better than the optimum
+    misfit = 0.0 if optimum is None else _misfit(density, optimum.u, len(free))
+    limit = misfit_limit(data.reading_count - len(free))
+    if misfit <= limit:
+        sample, misfit = _with_misfit(density, optimum, len(free))
         if misfit <= limit:
-            sample = _sampled(density, None, optimum)
-    else:
-        sample, misfit = sample_posterior(case, data, free)
-    if sample is not None and misfit <= limit:
-        return PosteriorSamples(_of_first(sample, p), misfit, 1.0)
-    if misfit < SIMILAR_NOISE**2:
-        start = sample
+            return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
+        start = sample if misfit < SIMILAR_NOISE**2 else None
     noise_scale = float(np.sqrt(misfit))
     sample = _sampled(PosteriorDensity(case, data, free, noise_scale), start, optimum)
-    return PosteriorSamples(_of_first(sample, p), misfit, noise_scale)
+    return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
 
 
 def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
@@ -176,28 +173,22 @@ def sample_posterior(
 ) -> tuple[ImportanceSample, float]:
     """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
 
-    The noise is as declared, whatever the misfit at the sample of largest weight or, with shared
-    errors, of the best fit. Raises `FitError` as `posterior` does.
+    The noise is as declared, whatever the misfit, which is that at the sample of largest weight, or
+    with shared errors at the optimum if it is less there. Raises `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, data, free)
-    if density.errors:
-        optimum, misfit = _optimum_and_misfit(density, least_squares_problem(case, data, free))
-        return _sampled(density, None, optimum), misfit
-    sample = _sampled(density, None, None)
-    return sample, _misfit(density, sample.u[int(np.argmax(sample.weights))], len(free))
+    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    return _with_misfit(density, optimum, len(free))
 
 
-def _optimum_and_misfit(
-    density: PosteriorDensity, problem: LeastSquaresProblem
-) -> tuple[Optimum, float]:
-    """The most probable parameters and errors, and the misfit of the best fit next to them.
-
-    Samples of soil and errors have nearly one more squared residual for each of them.
-    """
-    optimum = most_probable(problem)
-    best = descend(problem.with_noise_at(optimum), optimum.u)
-    p = len(density.free) - density.errors
-    return optimum, min(_misfit(density, u, p) for u in (optimum.u, best.u))
+def _with_misfit(
+    density: PosteriorDensity, optimum: Optimum | None, parameters: int
+) -> tuple[ImportanceSample, float]:
+    sample = _sampled(density, None, optimum)
+    misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
+    if optimum is not None:  # samples have nearly one more squared residual for each error
+        misfit = min(misfit, _misfit(density, optimum.u, parameters))
+    return sample, misfit
 
 
 def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
