@@ -30,8 +30,8 @@ UNEXPLAINED, FEW_ROUNDS = 2.0, 4
 REACH = 6.0
 #: Most rows where the model is sampled, which bounds the time.
 MOST_SAMPLED_ROWS = 128
-#: Effective sample size at which sampling of the model ends, and the number of solutions, but not
-#: of samples, at which it ends anyway.
+#: Effective sample size at which sampling of the model ends, and the numbers of solutions and of
+#: samples at which it ends anyway where nothing explains the rows.
 ENOUGH, MOST_SOLUTIONS, FEWEST_SAMPLES = 1250.0, 500_000, 4096
 
 
@@ -40,7 +40,8 @@ def joint_sample(density: PosteriorDensity, optimum: Optimum) -> ImportanceSampl
 
     The region is that of the linearised posterior at the most probable parameters. Polynomials take
     the place of the model where they soon turn out to be accurate there; otherwise the model is
-    sampled, of many rows at some that are chosen at random, and for a bounded number of solutions.
+    sampled, of many rows at some that are chosen at random; where nothing explains the rows, for a
+    bounded number of solutions.
     """
     start = normal_start(density, optimum)
     density.linearise_at_mean(start)
@@ -89,13 +90,15 @@ def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceS
         logs[inside] = density(u[inside])
         return logs
 
-    p = len(density.free)
+    p, most = len(density.free), float("inf")
+    if density.noise_scale > UNEXPLAINED:
+        most = max(MOST_SOLUTIONS // len(density.data.slip), FEWEST_SAMPLES)
     found = importance_sample(
         log_density,
         p,
         least_effective_size=ENOUGH,
         middle_std=0.5 / region.half_width,
-        most_samples=max(MOST_SOLUTIONS // len(density.data.slip), FEWEST_SAMPLES),
+        most_samples=most,
     )
     kept = found.weights > 0.0
     u, weights = region.points(found.u[kept]), found.weights[kept]
