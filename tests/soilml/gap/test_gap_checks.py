@@ -137,7 +137,7 @@ QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
 def test_undeclared_noise_is_an_error():
     found = check(driven(case_of()), QUIET)
     assert len(found.errors) == 1
-    assert "give [noise] sinkage_m, or sinkage_m_std" in found.errors[0]
+    assert 'give [noise] sinkage_m, as in sinkage_m = "2 %", or a column' in found.errors[0]
 
 
 def test_a_column_of_standard_deviations_declares_noise():
