@@ -90,7 +90,7 @@ def dask_map(
                     n_workers=count,
                     threads_per_worker=1,
                     memory_limit=None,
-                    dashboard_address=None,
+                    dashboard_address="127.0.0.1:0",  # None takes port 8787, or warns
                     silence_logs=logging.CRITICAL,
                 )
             address = stack.enter_context(cluster)

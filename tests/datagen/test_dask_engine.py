@@ -25,7 +25,7 @@ distributed = pytest.importorskip("distributed")
 def scheduler():
     """The address of a scheduler with two workers, which are started again when they die."""
     few = dask.config.set({"distributed.scheduler.allowed-failures": 1})
-    options = {"threads_per_worker": 1, "memory_limit": None, "dashboard_address": None}
+    options = {"threads_per_worker": 1, "memory_limit": None, "dashboard_address": "127.0.0.1:0"}
     with few, distributed.LocalCluster(n_workers=2, **options) as cluster:
         yield cluster.scheduler_address
 
@@ -136,7 +136,9 @@ def test_what_answers_may_be_something_else(monkeypatch):
 def test_a_scheduler_without_workers_is_not_waited_for_in_vain(monkeypatch):
     monkeypatch.setattr(dask_cluster, "WORKERLESS", 0.5)
     with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as cluster,
+        distributed.LocalCluster(
+            n_workers=0, dashboard_address="127.0.0.1:0", silence_logs=50
+        ) as cluster,
         pytest.raises(InputError, match="no worker for"),
         dask_map(abs, range(3), scheduler=cluster.scheduler_address) as results,
     ):

@@ -206,7 +206,7 @@ def jackknife_rmse_ratio_std(squares: Floats, reference_squares: Floats) -> Floa
 
     .. math:: \sigma^2 = \frac{n - 1}{n} \sum_i (r_{(i)} - \bar{r})^2
 
-    with r_(i) the ratio of the RMSE values without set i.
+    with r_(i) the ratio of the RMSE values without set i. One set alone has none: NaN.
 
     Parameters
     ----------
@@ -219,6 +219,8 @@ def jackknife_rmse_ratio_std(squares: Floats, reference_squares: Floats) -> Floa
     Efron and Stein, The jackknife estimate of variance, Annals of Statistics 9, 1981.
     """
     n = len(squares)
+    if n < 2:
+        return np.full(squares.shape[1:], np.nan)
     leave_one_out = np.sqrt(
         (squares.sum(axis=0) - squares) / (reference_squares.sum(axis=0) - reference_squares)
     )
