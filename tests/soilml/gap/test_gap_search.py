@@ -76,6 +76,33 @@ def test_a_refused_explanation_counts_as_a_cause_outside_the_catalogue():
     assert refused.effect_log_odds("slope") == inside.effect_log_odds("slope")
 
 
+def ranked(weights):
+    """Suspects with their odds, of sets of effects joined by a plus sign, with these weights."""
+    total = sum(weights.values())
+    logs = {tuple(n.split("+")) if n else (): np.log(w / total) for n, w in weights.items()}
+    return {"+".join(names): np.exp(odds) for names, odds in Posterior(logs).ranked()}
+
+
+def test_partners_that_are_less_likely_than_not_count_towards_their_suspect():
+    pairs = {"a+dig": 0.3, "b+dig": 0.3, "dig": 0.2}
+    found = ranked(pairs | {"a": 0.1, "": 0.1})
+    assert list(found) == ["dig", "a"]
+    assert found["dig"] == pytest.approx(0.8 / 0.2)
+    assert found["a"] == pytest.approx(0.1 / 0.9)
+
+
+def test_two_effects_that_are_both_likelier_than_not_are_one_suspect():
+    found = ranked({"a+dig": 0.6, "dig": 0.3, "b+dig": 0.05, "": 0.05})
+    assert list(found) == ["a+dig", "dig"]
+    assert found["a+dig"] == pytest.approx(0.6 / 0.4)
+    assert found["dig"] == pytest.approx(0.35 / 0.65)
+
+
+def test_rivals_none_of_which_is_likelier_than_not_are_listed_each():
+    found = ranked({"a+b": 0.3, "c": 0.4, "a": 0.1, "": 0.2})
+    assert list(found) == ["c", "a+b", "a"]
+
+
 def test_the_true_law_needs_no_shape(named):
     assert not named.shape_supported
     assert named.shape_deviation == 0.0
