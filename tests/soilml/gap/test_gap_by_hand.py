@@ -1,0 +1,301 @@
+"""Figures of the gap analysis beside the same figures computed in another way."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from gap_sets import candidate, case_of, driven, fit_problem
+from scipy.integrate import quad
+
+from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.gap.design.planned_readings import joined_readings
+from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains
+from soilml.gap.search.problem import FitProblem
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
+from soilml.gap.statistics.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
+from soilml.gap.statistics.reml_covariance import VarianceComponents, assemble_covariance
+from soilml.gap.statistics.signatures import SECANT_STEP, Signature, effect_signatures
+from soilml.gap.verdict.claimed_effects import (
+    SignatureSimilarity,
+    discrepancy_map,
+    effect_estimates,
+    named_effects,
+    signature_similarity,
+    soil_estimates,
+)
+from soilml.gap.verdict.cross_validation import (
+    INFEASIBLE_SQUARE,
+    _run_folds,
+    gap_reduction,
+    held_out_region,
+)
+from soilml.gap.verdict.updated_case import PRIOR_HALF_WIDTH, updated_case
+from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+from soilml.physics.operating_point import Operating
+
+
+@pytest.fixture(scope="module")
+def problem() -> FitProblem:
+    case = case_of()
+    return fit_problem(case, driven(case, [SlipSinkage(n1=0.3)], seed=2))
+
+
+@pytest.fixture(scope="module")
+def found(problem):
+    """The set of slip-sinkage, fitted."""
+    return candidate(problem, ["slip-sinkage"], {})
+
+
+def test_the_prior_of_an_amplitude_is_that_of_its_neighbourhood():
+    """Half nothing; else exponential, but for one in fifty: half-Cauchy with the scale 10."""
+
+    def density(a):
+        return 0.98 * np.exp(-a) + 0.02 * 20.0 / (np.pi * (100.0 + a * a))
+
+    edges = [0.0, *np.sqrt(AMPLITUDES[1:-1] * AMPLITUDES[2:]), np.inf]
+    mass = [0.5 * quad(density, a, b)[0] for a, b in pairwise(edges)]
+    expected = -2.0 * np.log([0.5, *mass])
+    assert amplitude_penalty(AMPLITUDES[:, None]) == pytest.approx(expected)
+    pairs = np.asarray([[0.0, 1.0], [25.0, 0.15]])
+    at = [[0, 5], [len(AMPLITUDES) - 1, 1]]
+    assert amplitude_penalty(pairs) == pytest.approx([expected[i].sum() for i in at])
+
+
+def test_separation_is_the_part_of_a_signature_that_no_rival_has():
+    cosine = np.asarray([[0.0, 0.6, 0.1], [0.6, 0.0, 0.96], [0.1, 0.96, 0.0]])
+    similar = SignatureSimilarity(("a", "b", "c"), np.asarray([5.0, 10.0, 2.0]), cosine)
+    assert similar.separation("a", -2.0) == (pytest.approx(2.0 * 5.0 * 0.8), "b")
+    assert similar.separation("b", 0.5) == (pytest.approx(0.5 * 10.0 * 0.28), "c")
+    assert similar.separation("unknown", 1.0) == (0.0, "")
+    assert similar.largest_cosine(["a"]) == 0.6
+    assert similar.largest_cosine(["a", "b"]) == 0.96
+    assert similar.largest_cosine(["a", "b", "c"]) == similar.largest_cosine(["d"]) == 0.0
+
+
+def test_similarity_is_that_of_what_the_soil_leaves_of_signatures(problem, found):
+    fit = found.fit
+    none = np.zeros(len(problem.readings.channels))
+    similar = signature_similarity(problem, fit, none)
+    case = problem.case.with_values(
+        {c.path: fit.values()[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
+    )
+    signatures, _ = effect_signatures(case, problem.readings, problem.effects)
+    assert similar.names == tuple(s.name for s in signatures)
+    whiten = problem.discrepancy.whiten(none)
+    soil = whiten @ fit.derivatives[:, :3]
+    left = []
+    for s in signatures:
+        column = whiten @ s.column
+        left.append(column - soil @ np.linalg.lstsq(soil, column)[0])
+    norms = np.linalg.norm(left, axis=1)
+    assert similar.norm == pytest.approx(norms, rel=1e-6, abs=1e-9)
+    i, j = similar.names.index("slip-sinkage"), similar.names.index("exit-angle")
+    assert similar.cosine[i, j] == pytest.approx(abs(left[i] @ left[j]) / norms[i] / norms[j])
+    assert not similar.cosine.diagonal().any()
+
+
+def test_named_effects_carry_their_estimates_and_rivals(problem, found):
+    class Half:
+        """Even odds for every effect."""
+
+        def probability(self, name):
+            return 0.45
+
+        def effect_log_odds(self, name):
+            return 0.0
+
+    similar = SignatureSimilarity(
+        ("slip-sinkage", "exit-angle"), np.asarray([4.0, 1.0]), np.asarray([[0.0, 0.8], [0.8, 0.0]])
+    )
+    other = replace(found, names=("exit-angle",))
+    both = replace(found, names=("slip-sinkage", "rate"))
+    (effect,) = named_effects([found, both, other], found.fit, similar, Half())
+    size = found.fit.x[3]
+    assert isinstance(found.fit.coordinates[3], EffectCoordinate) and size > 0.0
+    assert (effect.name, effect.alternatives) == ("slip-sinkage", ("exit-angle", "rate"))
+    assert effect.separating_snr == pytest.approx(size * 4.0 * 0.6)
+    assert (effect.nearest_rival, effect.probability, effect.log_odds) == ("exit-angle", 0.45, 0.0)
+    (n1,) = effect_estimates(found.fit, "slip-sinkage").values()
+    assert n1.value == pytest.approx(found.fit.values()["slip-sinkage.n1"])
+    assert n1.std == pytest.approx(found.fit.stds()["slip-sinkage.n1"])
+    assert n1.value == pytest.approx(0.3, abs=4.0 * n1.std)
+    assert effect_estimates(found.fit, "rate") == {}
+    assert set(soil_estimates(found.fit)) == {"cohesion", "friction_angle", "shear_modulus"}
+
+
+def test_a_size_gets_a_prior_of_three_standard_deviations_within_its_bounds(found):
+    case = updated_case(found.fit)
+    value, std = found.fit.values()["slip-sinkage.n1"], found.fit.stds()["slip-sinkage.n1"]
+    prior = case.prior["slip-sinkage.n1"]
+    assert (prior.lower, prior.upper) == pytest.approx(
+        (value - 3.0 * std, value + 3.0 * std), rel=1e-5
+    )
+    loose = replace(found.fit, jacobian=found.fit.jacobian * 1e-3)  # wider than the bounds
+    prior = updated_case(loose).prior["slip-sinkage.n1"]
+    assert (prior.lower, PRIOR_HALF_WIDTH) == (0.0, 3.0)
+    left = updated_case(found.fit, {"torque_Nm": 0.123456789}).discrepancy
+    assert left["torque_Nm"].constant == pytest.approx(0.1235, abs=1e-4)
+    assert left["torque_Nm"].share == 0.0 and set(left) == {"torque_Nm"}
+
+
+def test_a_gap_is_the_mean_square_over_noise_by_channel(problem):
+    readings, std = problem.readings, np.full(len(problem.readings), 0.5)
+    before = readings.reading + np.where(readings.channel == 1, 1.0, 0.5)
+    after = readings.reading + 0.25
+    after[0] = np.nan
+    found = gap_reduction(readings, std, before, after, "all")
+    n = len(readings)
+    assert found.before == pytest.approx((2.0 * 1.0 + 4.0) / 3.0)
+    assert found.after == pytest.approx((0.25 * (n - 1) + INFEASIBLE_SQUARE) / n)
+    assert found.channels["drawbar_pull_N"] == pytest.approx((4.0, 0.25))
+    assert found.channels["torque_Nm"][1] == pytest.approx((0.25 * 31 + INFEASIBLE_SQUARE) / 32)
+    assert INFEASIBLE_SQUARE == 100.0 and (found.readings, found.description) == (n, "all")
+
+
+@pytest.mark.parametrize(
+    "loads, slips, name, share",
+    [
+        ((40.0, 60.0, 90.0, 140.0), 8, "load_N >= 140", 0.25),
+        ((40.0, 60.0, 90.0), 8, "load_N >= 90", 1 / 3),
+        ((40.0, 50.0, 60.0, 70.0, 80.0), 4, "load_N >= 80", 0.2),
+        ((40.0, 50.0, 60.0, 70.0, 80.0, 90.0), 4, "load_N >= 80", 1 / 3),
+        ((60.0, 60.0), 10, "slip >= 0.48", 0.3),
+    ],
+)
+def test_the_region_held_out_is_three_tenths_of_the_readings(loads, slips, name, share):
+    case = case_of()
+    readings = fit_problem(case, driven(case, loads=loads, slips=slips)).readings
+    found, out = held_out_region(readings)
+    assert found == name and out.mean() == pytest.approx(share)
+    values = readings.load if name.startswith("load") else readings.slip
+    assert values[out].min() > values[~out].max()
+
+
+def test_no_region_is_held_out_where_hardly_anything_varies():
+    case = case_of()
+    readings = fit_problem(case, driven(case, loads=(40.0, 60.0), slips=2)).readings
+    assert held_out_region(readings) is None and _run_folds(readings, 0) is None
+
+
+@pytest.mark.parametrize("runs, folds", [(3, 3), (4, 4), (7, 4)])
+def test_every_run_is_predicted_in_one_of_four_folds(runs, folds):
+    case = case_of()
+    readings = fit_problem(
+        case, driven(case, loads=np.linspace(40.0, 90.0, runs), slips=3)
+    ).readings
+    found = _run_folds(readings, 1)
+    of_run = [np.unique(found.fold[readings.run[readings.row] == i]) for i in range(runs)]
+    assert [len(fold) for fold in of_run] == [1] * runs
+    sizes = np.bincount(np.concatenate(of_run))
+    assert len(sizes) == folds and sizes.max() - sizes.min() <= 1
+    assert found.predicted.tolist() == list(range(folds))
+
+
+def test_readings_are_joined_with_usual_covariates(problem):
+    case = case_of()
+    other = fit_problem(case, driven(case, loads=(50.0, 70.0), slips=3, speed=[0.1, 0.2])).readings
+    first = problem.readings
+    both = joined_readings(first, other)
+    n, m = len(first.run), len(first)
+    assert both.runs == (*first.runs, *other.runs) and len(both) == m + len(other)
+    assert both.run.tolist() == [*first.run, *(other.run + 4)]
+    assert both.row[m:].tolist() == (other.row + n).tolist()
+    assert both.at.speed[n:].tolist() == [0.1] * 3 + [0.2] * 3
+    assert np.ptp(both.at.speed[:n]) == 0.0 and both.at.pass_number is None
+    assert both.load[m:].tolist() == other.load.tolist() and both.at.gear is None
+    named = replace(other, at=replace(other.at, gear=np.full(6, "lugged")))
+    assert joined_readings(first, named).at.gear.tolist() == [UNNAMED_GEAR] * n + ["lugged"] * 6
+
+
+@pytest.mark.parametrize("scale, struck", [(1.0, 1.1 * OUTLIER_SIGMA), (3.0, 3.4 * OUTLIER_SIGMA)])
+def test_outliers_are_judged_by_the_scale_of_most_readings(problem, scale, struck):
+    """Studentised residuals of independent readings without an unknown are those over noise."""
+    readings = problem.readings
+    known = VarianceComponents(np.ones(3), 0.0, 0.0, 0.0, 1e6)
+    covariance = assemble_covariance(readings, np.zeros((len(readings), 2)), known)
+    z = scale * np.random.default_rng(3).permutation(
+        np.quantile(np.random.default_rng(0).standard_normal(9999), np.linspace(0.01, 0.99, 96))
+    )
+    z[5], z[9] = struck, 0.9 * struck * (1.0 if scale == 1.0 else 0.7)
+    space = np.zeros((96, 0))
+    found = outliers(covariance, z * readings.std, space)
+    assert np.flatnonzero(found).tolist() == [5]
+    alike, run = np.arange(96), np.zeros(96, dtype=np.int64)
+    alike[9], run[9] = 5, 1  # a repeat of another run, 0.5 and more away
+    agrees = abs(z[5] - z[9]) <= REPEAT_SIGMA * np.sqrt(2.0) and z[9] > REPEAT_SIGMA * scale
+    assert outliers(covariance, z * readings.std, space, alike, run)[5] == (not agrees)
+
+
+def test_signatures_are_secants_in_the_possible_direction(problem):
+    case, readings = problem.case, problem.readings
+    signatures, missing = effect_signatures(case, readings, problem.effects)
+    by_name = {s.name: s for s in signatures}
+    assert {u.name: u.reason for u in missing}["rate"] == "needs the column speed_m_s"
+    dug = by_name["slip-sinkage"]
+    assert dug.sign == 1 and by_name["torque-offset"].sign == 0
+    assert dug.kind == EFFECTS["slip-sinkage"].about.kind
+    reference = EFFECTS["slip-sinkage"].about.reference["n1"]
+    step = SECANT_STEP
+    at = Operating(slip=np.asarray(readings.at.slip), load=np.asarray(readings.at.load))
+    changed = (case.model + SlipSinkage(n1=step * reference))(case.soil, at)
+    base = case.model(case.soil, at)
+    own = [
+        (np.asarray(getattr(changed, name)) - np.asarray(getattr(base, name))) / step
+        for name in readings.channels
+    ]
+    expected = np.asarray(own)[readings.channel, readings.row]
+    assert dug.column == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_one_speed_is_not_enough_to_test_a_rate():
+    case = case_of()
+    constant = fit_problem(case, driven(case, speed=[0.1] * 4)).readings
+    (missing,) = effect_signatures(case, constant, {"rate": EFFECTS["rate"]})[1]
+    assert missing.reason == "needs runs at several values of speed_m_s"
+    several = fit_problem(case, driven(case, speed=[0.1, 0.1, 0.2, 0.2])).readings
+    (tested,), missing = effect_signatures(case, several, {"rate": EFFECTS["rate"]})
+    assert tested.name == "rate" and missing == []
+
+
+def test_gains_are_what_least_squares_gains(problem):
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    rng = np.random.default_rng(0)
+    std = problem.readings.std
+    columns = {"up": 1, "down": -1, "any": 0}
+    whiten = problem.covariance.whiten
+    shape = rng.standard_normal(len(std)) * std
+    signatures = [Signature(name, "soil", shape, sign) for name, sign in columns.items()]
+    gains = noise_only_gains(problem, soil, signatures)
+    fit = soil.whitened_by(whiten)
+    together = np.column_stack([fit.jacobian, whiten @ shape])
+    alone = np.linalg.lstsq(fit.jacobian, fit.residual)[0]
+    solution = np.linalg.lstsq(together, fit.residual)[0]
+    gained = np.sum((fit.residual - fit.jacobian @ alone) ** 2)
+    gained -= np.sum((fit.residual - together @ solution) ** 2)
+    assert gains["any"] == pytest.approx(gained) and gained > 0.0
+    side = "up" if solution[-1] > 0.0 else "down"
+    assert gains[side] == gains["any"] and sorted(gains.values())[0] == 0.0
+    candidate_ = candidate(problem, ["slip-sinkage"], {})
+    free = free_law_gains(problem, candidate_, soil, signatures)
+    assert free["any"] >= gained * 0.999
+
+
+def test_the_map_of_the_gap_has_the_side_of_the_readings(problem):
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    found = discrepancy_map(problem, soil, 0)
+    std = problem.covariance.std
+    standardised = (problem.readings.reading - soil.prediction) / std
+    sizes = [abs(d.z) for d in found]
+    assert sizes == sorted(sizes, reverse=True) and len(found) > 3
+    worst = found[0]
+    channel = ["torque_Nm", "drawbar_pull_N", "sinkage_m"].index(worst.channel)
+    low, high = worst.slip
+    here = problem.readings.channel == channel
+    here &= (problem.readings.slip >= low) & (problem.readings.slip <= high)
+    low, high = worst.load_N
+    here &= (problem.readings.load >= low) & (problem.readings.load <= high)
+    assert np.sign(worst.z) == np.sign(standardised[here].mean())
+    assert worst.p < 0.05
