@@ -1,0 +1,119 @@
+"""What a design can identify: figures by hand, and the audit of a small design."""
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven
+
+from soilml.errors import InputError
+from soilml.gap import audit
+from soilml.gap.design.effect_identifiability import (
+    NAMEABLE_SIGMA,
+    identifiability,
+    indistinguishable_classes,
+)
+from soilml.gap.statistics.signatures import Signature
+from soilml.physics.effects import EFFECTS
+
+STD = np.asarray([0.5, 1.0, 1.0, 1.0, 1.0])
+#: The soil can change the first reading alone, which is whitened.
+SOIL = np.asarray([[1.0], [0.0], [0.0], [0.0], [0.0]])
+
+
+def signature(name, *column):
+    return Signature(name, EFFECTS[name].about.kind, np.asarray(column), 0)
+
+
+SIGNATURES = [
+    signature("slip-sinkage", 2.0, 3.0, 0.0, 0.0, 0.0),  # in sigma: 4, 3, of which 3 is left
+    signature("grousers", 0.0, 4.0, 3.0, 0.0, 0.0),  # 5, at a cosine of 0.8 to the first
+    signature("bulldozing", 0.0, 0.0, 0.0, 12.0, 0.0),
+    signature("exit-angle", 1.5, 0.0, 0.0, 0.0, 0.0),  # what the soil does as well
+]
+
+
+def test_figures_of_a_design_by_hand():
+    dug, lugs, ploughed, left = identifiability(SIGNATURES, STD, SOIL, EFFECTS)
+    assert (dug.signal, dug.residual_signal) == (pytest.approx(5.0), pytest.approx(3.0))
+    assert dug.absorbed == pytest.approx(1.0 - 9.0 / 25.0)
+    assert dug.rivals[0] == ("grousers", pytest.approx(0.8))
+    assert dug.separating_snr == pytest.approx(3.0 * 0.6)
+    size = EFFECTS["slip-sinkage"].about.reference["n1"]
+    assert (dug.size, dug.unit, dug.kind) == (size, "1", EFFECTS["slip-sinkage"].about.kind)
+    assert dug.detectable_size == pytest.approx((3.0 + 0.8416) / 3.0 * size)
+    assert lugs.separating_snr == pytest.approx(5.0 * 0.6) and lugs.absorbed == pytest.approx(0.0)
+    assert ploughed.separating_snr == pytest.approx(12.0)
+    assert left.detectable_size == float("inf") and left.signal == pytest.approx(3.0)
+    assert identifiability([], STD, SOIL, EFFECTS) == []
+
+
+@pytest.mark.parametrize("factor, alike", [(1.0, True), (1.2, False)])
+def test_effects_are_alike_where_two_sigma_tell_them_apart(factor, alike):
+    """The weaker of the first two leaves 1.8 sigma, and 2.2 where it is 1.2 times as large."""
+    stronger = [
+        signature(s.name, *(factor * s.column if s.name == "slip-sinkage" else s.column))
+        for s in SIGNATURES
+    ]
+    found = indistinguishable_classes(stronger, STD, SOIL)
+    assert found == ((("slip-sinkage", "grousers"),) if alike else ())
+    assert indistinguishable_classes([], STD, SOIL) == ()
+
+
+def test_classes_are_joined_by_a_common_member():
+    chain = [
+        signature("rate", 0.0, 4.0, 1.0, 0.0, 0.0),
+        signature("slope", 0.0, 4.0, -1.0, 0.0, 0.0),
+        signature("multipass", 0.0, 4.0, 0.0, 0.0, 0.0),
+        signature("bulldozing", 0.0, 0.0, 0.0, 1.5, 0.0),  # below two sigma: in no class
+        signature("exit-angle", 0.0, 0.0, 0.0, 1.4, 0.0),
+    ]
+    assert indistinguishable_classes(chain, STD, SOIL) == (("rate", "slope", "multipass"),)
+
+
+@pytest.fixture(scope="module")
+def found():
+    case = case_of()
+    design = driven(case, loads=(40.0, 90.0), slips=4, speed=[0.05, 0.05])
+    return audit(case, design, costs={"other-speed": 4.0})
+
+
+def test_an_audit_lists_the_best_identified_first(found):
+    separating = [e.separating_snr for e in found.effects]
+    assert separating == sorted(separating, reverse=True) and len(separating) > 8
+    names = {e.name for e in found.effects}
+    assert names | set(found.untestable) == {
+        n for n, e in EFFECTS.items() if e.applies_to(case_of().model.gear)
+    }
+    assert not names & set(found.untestable) and "rate" in found.untestable
+    for group in found.classes:
+        assert len(group) > 1 and set(group) <= names
+
+
+def test_runs_to_add_gain_what_could_not_be_named(found):
+    nameable = {e.name for e in found.effects if e.separating_snr >= NAMEABLE_SIGMA}
+    assert found.added_runs
+    for run in found.added_runs:
+        assert not set(run.gained) & nameable
+        assert run.nameable == len(nameable) + len(run.gained)
+    gains = [len(run.gained) / (run.cost or 1.0) for run in found.added_runs]
+    assert gains == sorted(gains, reverse=True)
+    assert {run.cost for run in found.added_runs if run.kind == "other-speed"} == {4.0}
+    rate = next(run for run in found.added_runs if run.kind == "other-speed")
+    assert "rate" in rate.gained
+
+
+def test_the_audit_as_json_has_the_same_figures(found):
+    content = found.as_json()
+    first, entry = found.effects[0], content["effects"][0]
+    assert (entry["name"], entry["seen_sigma"]) == (first.name, first.signal)
+    assert entry["left_sigma"] == first.residual_signal
+    assert entry["nameable"] == (first.separating_snr >= 3.0)
+    assert content["not_testable"] == found.untestable
+    assert [r["nameable"] for r in content["runs_to_add"]] == [r.nameable for r in found.added_runs]
+    assert content["classes"] == [list(c) for c in found.classes]
+
+
+def test_an_audit_needs_noise():
+    case = case_of()
+    silent = case_of().__class__(**{**case.__dict__, "noise": {}})
+    with pytest.raises(InputError, match="noise"):
+        audit(silent, driven(case, loads=(40.0,), slips=3, noise=0.0))
