@@ -72,7 +72,7 @@ def test_classes_are_joined_by_a_common_member():
 @pytest.fixture(scope="module")
 def found():
     case = case_of()
-    design = driven(case, loads=(40.0, 90.0), slips=4, speed=[0.05, 0.05])
+    design = driven(case, loads=(40.0, 90.0), slips=4)
     return audit(case, design, costs={"other-speed": 4.0})
 
 
@@ -96,8 +96,8 @@ def test_runs_to_add_gain_what_could_not_be_named(found):
         assert run.nameable == len(nameable) + len(run.gained)
     gains = [len(run.gained) / (run.cost or 1.0) for run in found.added_runs]
     assert gains == sorted(gains, reverse=True)
-    assert {run.cost for run in found.added_runs if run.kind == "other-speed"} == {4.0}
-    rate = next(run for run in found.added_runs if run.kind == "other-speed")
+    assert {run.cost for run in found.added_runs if run.kind == "other speed"} == {4.0}
+    rate = next(run for run in found.added_runs if run.kind == "other speed")
     assert "rate" in rate.gained
 
 
