@@ -13,9 +13,12 @@ from filelock import FileLock
 def shared_folder(
     factory: pytest.TempPathFactory, name: str, fill: Callable[[Path], object]
 ) -> Path:
-    """A folder that the first of all workers fills, and that the others read."""
-    root = factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
+    """A folder that the first of all workers fills, and that the others read.
+
+    It lies in `SOILML_TEST_FILES`, where that is set, and outlives the tests.
+    """
+    root = Path(os.environ.get("SOILML_TEST_FILES") or factory.getbasetemp())
+    if "PYTEST_XDIST_WORKER" in os.environ and "SOILML_TEST_FILES" not in os.environ:
         root = root.parent
     folder = root / name
     with FileLock(root / f"{name}.lock"):
