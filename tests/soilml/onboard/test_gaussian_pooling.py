@@ -1,11 +1,14 @@
 """Pooling of estimates of one soil, against exact Gaussian inference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
+    PoolingRule,
     RunConditions,
     RunPattern,
     pool,
@@ -139,3 +142,17 @@ def test_the_rule_of_a_run_is_interpolated_between_patterns():
     drifting, _ = pooled_run([0.1, 0.15, 0.2, 0.25], [60.0] * 4)
     assert 1.0 < drifting.weights.sum() < 2.0
     assert 1.0 < drifting.std_scale[0] < 2.0
+
+
+def test_factors_scale_the_covariance_up_to_the_prior():
+    prior = wide(np.zeros(2), np.ones(2))
+    row = np.asarray([[0.2, 0.03], [0.03, 0.6]])
+    mean = np.asarray([prior.upper[0] + 1.0, 0.4])
+    rule = PoolingRule(np.ones(1), np.asarray([1.5, 2.0]), np.full(2, 1.6))
+    found = pool_within_prior(mean[None], row[None], prior, rule)
+    scale = np.asarray([1.5, 1.0 / np.sqrt(0.6)])  # the second at most to the prior's deviation
+    assert found.covariance == pytest.approx(row * np.outer(scale, scale), rel=1e-6)
+    assert found.mean == pytest.approx([prior.upper[0], 0.4], rel=1e-6)
+    narrower = replace(rule, std_scale=np.asarray([0.5, 0.5]))
+    found = pool_within_prior(mean[None], row[None], prior, narrower)
+    assert found.covariance == pytest.approx(0.25 * row, rel=1e-6)
