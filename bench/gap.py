@@ -29,7 +29,7 @@ from soilml.io.atomic_files import save_text
 
 #: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
 #: (0, 1, 2, 3, 4, 5, 7).
-SEEDS = (6,)
+SEEDS = (10, 11)
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
