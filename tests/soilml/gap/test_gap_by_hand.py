@@ -11,7 +11,8 @@ from scipy.integrate import quad
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.gap.design.planned_readings import joined_readings
 from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
-from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains
+from soilml.gap.search.candidate_fits import EFFECT_PENALTY
+from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains, predicted_gains
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
 from soilml.gap.statistics.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
@@ -25,12 +26,7 @@ from soilml.gap.verdict.claimed_effects import (
     signature_similarity,
     soil_estimates,
 )
-from soilml.gap.verdict.cross_validation import (
-    INFEASIBLE_SQUARE,
-    _run_folds,
-    gap_reduction,
-    held_out_region,
-)
+from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import PRIOR_HALF_WIDTH, updated_case
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
@@ -141,59 +137,6 @@ def test_a_size_gets_a_prior_of_three_standard_deviations_within_its_bounds(foun
     assert left["torque_Nm"].share == 0.0 and set(left) == {"torque_Nm"}
 
 
-def test_a_gap_is_the_mean_square_over_noise_by_channel(problem):
-    readings, std = problem.readings, np.full(len(problem.readings), 0.5)
-    before = readings.reading + np.where(readings.channel == 1, 1.0, 0.5)
-    after = readings.reading + 0.25
-    after[0] = np.nan
-    found = gap_reduction(readings, std, before, after, "all")
-    n = len(readings)
-    assert found.before == pytest.approx((2.0 * 1.0 + 4.0) / 3.0)
-    assert found.after == pytest.approx((0.25 * (n - 1) + INFEASIBLE_SQUARE) / n)
-    assert found.channels["drawbar_pull_N"] == pytest.approx((4.0, 0.25))
-    assert found.channels["torque_Nm"][1] == pytest.approx((0.25 * 31 + INFEASIBLE_SQUARE) / 32)
-    assert INFEASIBLE_SQUARE == 100.0 and (found.readings, found.description) == (n, "all")
-
-
-@pytest.mark.parametrize(
-    "loads, slips, name, share",
-    [
-        ((40.0, 60.0, 90.0, 140.0), 8, "load_N >= 140", 0.25),
-        ((40.0, 60.0, 90.0), 8, "load_N >= 90", 1 / 3),
-        ((40.0, 50.0, 60.0, 70.0, 80.0), 4, "load_N >= 80", 0.2),
-        ((40.0, 50.0, 60.0, 70.0, 80.0, 90.0), 4, "load_N >= 80", 1 / 3),
-        ((60.0, 60.0), 10, "slip >= 0.48", 0.3),
-    ],
-)
-def test_the_region_held_out_is_three_tenths_of_the_readings(loads, slips, name, share):
-    case = case_of()
-    readings = fit_problem(case, driven(case, loads=loads, slips=slips)).readings
-    found, out = held_out_region(readings)
-    assert found == name and out.mean() == pytest.approx(share)
-    values = readings.load if name.startswith("load") else readings.slip
-    assert values[out].min() > values[~out].max()
-
-
-def test_no_region_is_held_out_where_hardly_anything_varies():
-    case = case_of()
-    readings = fit_problem(case, driven(case, loads=(40.0, 60.0), slips=2)).readings
-    assert held_out_region(readings) is None and _run_folds(readings, 0) is None
-
-
-@pytest.mark.parametrize("runs, folds", [(3, 3), (4, 4), (7, 4)])
-def test_every_run_is_predicted_in_one_of_four_folds(runs, folds):
-    case = case_of()
-    readings = fit_problem(
-        case, driven(case, loads=np.linspace(40.0, 90.0, runs), slips=3)
-    ).readings
-    found = _run_folds(readings, 1)
-    of_run = [np.unique(found.fold[readings.run[readings.row] == i]) for i in range(runs)]
-    assert [len(fold) for fold in of_run] == [1] * runs
-    sizes = np.bincount(np.concatenate(of_run))
-    assert len(sizes) == folds and sizes.max() - sizes.min() <= 1
-    assert found.predicted.tolist() == list(range(folds))
-
-
 def test_readings_are_joined_with_usual_covariates(problem):
     case = case_of()
     other = fit_problem(case, driven(case, loads=(50.0, 70.0), slips=3, speed=[0.1, 0.2])).readings
@@ -299,3 +242,30 @@ def test_the_map_of_the_gap_has_the_side_of_the_readings(problem):
     here &= (problem.readings.load >= low) & (problem.readings.load <= high)
     assert np.sign(worst.z) == np.sign(standardised[here].mean())
     assert worst.p < 0.05
+
+
+def test_an_effect_of_an_impossible_sign_gains_less_than_nothing(problem, found):
+    column = found.fit.derivatives[:, 3]  # more of slip-sinkage, which is there already
+    none = candidate(problem, [], {})
+    signs = {"more": 1, "less": -1, "any": 0}
+    signatures = [Signature(name, "soil", column, sign) for name, sign in signs.items()]
+    gains = predicted_gains(problem, none, none.objective, signatures)
+    assert gains["more"] == gains["any"] > 50.0
+    assert gains["less"] == -EFFECT_PENALTY < 0.0
+
+
+def test_a_trend_of_residuals_is_stated_in_sigma_by_channel(problem):
+    """A sinkage that is off by a smooth function of slip and load, and readings without noise."""
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    readings, std = problem.readings, problem.covariance.std
+    smooth = np.sin(12.0 * readings.slip) * np.log(readings.load / 75.0)
+    off = np.where(readings.channel == readings.channels.index("sinkage"), smooth * std, 0.0)
+    trend = residual_trend(problem, replace(soil, reading=soil.prediction + 8.0 * off))
+    rms = 8.0 * np.sqrt(np.mean(smooth[off != 0.0] ** 2))
+    assert trend["sinkage_m"] == pytest.approx(rms, rel=0.35) and trend["sinkage_m"] < rms
+    assert trend["torque_Nm"] == trend["drawbar_pull_N"] == 0.0
+    rng = np.random.default_rng(0)
+    noise = residual_trend(
+        problem, replace(soil, reading=soil.prediction + std * rng.standard_normal(len(std)))
+    )
+    assert max(noise.values()) < 0.5

@@ -1,8 +1,10 @@
 """Repeated rows: their agreement, the words about the worst pair, and overstated noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from gap_sets import case_of, driven
+from gap_sets import case_of, driven, fit_problem
 
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.statistics.repeats import (
@@ -85,3 +87,21 @@ def test_overstated_noise_is_noted():
     note = overstated_noise_notes(calm)[0]
     assert "repeated rows of" in note and "times the declared noise" in note
     assert overstated_noise(stack_readings(case, driven(case, loads=TWICE))) == {}
+
+
+def test_the_channel_whose_repeats_disagree_most_comes_first():
+    case = case_of()
+    readings = fit_problem(case, driven(case, loads=(40.0, 40.0, 90.0), noise=0.0)).readings
+    shift = {"torque": 30.0, "drawbar_pull": 90.0, "sinkage": 2.0}
+    sizes = np.asarray([shift[name] for name in readings.channels])[readings.channel]
+    second = readings.run[readings.row] == 1
+    other = replace(
+        readings, reading=readings.reading + np.where(second, sizes, 0.0) * readings.std
+    )
+    found = repeat_disagreement(other)
+    assert [c.channel for c in found] == ["drawbar_pull", "torque", "sinkage"]
+    assert found[0].p_value == found[1].p_value == 0.0 < found[2].p_value < 0.05
+    expected = 8 * 90.0**2 / 2.0  # eight pairs, each with the variance of two readings
+    assert found[0].chi_square == pytest.approx(expected, rel=1e-6)
+    assert found[0].scatter_ratio == pytest.approx(np.sqrt(expected / 8))
+    assert found[0].worst_sigma == pytest.approx(90.0 / np.sqrt(2.0))
