@@ -25,6 +25,7 @@ from wrong_worlds import (
     SimulatedDrives,
     World,
     simulate,
+    unlisted_worlds,
 )
 
 from soilml import Estimator
@@ -198,6 +199,11 @@ def tables(file: Path = ROOT / "exported" / "wheel.onnx") -> str:
         "### Noise of slip and load that is declared, torque",
         coverage_table(estimator, (*NOISE_OF_SLIP, *NOISE_OF_LOAD), CHANNELS["torque"]),
     ]
+    for label, channels in CHANNELS.items():
+        parts += [
+            f"### Mechanisms of the blind sets that no error describes, {label}",
+            coverage_table(estimator, unlisted_worlds(), channels),
+        ]
     return "\n\n".join(parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from drawn_errors import STD, DrawnErrors
 
 from datagen.blind_sets.catalogue import MECHANISMS
+from datagen.blind_sets.mechanism import Mechanism
 from datagen.blind_sets.reference_wheel import solve_equilibrium
 from datagen.blind_sets.wheel_state import WheelState
 from datagen.recipe import read_recipe
@@ -26,11 +27,12 @@ LEAST_SLIP = 0.003
 class World:
     """What differs from the model file's assumptions; errors are those of the reported values.
 
-    `mechanism` names a mechanism of tier A of the blind sets, with its size.
+    `mechanism` names a mechanism of the blind sets, with its size.
     """
 
     name: str
     mechanism: tuple[str, float] | None = None
+    radius: float = 1.0  # true radius over that assumed
     bearing: float = 1.0  # true bearing pressure over that assumed
     bearing_std: float = 0.0  # of the logarithm of that factor, drawn for each soil
     slip_offset: float = 0.0
@@ -68,9 +70,41 @@ WORLDS = (
 #: An error of the usual size, as the answer that allows for it assumes, where `x 2` is one error of
 #: 1.7 standard deviations.
 USUAL_BEARING = World("usual error of bearing", bearing_std=STD["bearing"])
+#: Mechanisms that no error of sensors or model describes, at their reference sizes.
+UNLISTED = (
+    "stress-shift",
+    "stress-shift/with-slip",
+    "sidewall-shear",
+    "shear-softening",
+    "bulldozing",
+    "slip-sinkage/lyasko",
+    "slip-sinkage/square",
+    "exit-angle/constant",
+    "grousers/saturating",
+    "cable-drag",
+    "stiff-layer",
+    "crust",
+    "ripple",
+    "vibration",
+    "stick-slip",
+)
 #: Worlds whose noise of slip or load is declared.
 NOISE_OF_SLIP = tuple(World(f"slip std {s:g}", slip_std=s) for s in (0.01, 0.02, 0.04, 0.06))
 NOISE_OF_LOAD = tuple(World(f"load std {s:.0%}", load_std=s) for s in (0.02, 0.05))
+
+
+def mechanisms() -> dict[str, Mechanism]:
+    """Mechanisms of all tiers by their keys."""
+    return {key: mechanism for tier in MECHANISMS.values() for key, mechanism in tier.items()}
+
+
+def unlisted_worlds() -> tuple[World, ...]:
+    """A wheel of another radius, and each mechanism that no error describes."""
+    known = mechanisms()
+    return (
+        *(World(f"radius x {r:g}", radius=r) for r in (0.95, 1.05)),
+        *(World(key, mechanism=(key, known[key].reference)) for key in UNLISTED),
+    )
 
 
 def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
@@ -83,7 +117,7 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
     errors = DrawnErrors.drawn(sets, seed, world.usual)
     gear: Any = case.model.gear
     fixed = {name: getattr(case.soil, name) for name in ("n", "a0", "a1", "unit_weight")}
-    fixed |= {"radius": gear.radius, "width": gear.width}
+    fixed |= {"radius": world.radius * gear.radius, "width": gear.width}
     fixed |= {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
     of_soil = {name: truth[:, i, None] for i, name in enumerate(SHEAR)}
     driven = {
@@ -101,7 +135,7 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         }
     )
     name, size = world.mechanism or ("", 0.0)
-    active = [(MECHANISMS["A"][name], size)] if name else []
+    active = [(mechanisms()[name], size)] if name else []
     if world.usual:
         active.append((errors.mechanism(slip), 1.0))
     found = solve_equilibrium(state, tuple(active))

@@ -10,7 +10,6 @@ import numpy as np
 from soilml.errors import InputError
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
-    ERROR_COLUMNS,
     MODEL_ERROR_INPUT,
     SENSOR_ERROR_COLUMNS,
 )
@@ -24,11 +23,14 @@ def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
 
 
-def error_columns(usual: Mapping[str, float]) -> int:
-    """Columns of errors in the residual system of a file with these usual errors."""
-    if not usual:
+def error_columns(metadata: Mapping[str, Any]) -> int:
+    """Columns of errors in a file's residual system, from the entry `set` of its metadata.
+
+    Files of earlier versions know fewer errors.
+    """
+    if "errors" not in metadata:
         return 1
-    return len(ERROR_COLUMNS if MODEL_ERROR_INPUT in usual else SENSOR_ERROR_COLUMNS)
+    return len(SENSOR_ERROR_COLUMNS) + len(metadata.get("model_errors", ()))
 
 
 def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, float]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 #: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
 #: files without that entry have version 1. docs/onnx-interface.md lists the changes.
-INTERFACE = "3"
+INTERFACE = "4"
 
 #: Readings that every row must have, and readings that a row may lack.
 REQUIRED_READINGS = ("slip", "torque", "load")
@@ -55,7 +55,9 @@ SENSOR_ERROR_COLUMNS = (
 )
 #: Errors of the model, in the order of their columns, after those of the sensors: logarithm of the
 #: bearing modulus, its changes with slip and with the logarithm of load, contact behind the axle
-#: as a multiple of `exit-angle` at its usual size, logarithm of sinkage, drawbar pull over load.
+#: as a multiple of `exit-angle` at its usual size, logarithm of sinkage, drawbar pull over load;
+#: changes with slip of the logarithms of torque and sinkage, and of drawbar pull over load, which
+#: files of interface 3 lack.
 MODEL_ERROR_COLUMNS = (
     "bearing",
     "bearing_by_slip",
@@ -63,6 +65,9 @@ MODEL_ERROR_COLUMNS = (
     "contact",
     "sinkage",
     "drawbar_pull",
+    "torque_by_slip",
+    "sinkage_by_slip",
+    "drawbar_pull_by_slip",
 )
 #: All columns of errors.
 ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)

@@ -79,6 +79,8 @@ class SetPosterior:
     common_errors : dict
         Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`. Empty for a
         file of an earlier version, which takes slip and load as exact.
+    error_columns : int
+        Columns of these errors in the residual system.
     """
 
     terms: int
@@ -87,6 +89,7 @@ class SetPosterior:
     context_values: dict[str, float]
     sets_only: bool
     common_errors: dict[str, float] = field(default_factory=dict)
+    error_columns: int = 1
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -98,13 +101,14 @@ class SetPosterior:
             context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context.items()},
             context_values={},
             common_errors=read_common_errors(metadata),
+            error_columns=error_columns(metadata),
             sets_only=bool(metadata["alone"]),
         )
 
     @property
     def columns(self) -> int:
         """Columns of the residual system: monomials, and errors that all rows share."""
-        return self.terms + error_columns(self.common_errors)
+        return self.terms + self.error_columns
 
     @property
     def missing_context(self) -> tuple[str, ...]:

@@ -15,23 +15,29 @@ def sensor_columns(data: Observations, prediction: Floats) -> Floats | None:
 
     .. math:: y = (1 + e_1) f + e_2
 
-    for torque and sinkage; drawbar pull has an error in proportion to load instead of a gain. They
-    are linear in the errors at predictions f (sets, k), so that errors with normal priors are
-    integrated out without approximation: their covariance is that of the columns. None without such
-    errors of a measured channel.
+    for torque and sinkage; drawbar pull has an error in proportion to load instead of a gain. Gains
+    and shares of load that grow with slip are in proportion to it. All are linear in the errors at
+    predictions f (sets, k), so that errors with normal priors are integrated out without
+    approximation: their covariance is that of the columns. None without such errors of a measured
+    channel.
     """
     prediction = np.nan_to_num(prediction)
     errors, parts, stop = data.shared_errors, [], 0
     for channel in data.channels:
         measured = np.isfinite(channel.reading)
         start, stop = stop, stop + int(measured.sum())
+        own_size, slip = prediction[:, start:stop], np.abs(data.slip[measured])
+        load = data.load[measured]
         factors: dict[str, tuple[str, Floats | float]] = {
-            "torque_gain": ("torque", prediction[:, start:stop]),
+            "torque_gain": ("torque", own_size),
             "torque_bias": ("torque", 1.0),
-            "sinkage": ("sinkage", prediction[:, start:stop]),
+            "torque_by_slip": ("torque", own_size * slip),
+            "sinkage": ("sinkage", own_size),
             "sinkage_bias": ("sinkage", 1.0),
-            "drawbar_pull": ("drawbar_pull", data.load[measured]),
+            "sinkage_by_slip": ("sinkage", own_size * slip),
+            "drawbar_pull": ("drawbar_pull", load),
             "drawbar_pull_bias": ("drawbar_pull", 1.0),
+            "drawbar_pull_by_slip": ("drawbar_pull", load * slip),
         }
         for name, (own, factor) in factors.items():
             if name in errors and own == channel.name:

@@ -17,6 +17,7 @@ from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.identification.shared_errors import joint_sample
 from soilml.identification.shared_errors.effect import ModelledErrors
+from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.identification.shared_errors.sizes import usual_errors
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -127,6 +128,25 @@ def test_errors_of_the_model_change_it_as_other_soils_and_sensors_do(case):
     rise = short(soil, at).sinkage - exact.sinkage
     assert rise == pytest.approx(exact.sinkage - plus(soil, at).sinkage, rel=0.05)
     assert np.isfinite(far(soil, at).torque).all()
+
+
+def test_gains_offsets_and_errors_that_grow_with_slip_are_columns(case):
+    slip, load, reading = [0.1, -0.4, 0.5], [40.0, 70.0, 110.0], [2.0, np.nan, 3.0]
+    columns = {"slip": slip, "load_N": load, "torque_Nm": reading, "drawbar_pull_N": reading}
+    table = Table({name: np.asarray(values) for name, values in columns.items()})
+    data = read_observations(case, table)
+    prediction = np.asarray([[1.0, 2.0, 8.0, 9.0]])  # two torques, two pulls
+    errors = {"torque_by_slip": 0.1, "torque_bias": 0.2, "drawbar_pull": 0.02}
+    errors |= {"drawbar_pull_by_slip": 0.3, "sinkage_by_slip": 9.0, "bearing": 0.4}
+    found = sensor_columns(replace(data, shared_errors=errors), prediction)
+    expected = [
+        [0.2, 0.2, 0.0, 0.0],
+        [0.1 * 1.0 * 0.1, 0.1 * 2.0 * 0.5, 0.0, 0.0],
+        [0.0, 0.0, 0.02 * 40.0, 0.02 * 110.0],
+        [0.0, 0.0, 0.3 * 40.0 * 0.1, 0.3 * 110.0 * 0.5],
+    ]
+    assert np.asarray(sorted(found[0].T.tolist())) == pytest.approx(np.asarray(sorted(expected)))
+    assert sensor_columns(replace(data, shared_errors={"bearing": 0.4}), prediction) is None
 
 
 def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):

@@ -106,8 +106,8 @@ def test_a_file_of_an_earlier_version_says_that_its_model_is_right(estimator):
     ):
         old.on(model_error=1.0)
     assert MODEL_ERROR_INPUT not in old.on(model_error=0.0).sets.common_errors
-    assert error_columns(sensors) == len(SENSOR_ERROR_COLUMNS)
-    assert error_columns(estimator.sets.common_errors) == len(ERROR_COLUMNS)
+    assert error_columns({"errors": sensors}) == len(SENSOR_ERROR_COLUMNS)
+    assert estimator.sets.error_columns == len(ERROR_COLUMNS)
     assert error_columns({}) == 1
     for value in (-1.0, np.nan):
         with pytest.raises(InputError, match=r"model_error is .*; needed is a standard deviation"):

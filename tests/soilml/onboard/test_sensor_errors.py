@@ -49,7 +49,7 @@ def test_a_common_error_must_be_a_standard_deviation(estimator):
 
 def test_a_file_that_takes_slip_as_exact_says_so(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 4)
-    old = replace(estimator, sets=replace(estimator.sets, common_errors={}))
+    old = replace(estimator, sets=replace(estimator.sets, common_errors={}, error_columns=1))
     with pytest.raises(InputError, match=r"slip_std is 0.02, but this file takes slip"):
         old.run(**run, slip_std=0.02)
     with pytest.raises(InputError, match=r"torque_gain is 0.05, but this file"):

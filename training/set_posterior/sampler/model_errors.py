@@ -25,6 +25,8 @@ from training.set_posterior.response_surface import Response
 
 #: The unknown that is a strength, beside the bearing modulus.
 COHESION = "cohesion"
+#: Place of the first error that one channel has alone, and how those that grow with slip are named.
+OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
 
 
 @dataclass(frozen=True)
@@ -106,8 +108,9 @@ class ModelErrors:
             log_load * stds["bearing_by_load"],
         ]
         profile = stack_rows(bearing).reshape(3, 1, -1)
-        of_torque = np.zeros((channels, 1))
-        of_torque[0] = 1.0 - self.context.torque_by_load
+        first = np.zeros((channels, 1))
+        first[0] = 1.0
+        of_torque = first * (1.0 - self.context.torque_by_load)
         change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
         names = [axis.name for axis in self.family.axes]
         if COHESION in names:
@@ -115,15 +118,22 @@ class ModelErrors:
             by_log = _by_log_value(basis, self.response.terms, number + 1, self.family.axes[number])
             of_cohesion = gemm(by_log, coefficients, transpose_a=True)
             change = change - of_cohesion.reshape(1, channels, -1)
-        none = change * 0.0
-        contact = none
+        contact = change * 0.0
         if self.response.contact is not None:
             at_soil = self.response.contact.add_at_soil(features).at(basis)
             contact = at_soil.reshape(1, channels, -1) * stds["contact"]
-        scales = np.zeros((2, channels, 1))
-        scales[0, 1], scales[1, 2] = stds["sinkage"], stds["drawbar_pull"]
-        columns = concat([change * profile, contact, none + scales], axis=0) * size
+        own = (slope * torque * first + (1.0 - first)) * self._own_errors(slip)
+        columns = concat([change * profile, contact, own], axis=0) * size
         return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
+
+    def _own_errors(self, slip: Value) -> Value:
+        """Relative errors (errors, channels, rows) of single channels; of pull, over load."""
+        stds, names = self.family.model_errors(), MODEL_ERROR_COLUMNS[OF_CHANNELS:]
+        constant, growing = np.zeros((2, len(names), len(RESPONSE_CHANNELS), 1))
+        for number, name in enumerate(names):
+            part = growing if name.endswith(GROWS) else constant
+            part[number, RESPONSE_CHANNELS.index(name.removesuffix(GROWS))] = stds[name]
+        return slip * growing + constant
 
 
 def _by_log_value(basis: Value, terms: Terms, number: int, axis: Coordinate) -> Value:

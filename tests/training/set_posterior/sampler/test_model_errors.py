@@ -141,14 +141,25 @@ def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
         assert found[channel] == pytest.approx(expected[channel], abs=tolerance)
 
 
-def test_sinkage_and_drawbar_pull_have_errors_of_their_own(wheel_posterior):
-    readings = true_readings(wheel_posterior.family)
-    found = model_columns(wheel_posterior, readings, 0.5)[:, :, 4:]
-    expected = np.zeros((3, len(SLIP), 2))
-    expected[1, :, 0] = 0.5 * USUAL_MODEL_ERRORS["sinkage"]
-    expected[2, :, 1] = 0.5 * USUAL_MODEL_ERRORS["drawbar_pull"]
-    assert found == pytest.approx(expected, rel=1e-4)
-    assert not model_columns(wheel_posterior, readings, 0.0).any()
+@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
+def test_channels_have_errors_of_their_own(kind, request):
+    posterior = request.getfixturevalue(kind)
+    readings = true_readings(posterior.family)
+    found = model_columns(posterior, readings, 0.5)[:, :, 4:]
+    of_torque = readings["torque"] * posterior_slope(posterior, readings)
+    expected = np.zeros((3, len(SLIP), 5))
+    for number, (name, channel, factor) in enumerate(
+        [
+            ("sinkage", 1, 1.0),
+            ("drawbar_pull", 2, 1.0),
+            ("torque_by_slip", 0, of_torque * SLIP),
+            ("sinkage_by_slip", 1, SLIP),
+            ("drawbar_pull_by_slip", 2, SLIP),
+        ]
+    ):
+        expected[channel, :, number] = 0.5 * USUAL_MODEL_ERRORS[name] * factor
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
+    assert not model_columns(posterior, readings, 0.0).any()
 
 
 def test_what_the_model_has_is_none_of_its_errors(any_posterior):
