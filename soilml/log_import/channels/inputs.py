@@ -184,7 +184,7 @@ def resting(inputs: Inputs) -> slice | None:
     """The stretch before the wheel starts, without its end; None where there is none."""
     speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
     if speed is None:
-        speed = inputs.values.get("ground_speed")
+        speed = inputs.values.get("ground_speed", _effort(inputs))
     if speed is None or not np.isfinite(speed).any():
         return None
     size = np.abs(speed)
@@ -196,6 +196,19 @@ def resting(inputs: Inputs) -> slice | None:
     margin = _BEFORE_START + (SMOOTH / 2 if "wheel_angle" in inputs.places else 0.0)
     end = first - round(margin / inputs.step)
     return slice(0, end) if end * inputs.step >= _SHORTEST_REST else None
+
+
+def _effort(inputs: Inputs) -> Floats | None:
+    """Torque or current (n,) less its zero, in a log of slip without speeds that begins at rest."""
+    effort = inputs.values.get("torque", inputs.values.get("motor_current"))
+    first = max(3, round(_SHORTEST_REST / inputs.step))
+    if effort is None or "slip" not in inputs.values or not np.isfinite(effort[:first]).any():
+        return None
+    zero = float(np.nanmedian(effort[:first]))
+    usual = float(np.nanpercentile(np.abs(effort), 90))
+    # noise is no start; a sensor whose zero is far off cannot be told from a wheel that drives
+    return np.where(np.abs(effort - zero) > 2 * _STANDS * usual, effort - zero, 0.0) if (
+        abs(zero) < 2 * _STANDS * usual) else None  # fmt: skip
 
 
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:

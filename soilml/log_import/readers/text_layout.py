@@ -39,6 +39,8 @@ _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
 _SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+#: What stands before units in a line of comment.
+_UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*", re.IGNORECASE)
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
@@ -162,7 +164,7 @@ def _header(
         text = line.strip()
         for mark in COMMENTS:
             text = text.removeprefix(mark).strip() if text.startswith(mark) else text
-        cells = split_line(text, separator)
+        cells = split_line(_UNITS_FOLLOW.sub("", text), separator)
         while cells and not cells[-1] and len(cells) > width:
             cells.pop()
         # some loggers end each line of samples with a separator, and the header without
@@ -176,7 +178,8 @@ def _header(
         if _are_units(cells):
             break
         index, names_row = later, cells
-    units_rows = [cells for i, cells in rows if i > index and _are_units(cells)]
+    units_rows = [cells for i, cells in rows if _are_units(cells)
+                  and (i > index or i < index and len(cells) == len(names_row))]  # fmt: skip
     units = (units_rows[0] if units_rows else []) + [""] * width
     names: list[str] = []
     stated: list[str] = []

@@ -89,12 +89,17 @@ def _wrap(own: Floats, steps: Floats) -> float:
     return 0.0
 
 
-def looks_like_time(values: Floats) -> float:
-    """How much a column looks like a clock, 0 to 1: it rises by even steps."""
+def looks_like_time(values: Floats, named: bool = False) -> float:
+    """How much a column looks like a clock, 0 to 1: it rises by even steps.
+
+    One whose name says that it is a time may show the same time several times.
+    """
     own = values[np.isfinite(values)]
     if own.size < 8:
         return 0.0
     steps = np.diff(own)
+    if named and np.mean(steps == 0.0) < 0.5:
+        steps = steps[steps != 0.0]
     if np.mean(steps > 0.0) < 0.97:
         return 0.0
     middle = float(np.median(steps))
