@@ -27,6 +27,8 @@ SMOOTH = 0.5
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
 _PLACES = ("wheel_angle", "position")
+#: Share of the usual torque or current that is more than noise and offset.
+_EFFORT = 0.1
 
 
 @dataclass
@@ -206,9 +208,9 @@ def _effort(inputs: Inputs) -> Floats | None:
         return None
     zero = float(np.nanmedian(effort[:first]))
     usual = float(np.nanpercentile(np.abs(effort), 90))
-    # noise is no start; a sensor whose zero is far off cannot be told from a wheel that drives
-    return np.where(np.abs(effort - zero) > 2 * _STANDS * usual, effort - zero, 0.0) if (
-        abs(zero) < 2 * _STANDS * usual) else None  # fmt: skip
+    if abs(zero) >= _EFFORT * usual:
+        return None  # a zero that is far off, or a wheel that drives from the beginning
+    return np.where(np.abs(effort - zero) > _EFFORT * usual, effort - zero, 0.0)
 
 
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:

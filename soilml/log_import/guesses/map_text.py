@@ -145,9 +145,7 @@ class _MapText:
         first = next(iter(drafts.values()))
         add_errors(first, self.found, self.errors)
         lines += self._wheel(first)
-        lines += load_lines(
-            self.found, self.stated, self.heads, self.run_names, len(self.labels)
-        )
+        lines += load_lines(self.found, self.stated, self.heads, self.run_names, len(self.labels))
         for role in ROLES:
             if role in self.found.shared:
                 lines += self._channel(f"[{role}]", role, first[role])

@@ -50,7 +50,10 @@ def load_lines(
     if count == 1:
         why = "  # CHANGE: how many wheels carry this mass"
         if "wheels" in stated:
-            count, why = int(stated["wheels"][0]), f"  # stated in the log: {stated['wheels'][1][:60]}"
+            count, why = (
+                int(stated["wheels"][0]),
+                f"  # stated in the log: {stated['wheels'][1][:60]}",
+            )
     mass, line = stated.get("mass", ("", ""))
     lines = ["", "# No column is a vertical load: it follows from the mass."]
     if mass:

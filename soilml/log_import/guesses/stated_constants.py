@@ -13,7 +13,10 @@ _VALUE += r"([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
 _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
-    "radius": (r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel)", "m"),
+    "radius": (
+        r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel|r(?=\s*[=:]))",
+        "m",
+    ),
     "diameter": (r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser)", "m"),
     "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
     "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
@@ -28,7 +31,9 @@ _STATED = {
     ),
     "load": (r"(?:normal[ _]?|vertical[ _]?|wheel[ _]?)?(?:load|weight)", "N"),
 }
-_WHEELS = re.compile(r"\b(\d{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*(\d{1,2})\b", re.IGNORECASE)
+_WHEELS = re.compile(
+    r"\b(\d{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*(\d{1,2})\b", re.IGNORECASE
+)
 #: Numbers in names of files: role, pattern and unit.
 _IN_NAMES = (
     ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),

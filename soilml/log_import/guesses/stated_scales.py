@@ -12,16 +12,20 @@ from soilml.log_import.units.unit_names import is_raw_signal, spelling
 _NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
 _RAW = r"([munµμ]?V(?:/V)?|volts?|digits?|counts?|lsb)\b"
 _UNIT = r"([A-Za-zµ·*][A-Za-zµ·* ²^0-9-]*)"
+_LAZY = r"([A-Za-zµ·*][A-Za-zµ·* ²^0-9-]*?)"
 #: 1 mV = 0.425 N m; 2 mV/V at 50 N m.
 _EQUAL = re.compile(
-    rf"{_NUMBER}\s*{_RAW}\s*(?:=|≙|->|:|corresponds? to|equals?|at|for|entspr\w*)\s*{_NUMBER}\s*{_UNIT}",
+    rf"{_NUMBER}\s*{_RAW}\s*(?:=|≙|->|:|corresponds? to|equals?|at|for|entspr\w*)\s*"
+    rf"{_NUMBER}\s*{_UNIT}",
     re.IGNORECASE,
 )
 #: 0.425 N m/mV; 0.425 Nm per mV.
-_RATIO = re.compile(rf"{_NUMBER}\s*{_UNIT}\s*(?:/|\bper\b|\bpro\b)\s*{_RAW}", re.IGNORECASE)
+_RATIO = re.compile(rf"{_NUMBER}\s*{_LAZY}\s*(?:/|\bper\b|\bpro\b)\s*{_RAW}", re.IGNORECASE)
 
 
-def stated_scale(name: str, unit: str, role: str, ours: str, lines: Sequence[str]) -> tuple[str, str]:
+def stated_scale(
+    name: str, unit: str, role: str, ours: str, lines: Sequence[str]
+) -> tuple[str, str]:
     """What 1 in a column of this raw unit is, as a value of a map, and the line that states it.
 
     Of several lines whose unit fits, that which has words of the column, or of its role. Two empty

@@ -72,7 +72,9 @@ def unit_in_name(name: str) -> str:
     for count in (2, 1):
         tail = words[-count:]
         if len(words) > count and "_".join(tail).lower() in _SUFFIXES.split():
-            text = "/".join(tail) if count == 2 and tail[-1] in ("s", "s2", "min") else "_".join(tail)
+            text = (
+                "/".join(tail) if count == 2 and tail[-1] in ("s", "s2", "min") else "_".join(tail)
+            )
             if len(text) == 1 and text.islower() and text in ("a", "n", "v"):
                 continue  # an axis or an index rather than a unit
             return text.replace("s2", "s^2")

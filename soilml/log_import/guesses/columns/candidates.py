@@ -103,9 +103,9 @@ def _score(
         even = looks_like_time(recording.columns[name], score > 0.0)
         return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
     wanted = (ROLES[role][0], *_ALSO.get(role, ()))
-    if is_raw_signal(unit) and role in CALIBRATED and kind not in wanted:
-        score -= 0.5  # of two sensors, that with a unit
-    elif kind is not None:
+    if is_raw_signal(unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
+        kind = None  # the name decides
+    if kind is not None:
         if kind not in wanted and not (kind == "1" and role == "slip"):
             return 0.0
         if kind == "1" and role == "motor_current" and score < _CLEAR:

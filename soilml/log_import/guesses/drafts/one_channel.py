@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns.candidates import CALIBRATED, Candidate
+from soilml.log_import.guesses.columns.column_words import words_of
 from soilml.log_import.guesses.drafts.draft import Draft
 from soilml.log_import.guesses.drafts.unit_guess import guess_rotation_unit, guess_unit
 from soilml.log_import.guesses.stated_constants import stated_radius
@@ -49,10 +50,6 @@ def draft_of(
     unit, why = guess_unit(role, column, moving)
     if role == "position" and dimension(unit) == "count":
         draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
-    elif dimension(unit) == "1" and role in ("torque", "motor_current"):
-        one = "0.01 N m" if role == "torque" else "0.01 A"
-        rated = "torque" if role == "torque" else "current"
-        draft.put("scale", one, f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
     elif is_raw_signal(unit) and role in CALIBRATED:
         lines = [line for recording in run.recordings for line in recording.about]
         known_scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
@@ -62,6 +59,10 @@ def draft_of(
             f"for 1 {unit}; stated in the log: {line[:60]}" if known_scale else
             f"CHANGE: what 1 {unit} is, from the calibration of the sensor",
         )  # fmt: skip
+    elif dimension(unit) == "1" and role in ("torque", "motor_current"):
+        one = "0.01 N m" if role == "torque" else "0.01 A"
+        rated = "torque" if role == "torque" else "current"
+        draft.put("scale", one, f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
     elif dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
         known_turn = "counts_per_turn" in stated
@@ -79,6 +80,9 @@ def draft_of(
             True,
             "of a quaternion (REP 103): there the nose is down where it is positive",
         )
+    if role == "slip" and "kappa" in words_of(column.name):
+        why = "of a kappa, as of tyres; remove this line where it is 1 - v/(r omega)"
+        draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
     if role in ("wheel_angle", "wheel_speed", "motor_current"):

@@ -14,8 +14,8 @@ from soilml.log_import.guesses.drafts.draft_inputs import moving
 _OFFSET = 0.01
 #: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.
 _FAR, _SUNK = 0.08, 0.01
-#: Share of the radius that no wheel sinks in at rest; fall of a reading, and reading at rest, m, that
-#: are more than noise.
+#: Share of the radius that no wheel sinks in at rest; fall of a reading, and reading at rest, m,
+#: that are more than noise.
 _MOST_AT_REST, _FALLS, _STANDS = 0.3, 0.002, 0.002
 #: Roles that read zero while a wheel rests.
 ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
@@ -58,7 +58,7 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
         if abs(rest) > _STANDS and (rest < 0.0) == turned:
             draft.comments["column"] = (
                 f"it reads {1e3 * abs(rest):.3g} mm before the wheel starts; where that is "
-                "the zero of the sensor, and no sinkage, add tare = \"rest\" and bias = 0.01"
+                'the zero of the sensor, and no sinkage, add tare = "rest" and bias = 0.01'
             )
         return
     if level < rest:
