@@ -56,11 +56,15 @@ def run(args: argparse.Namespace) -> int:
     if is_terminal():
         _print_table(found)
     tell(
-        f"{len(found.table)} rows of {found.runs} run{'s' * (found.runs != 1)} written to "
+        f"{_counted(len(found.table), 'row')} of {_counted(found.runs, 'run')} written to "
         f"{args.out}; report: {files[1]}; errors that all rows share, for the model file: "
         f"{files[3]}. Next: soilml identify MODEL.toml {args.out}"
     )
     return 0
+
+
+def _counted(number: int, name: str) -> str:
+    return f"{number} {name}{'s' * (number != 1)}"
 
 
 def _init(args: argparse.Namespace) -> int:
