@@ -191,7 +191,7 @@ def read_case(
     >>> print(case.model.gear.name, case.prior["friction_angle"], case.noise["torque_Nm"].share)
     wheel Prior(lower=0.4, upper=0.8, log=False) 0.02
     """
-    settings = read_settings(path)
+    settings = read_settings(path, f"soilml init {path}")
     case = take_case(settings, effects)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))
@@ -219,7 +219,7 @@ def read_case_of_one_gear(
     InputError
         As `read_case` does, and where the file has several gears and none of this name.
     """
-    settings = read_settings(path)
+    settings = read_settings(path, f"soilml init {path}")
     case = take_case(settings, effects)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))

@@ -131,8 +131,18 @@ def identify(
     if method not in CLOSED_FORM:
         data = condensed(case, data, selected)
     fit = METHODS[method](case, data, selected)
+    if method not in CLOSED_FORM and fit.low is None:
+        fit = _within_priors(fit, selected)
     texts = [*_method_limits(fit, data, free), *_about_discrepancy(case, fit, data), *data.notes]
     return replace(fit, warnings=(*fit.warnings, *texts))
+
+
+def _within_priors(fit: Fit, selected: Sequence[FreeParameter]) -> Fit:
+    """A fit whose Gaussian intervals end where the prior ends: no cohesion is below zero."""
+    low, high = fit.interval
+    prior = {parameter.path: parameter.prior for parameter in selected}
+    ends = np.asarray([(prior[name].lower, prior[name].upper) for name in fit.names])
+    return replace(fit, low=np.maximum(low, ends[:, 0]), high=np.minimum(high, ends[:, 1]))
 
 
 def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:

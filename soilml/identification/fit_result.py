@@ -49,7 +49,8 @@ class Fit:
     channels
         Columns that were fitted.
     low, high
-        Ends (p,) of the 90 % interval where the method computes them, as the posterior does.
+        Ends (p,) of the 90 % interval where the method computes them, as the posterior does, and
+        where Gaussian ones would reach beyond the priors.
     samples
         Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
         where the method drew them.

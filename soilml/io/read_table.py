@@ -112,7 +112,7 @@ def read_table(
         columns = arrow_columns(path)
         kept = _known_columns(file, list(columns), ignore_extra)
         table = Table({name: plain_column(file, name, columns[name]) for name in kept}, str(file))
-        return _checked(table, file, need, filled, limits)
+        return check_table(table, file, need, filled, limits)
     file = Path(path)
     try:
         if file.suffix == ".parquet" or file.is_dir():
@@ -123,17 +123,21 @@ def read_table(
         raise TableError(f"{file}: there is no such file") from None
     except OSError as error:
         raise TableError(f"{file} cannot be read: {error.strerror or error}") from None
-    return _checked(table, file, need, filled, limits)
+    return check_table(table, file, need, filled, limits)
 
 
-def _checked(
+def check_table(
     table: Table,
     file: Path,
     need: Sequence[str],
     filled: Sequence[str],
     limits: Mapping[str, Limits] | None,
 ) -> Table:
-    """The table, with its columns and values as they must be."""
+    """The table, with its columns and values as they must be.
+
+    `need`, `filled` and `limits` are those of `read_table`. Raises `TableError` for the first
+    column that is missing, cell that is blank, or value outside its limits.
+    """
     for name in need:
         if name not in table:
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")

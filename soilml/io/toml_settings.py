@@ -92,15 +92,19 @@ class Settings:
         raise InputError(f"{self.where}: {text}")
 
 
-def read_settings(path: str | os.PathLike[str]) -> Settings:
-    """The TOML file at `path`; raises `InputError` where it is missing or not valid TOML."""
+def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
+    """The TOML file at `path`; raises `InputError` where it is missing or not valid TOML.
+
+    `write` is the command that writes a first one, for the message.
+    """
     file = Path(path)
     try:
         content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
         _check_depth(content, str(file))
         _check_whole_numbers(content, str(file))
     except FileNotFoundError:
-        raise InputError(f"{file}: there is no such file") from None
+        hint = f"; `{write}` writes one" if write else ""
+        raise InputError(f"{file}: there is no such file{hint}") from None
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:

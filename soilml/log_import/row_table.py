@@ -53,6 +53,9 @@ def rows_as_table(
             if "speed" in row.values:
                 line[column("speed")] = row.values["speed"]
             line[column("time")] = (row.window.start + row.window.stop) / 2.0
+            if wheel.radius is not None:
+                # a model file of another wheel is refused, since slip is that of this radius
+                line[column("wheel_radius")] = wheel.radius.value
             line["source"] = run.recordings[0].file.name
             lines.append(line)
     names = list(dict.fromkeys(name for line in lines for name in line))

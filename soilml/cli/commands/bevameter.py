@@ -30,7 +30,8 @@ plate_radius_m, plate_area_m2 of a round plate, or plate_width_m and
 plate_length_m. SHEAR.csv has test, normal_stress_Pa, shear_displacement_m and
 shear_stress_Pa; for a ring inner_radius_m, outer_radius_m, angle_rad, torque_Nm,
 and load_N or normal_stress_Pa. A blank displacement or angle marks the steady
-end of a test. Rows with the same name in the column test are one test.
+end of a test. Rows with the same name in the column test are one test. Other
+names are taken where the header states units, such as z [mm] and p [kPa].
 
 The unit is the test, not the sample: ranges follow from how tests scatter. The
 second range is where the value at another place of the soil would lie, and is

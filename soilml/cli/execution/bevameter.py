@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 import numpy as np
 
 from soilml.cli.option_values import available_effects
-from soilml.cli.output import json_text, show
+from soilml.cli.output import json_text, show, tell
 from soilml.cli.progress import working
 from soilml.config.case import read_case
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError, MissingLibraryError, TableError
 from soilml.identification.bevameter import BevameterResult, bevameter
 from soilml.identification.bevameter.model_file import missing_values, model_file_text
 from soilml.io.atomic_files import save_text
-from soilml.io.read_table import Limits, read_table
+from soilml.io.read_table import Limits, check_table, read_table
 from soilml.io.table import Table
 from soilml.io.text_tables import format_table
+from soilml.log_import.soil_tests import read_soil_tests
 from soilml.optional_imports import need
 from soilml.report.terminal import shown_unit, significant
 
@@ -55,13 +57,29 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _table(path: str, ignore_extra: bool) -> Table:
+    """A table of tests; where it has other names and units, it is told what they are taken for."""
+    try:
+        return read_table(
+            path, ("test",), filled=("test",), ignore_extra=ignore_extra, limits=LIMITS
+        )
+    except TableError as error:
+        try:
+            need("pint", "bevameter")
+            found = read_soil_tests(path)
+        except MissingLibraryError:
+            found = None
+        if found is None:
+            raise error from None
+    tell(f"! {found}")
+    return check_table(found.table, Path(path), ("test",), ("test",), LIMITS)
+
+
 def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None]:
     """The plate tests and the shear tests, told apart by their columns."""
     found: dict[str, Table] = {}
     for path in args.tables:
-        table = read_table(
-            path, ("test",), filled=("test",), ignore_extra=args.ignore_extra, limits=LIMITS
-        )
+        table = _table(path, args.ignore_extra)
         if "shear_stress_Pa" in table or "torque_Nm" in table:
             kind = "shear"
         elif "sinkage_m" in table:

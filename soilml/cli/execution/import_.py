@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 
 from soilml.cli.output import format_columns, is_terminal, json_text, tell, write_stdout
 from soilml.cli.output_names import IMPORT_SUFFIXES
@@ -19,6 +20,8 @@ from soilml.optional_imports import need
 _SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "drawbar_pull_N",
           "sinkage_m")  # fmt: skip
 _MOST_SHOWN = 40
+#: Most logs that the next command names.
+_MOST_NAMED = 4
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,10 +56,15 @@ def run(args: argparse.Namespace) -> int:
     if is_terminal():
         _print_table(found)
     tell(
-        f"{len(found.table)} rows of {found.runs} runs written to {args.out}; "
-        f"report: {files[1]}; errors that all rows share: {files[3]}"
+        f"{_counted(len(found.table), 'row')} of {_counted(found.runs, 'run')} written to "
+        f"{args.out}; report: {files[1]}; errors that all rows share, for the model file: "
+        f"{files[3]}. Next: soilml identify MODEL.toml {args.out}"
     )
     return 0
+
+
+def _counted(number: int, name: str) -> str:
+    return f"{number} {name}{'s' * (number != 1)}"
 
 
 def _init(args: argparse.Namespace) -> int:
@@ -68,7 +76,9 @@ def _init(args: argparse.Namespace) -> int:
     changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
     lines = "1 line needs" if changes == 1 else f"{changes} lines need"
     todo = f"{lines} a look (CHANGE, NEEDED)" if changes else "look at its guesses"
-    tell(f"{args.out} written; {todo}; then: soilml import LOG... --map {args.out} --out RUNS.csv")
+    logs = [str(file) for file in args.files]
+    shown = shlex.join(logs) if len(logs) <= _MOST_NAMED else "LOG..."
+    tell(f"{args.out} written; {todo}; then: soilml import {shown} --map {args.out} --out runs.csv")
     return 0
 
 

@@ -27,6 +27,8 @@ SMOOTH = 0.5
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
 _PLACES = ("wheel_angle", "position")
+#: Share of the usual torque or current that is more than noise and offset.
+_EFFORT = 0.1
 
 
 @dataclass
@@ -184,7 +186,7 @@ def resting(inputs: Inputs) -> slice | None:
     """The stretch before the wheel starts, without its end; None where there is none."""
     speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
     if speed is None:
-        speed = inputs.values.get("ground_speed")
+        speed = inputs.values.get("ground_speed", _effort(inputs))
     if speed is None or not np.isfinite(speed).any():
         return None
     size = np.abs(speed)
@@ -196,6 +198,19 @@ def resting(inputs: Inputs) -> slice | None:
     margin = _BEFORE_START + (SMOOTH / 2 if "wheel_angle" in inputs.places else 0.0)
     end = first - round(margin / inputs.step)
     return slice(0, end) if end * inputs.step >= _SHORTEST_REST else None
+
+
+def _effort(inputs: Inputs) -> Floats | None:
+    """Torque or current (n,) less its zero, in a log of slip without speeds that begins at rest."""
+    effort = inputs.values.get("torque", inputs.values.get("motor_current"))
+    first = max(3, round(_SHORTEST_REST / inputs.step))
+    if effort is None or "slip" not in inputs.values or not np.isfinite(effort[:first]).any():
+        return None
+    zero = float(np.nanmedian(effort[:first]))
+    usual = float(np.nanpercentile(np.abs(effort), 90))
+    if abs(zero) >= _EFFORT * usual:
+        return None  # a zero that is far off, or a wheel that drives from the beginning
+    return np.where(np.abs(effort - zero) > _EFFORT * usual, effort - zero, 0.0)
 
 
 def _tare(inputs: Inputs, wheel: WheelMap) -> None:

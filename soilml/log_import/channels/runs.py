@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.log_import.channels.whole_seconds import spread_over_seconds
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.units.conversion import factor
@@ -163,6 +164,10 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
         clock = _clock(recording, log_map, kind)
         if clock is None:
             continue
+        spread = spread_over_seconds(clock)
+        if spread is not clock:
+            clock = spread
+            notes.append("the clock shows whole seconds: lines of one second are spread over it")
         good = _increasing(clock)
         if not good.any():
             continue

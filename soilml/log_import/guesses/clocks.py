@@ -20,6 +20,10 @@ from soilml.log_import.units.conversion import factor
 _LEAST, _MOST_RUNS = 0.5, 1000
 #: Shortest pause between two runs, s.
 _PAUSE = 5.0
+#: Words of a column of wheels, those of its number; most wheels, and share of lines that change it.
+_OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "rad", "actuator"}
+_NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
+_MOST_WHEELS, _TURNS = 12, 0.2
 
 
 def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:
@@ -50,6 +54,38 @@ def guess_run_column(recordings: Sequence[Recording]) -> tuple[str, int]:
             if 1 < count <= min(_MOST_RUNS, len(cells) / 20) and changes == count - 1:
                 return name, count
     return "", 0
+
+
+def guess_wheel_column(recordings: Sequence[Recording]) -> tuple[str, list[str]]:
+    """A column that says of which wheel a line is, and its wheels; "" and [] where none does.
+
+    Its value changes from line to line, as the wheels take turns.
+    """
+    for recording in recordings:
+        columns = dict(recording.texts)
+        for name, values in recording.columns.items():
+            whole = np.isfinite(values).all() and np.all(values == np.round(values))
+            if whole and _OF_A_WHEEL & {*words_of(name)} and _NUMBERED & {*words_of(name)}:
+                columns[name] = [f"{value:g}" for value in values]
+        for name, cells in columns.items():
+            labels = list(dict.fromkeys(cells))
+            if not 1 < len(labels) <= _MOST_WHEELS or "" in labels:
+                continue
+            sides = all({*words_of(label)} & {*WHEEL_WORDS} for label in labels)
+            changes = sum(a != b for a, b in pairwise(cells))
+            if changes > _TURNS * len(cells) and (sides or _OF_A_WHEEL & {*words_of(name)}):
+                return name, labels
+    return "", []
+
+
+def lines_of_first(recordings: Sequence[Recording], column: str) -> list[Recording]:
+    """The recordings with the lines of one label alone, where they have this column."""
+    found = []
+    for recording in recordings:
+        cells = recording.texts.get(column) or recording.columns.get(column)
+        keep = np.ones(0, dtype=bool) if cells is None else np.asarray(cells) == cells[0]
+        found.append(recording.rows(keep) if keep.size else recording)
+    return found
 
 
 def structs_are_runs(recordings: Sequence[Recording], clock: str) -> int:

@@ -13,6 +13,8 @@ from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.clocks import (
     guess_clock,
     guess_run_column,
+    guess_wheel_column,
+    lines_of_first,
     pauses,
     refuse_a_table_of_runs,
     restarts,
@@ -73,8 +75,13 @@ class _MapText:
         self.logs = logs
         first = [recording for log in logs[:4] for recording in log]
         self.steady = rows_are_runs(logs)
-        self.time_column, self.time_unit = ("", "") if self.steady else guess_clock(first)
         self.run_column, self.run_count = ("", 0) if self.steady else guess_run_column(logs[0])
+        self.labels: list[str] = []
+        if not self.steady and not self.run_column:
+            self.run_column, self.labels = guess_wheel_column(logs[0])
+            self.run_count = len(self.labels)
+            first = lines_of_first(first, self.run_column) if self.labels else first
+        self.time_column, self.time_unit = ("", "") if self.steady else guess_clock(first)
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
         self.structs = structs_are_runs(logs[0], self.time_column)
         self.pauses, self.longest = pauses(logs[0], self.time_column, self.time_unit)
@@ -138,12 +145,14 @@ class _MapText:
         first = next(iter(drafts.values()))
         add_errors(first, self.found, self.errors)
         lines += self._wheel(first)
-        lines += load_lines(self.found, self.stated, self.heads, self.run_names)
+        lines += load_lines(self.found, self.stated, self.heads, self.run_names, len(self.labels))
         for role in ROLES:
             if role in self.found.shared:
                 lines += self._channel(f"[{role}]", role, first[role])
             elif role not in self.found.roles():
-                lines += absent_lines(role, self.found, self.columns, self.run_names)
+                lines += absent_lines(
+                    role, self.found, self.columns, self.run_names, self.stated, self.heads
+                )
         of_wheels = self.found.wheels.items()
         alike = keys_alike([{role: drafts[name][role] for role in own} for name, own in of_wheels])
         for role, draft in alike.items():
@@ -219,7 +228,10 @@ class _MapText:
             return [*lines, f"column = {toml_value(name)}  # {why}"] if name else lines
         if self.run_column:
             column = toml_value(self.run_column)
-            return ["", "[runs]", f"column = {column}  # {self.run_count} values, one run each"]
+            what = f"{self.run_count} values, one run each"
+            if self.labels:
+                what = f"a line for each wheel ({', '.join(self.labels[:4])}): each is a run"
+            return ["", "[runs]", f"column = {column}  # {what}"]
         if self.structs:
             return ["", "[runs]", f"each_struct = true  # {self.structs} with the same columns"]
         if self.restarts:
@@ -243,6 +255,9 @@ class _MapText:
         inputs = inputs_of(drafts, self.run)
         ratio = fastest_ratio(inputs) if inputs is not None and needed else math.nan
         hint = ""
+        for role in ("wheel_speed", "wheel_angle"):
+            if role in drafts:  # the rotation is that of the motor
+                ratio *= float(drafts[role].keys.get("gear_ratio", 1.0))
         if math.isfinite(ratio) and ratio > 0.0:
             if 0.02 < ratio < 0.7:
                 hint = f"; travel over rotation is {ratio:.3g} m at the lowest slip: a little less"

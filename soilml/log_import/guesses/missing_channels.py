@@ -17,8 +17,12 @@ def load_lines(
     stated: dict[str, tuple[str, str]],
     heads: dict[str, tuple[str, str, list[str]]],
     run_names: Sequence[str],
+    labels: int = 1,
 ) -> list[str]:
-    """What stands for the load where no column is one: what logs or names say, or the mass."""
+    """What stands for the load where no column is one: what logs or names say, or the mass.
+
+    `labels` is the number of wheels that a column of the log tells apart.
+    """
     if "load" in found.roles():
         return []
     if "load" in stated and "mass" not in stated:
@@ -42,21 +46,38 @@ def load_lines(
             f"file_name = {toml_value(pattern)}  # the names say {shown}",
             f"unit = {toml_value(unit)}",
         ]
-    count = max(1, len(found.wheels))
-    mass = stated.get("mass", ("", ""))[0]
+    count, why = max(1, len(found.wheels), labels), ""
+    if count == 1:
+        why = "  # CHANGE: how many wheels carry this mass"
+        if "wheels" in stated:
+            count, why = (
+                int(stated["wheels"][0]),
+                f"  # stated in the log: {stated['wheels'][1][:60]}",
+            )
+    mass, line = stated.get("mass", ("", ""))
     lines = ["", "# No column is a vertical load: it follows from the mass."]
     if mass:
-        return [*lines, "[vehicle]", f'mass = "{mass} +- 1 %"', f"wheels = {count}"]
+        return [
+            *lines,
+            "[vehicle]",
+            f'mass = "{mass} +- 1 %"  # stated in the log: {line[:60]}',
+            f"wheels = {count}{why}",
+        ]
     return [
         *lines,
         "# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'",
         '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
-        f"# wheels = {count}",
+        f"# wheels = {count}{why}",
     ]
 
 
 def absent_lines(
-    role: str, found: Assignment, columns: Sequence[Candidate], run_names: Sequence[str]
+    role: str,
+    found: Assignment,
+    columns: Sequence[Candidate],
+    run_names: Sequence[str],
+    stated: dict[str, tuple[str, str]],
+    heads: dict[str, tuple[str, str, list[str]]],
 ) -> list[str]:
     """What stands for another role that no column has: what is needed, or the runner-up."""
     others: list[Candidate] = found.others.get(role, [])
@@ -78,6 +99,23 @@ def absent_lines(
             "# [wheel_angle]",
             "# [wheel_speed]",
             *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
+        ]
+    if role == "ground_speed" and not {"position", "slip"} & found.roles():
+        if "ground_speed" in stated:
+            value, line = stated["ground_speed"]
+            return ["", "[ground_speed]",
+                    f'value = "{value} +- 1 %"  # stated in the log: {line[:60]}']  # fmt: skip
+        if "ground_speed" in heads:
+            pattern, unit, values = heads["ground_speed"]
+            return ["", "[ground_speed]",
+                    f"head = {toml_value(pattern)}  # the logs state {', '.join(values[:4])}",
+                    f"unit = {toml_value(unit or 'm/s')}"]  # fmt: skip
+    if role == "torque" and not ("motor_current" in found.roles() or others):
+        return [
+            "",
+            "# NEEDED for a soil: no column is a torque. One of these:",
+            "# [torque]",
+            "# [motor_current]",
         ]
     if role == "ground_speed" and not ({"position", "slip"} & found.roles() or others):
         return [

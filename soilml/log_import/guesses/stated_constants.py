@@ -6,14 +6,17 @@ import re
 from collections.abc import Sequence
 
 from soilml.log_import.recording import Recording
-from soilml.log_import.units.conversion import dimension
+from soilml.log_import.units.conversion import dimension, factor
 
 _VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ][:=,;\s]*"
 _VALUE += r"([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
 _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
-    "radius": (r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel)", "m"),
+    "radius": (
+        r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel|r(?=\s*[=:]))",
+        "m",
+    ),
     "diameter": (r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser)", "m"),
     "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
     "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
@@ -21,8 +24,16 @@ _STATED = {
     "efficiency": (r"(?:gear[ _]?)?(?:efficiency|eta|wirkungsgrad)", "1"),
     "counts_per_turn": (r"(?:cpr|ppr|counts[ _]?per[ _]?(?:turn|rev\w*)|resolution)", "1"),
     "mass": (r"(?:mass|masse|rover[ _]?mass|vehicle[ _]?mass)", "kg"),
+    "ground_speed": (
+        r"(?:carriage|cart|travel|trolley|ground|traverse|forward|wagen|schlitten|vorschub)[ _]?"
+        r"(?:speed|velocity|feed|geschwindigkeit)",
+        "m/s",
+    ),
     "load": (r"(?:normal[ _]?|vertical[ _]?|wheel[ _]?)?(?:load|weight)", "N"),
 }
+_WHEELS = re.compile(
+    r"\b(\d{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*(\d{1,2})\b", re.IGNORECASE
+)
 #: Numbers in names of files: role, pattern and unit.
 _IN_NAMES = (
     ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
@@ -37,6 +48,8 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Constants by name: as they would be written in a map, and the line that states them."""
     found: dict[str, tuple[str, str]] = {}
     for line in lines:
+        if "wheels" not in found and (wheels := _WHEELS.search(line)):
+            found["wheels"] = (wheels[1] or wheels[2], line)
         for name, (words, ours) in _STATED.items():
             if name in found:
                 continue
@@ -61,6 +74,15 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
     if "diameter" in found and "radius" in found:
         del found["diameter"]
     return found
+
+
+def stated_radius(stated: dict[str, tuple[str, str]]) -> float:
+    """Radius in m that a log states, itself or as a diameter; 0 where it states none."""
+    for name, share in (("radius", 1.0), ("diameter", 0.5)):
+        if name in stated:
+            number, _, unit = stated[name][0].partition(" ")
+            return share * float(number) * (factor(unit, "m", name) if unit else 1.0)
+    return 0.0
 
 
 def agreed_constants(

@@ -90,7 +90,7 @@ class LogMap:
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
     """Read a map; raises `InputError`, naming file, table and key, for what is wrong in it."""
-    settings = read_settings(path)
+    settings = read_settings(path, f"soilml import --init LOG... --out {path}")
     found = _take_map(settings, str(path))
     settings.finish()
     return found

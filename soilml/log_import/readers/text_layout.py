@@ -39,6 +39,8 @@ _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
 _SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+#: What stands before units in a line of comment.
+_UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*", re.IGNORECASE)
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
@@ -157,14 +159,17 @@ def _header(
     head: list[str], separator: str, width: int
 ) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     """Names, units and the index of the header line, among the lines before the samples."""
-    rows = []
+    rows, said = [], None
     for i, line in enumerate(head):
         text = line.strip()
         for mark in COMMENTS:
             text = text.removeprefix(mark).strip() if text.startswith(mark) else text
-        cells = split_line(text, separator)
+        cells = _header_cells(_UNITS_FOLLOW.sub("", text), separator, width)
         while cells and not cells[-1] and len(cells) > width:
             cells.pop()
+        if _UNITS_FOLLOW.match(text) and len(cells) == width:
+            said = cells  # whatever its place
+            continue
         # some loggers end each line of samples with a separator, and the header without
         if abs(len(cells) - width) <= max(1, width // 8) and sum(map(bool, cells)) > width / 2:
             rows.append((i, cells))
@@ -177,7 +182,7 @@ def _header(
             break
         index, names_row = later, cells
     units_rows = [cells for i, cells in rows if i > index and _are_units(cells)]
-    units = (units_rows[0] if units_rows else []) + [""] * width
+    units = (said or (units_rows[0] if units_rows else [])) + [""] * width
     names: list[str] = []
     stated: list[str] = []
     for k in range(width):
@@ -188,6 +193,16 @@ def _header(
         names.append(name)
         stated.append(units[k].strip("[](){} ") or unit)
     return tuple(names), tuple(stated), index
+
+
+def _header_cells(text: str, separator: str, width: int) -> list[str]:
+    """The cells of a line before the samples; names may have another separator than the samples."""
+    cells = split_line(text, separator)
+    for other in _SEPARATORS if separator == " " or len(cells) < width else ():
+        own = split_line(text, other)
+        if len(own) == width and not any(is_number(cell) for cell in own):
+            return own
+    return cells
 
 
 def _are_units(cells: list[str]) -> bool:

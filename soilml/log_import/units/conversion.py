@@ -10,7 +10,22 @@ from soilml.log_import.units.unit_names import spelling
 from soilml.optional_imports import need
 
 #: Dimensions by the unit that soilml uses.
-DIMENSIONS = ("s", "rad/s", "rad", "m/s", "m", "1", "N m", "A", "N", "kg", "N m/A", "m/s^2")
+DIMENSIONS = (
+    "s",
+    "rad/s",
+    "rad",
+    "m/s",
+    "m",
+    "1",
+    "N m",
+    "A",
+    "N",
+    "kg",
+    "N m/A",
+    "m/s^2",
+    "Pa",
+    "m^2",
+)
 _ANGLES = ("deg", "rad", "turn", "rpm", "count", "mrad", "urad", "arcmin", "arcsec", "grade")
 _OTHER_KIND = {
     "N": "kg are a mass; write kgf where a scale shows the force in kg, or give the mass as "

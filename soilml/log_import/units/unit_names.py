@@ -42,7 +42,7 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
-    "newtons amps inc mn"
+    "newtons amps inc mn mm_min cm_min m_min mv uv"
 )
 _POWER = re.compile(r"([A-Za-z]+)\s*(?:\^|\*\*)?\s*(-?\d)(?!\d)")
 
@@ -72,11 +72,19 @@ def unit_in_name(name: str) -> str:
     for count in (2, 1):
         tail = words[-count:]
         if len(words) > count and "_".join(tail).lower() in _SUFFIXES.split():
-            text = "/".join(tail) if count == 2 and tail[-1] in ("s", "s2") else "_".join(tail)
+            text = (
+                "/".join(tail) if count == 2 and tail[-1] in ("s", "s2", "min") else "_".join(tail)
+            )
             if len(text) == 1 and text.islower() and text in ("a", "n", "v"):
                 continue  # an axis or an index rather than a unit
             return text.replace("s2", "s^2")
     return ""
+
+
+def is_raw_signal(unit: str) -> bool:
+    """Whether a unit is that of a sensor before its calibration: volts, mV/V, counts."""
+    text = spelling(unit)
+    return text in ("V", "mV", "uV", "kV", "count") or re.fullmatch(r"[mu]?V/V", text) is not None
 
 
 def known_unit(text: str) -> bool:

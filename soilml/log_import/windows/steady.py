@@ -13,6 +13,7 @@ from soilml.log_import.mapping.window_tables import LeaveOut, WindowSettings
 from soilml.log_import.recording import Floats
 from soilml.log_import.windows.change_points import steady_pieces
 from soilml.log_import.windows.mean_errors import mean_error
+from soilml.log_import.windows.resting_wheel import why_at_rest
 from soilml.log_import.windows.transients import without_transients
 
 #: Quantities whose changes end a window, and the least change that counts, as a share of the
@@ -21,8 +22,6 @@ _WATCHED = {"rim_speed": 0.01, "speed": 0.015, "slip": 0.01, "torque": 0.03, "lo
             "drawbar_pull": 0.04}  # fmt: skip
 #: Most values in the search, and shortest stretch over which samples are averaged for it, s.
 _MOST_VALUES, _SHORTEST_MEAN = 500, 0.1
-#: Share of the usual speed of the rim below which a wheel is at rest.
-_AT_REST = 0.1
 #: Largest share of missing samples in a window.
 _MISSING = 0.2
 #: A change within a window counts where it is this many standard errors.
@@ -220,15 +219,8 @@ def _why_not(
     low, high = settings.within
     if stop <= low or start >= high:
         return "outside of [windows] within"
-    rim = quantities.get("rim_speed", quantities.get("speed"))
-    if rim is not None and np.isfinite(rim[rows]).any():
-        usual = float(np.nanpercentile(np.abs(rim), 90))
-        if float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual:
-            return "the wheel is at rest"
-    elif "torque" in quantities and np.isfinite(quantities["torque"][rows]).any():
-        size = np.abs(quantities["torque"])
-        if float(np.nanmedian(size[rows])) < _AT_REST * float(np.nanpercentile(size, 90)):
-            return "the torque is near zero: the wheel is probably at rest"
+    if rests := why_at_rest(step, quantities, rows):
+        return rests
     if stop - start < settings.shortest:
         return f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
     for name in ("slip", "load"):

@@ -66,10 +66,17 @@ def table_summary(table: Table, case: Case | None = None) -> dict[str, Any]:
         "runs": runs,
         "slip": _ends(rows["slip"]),
         "load": _ends(rows["load_N"]),
+        "radius": _one_radius(rows),
         "measured": [COLUMNS[key].name.replace("_", " ") for key in measured],
         "points": {key: drawn[key].tolist() for key in ("slip", "load_N", *measured)},
         "point_runs": [str(name) for name in drawn["run"]] if "run" in drawn else [],
     }
+
+
+def _one_radius(rows: Table) -> float | None:
+    """The radius in m at which slip is defined, where the table says it and it is one."""
+    radii = np.unique(rows["wheel_radius_m"]) if "wheel_radius_m" in rows else np.zeros(0)
+    return float(radii[0]) if radii.size == 1 and np.isfinite(radii[0]) else None
 
 
 def _ends(values: Any) -> list[float]:

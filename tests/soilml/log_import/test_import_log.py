@@ -5,7 +5,8 @@ import pytest
 from log_files import FORMATS
 from simulated_rig import LOAD, RADIUS, drive, scores, torque_law, write_csv
 
-from soilml.errors import InputError
+from soilml import read_case
+from soilml.errors import InputError, TableError
 from soilml.identification import identify
 from soilml.io.read_table import read_table
 from soilml.io.text_tables import csv_text
@@ -219,3 +220,14 @@ def test_what_a_map_lacks_is_said(tmp_path):
         import_log(path, MAP | SPEEDS | {"torque": {"column": "torqe"}})
     with pytest.raises(InputError, match="unknown key 'ratio'"):
         import_log(path, MAP | SPEEDS | {"torque": {"column": "torque", "ratio": 2}})
+
+
+def test_a_model_file_of_another_wheel_is_refused(tmp_path, model_file):
+    """The table says at which radius slip is defined."""
+    d = drive(np.random.default_rng(12), slips=(0.2, 0.4), seconds=8)
+    columns = {"t": d.time, "omega": d.rim / 0.11, "v": d.ground, "torque": d.torque, "Fz": d.load}
+    text = init_map(write_csv(tmp_path / "a.csv", columns))
+    (tmp_path / "map.toml").write_text(text.replace('# radius = "0.15 m', 'radius = "0.11 m'))
+    found = import_log(tmp_path / "a.csv", tmp_path / "map.toml")
+    with pytest.raises(TableError, match=r"radius_m: 0\.11 given, the model's wheel has 0\.15"):
+        identify(read_case(model_file), found.table)

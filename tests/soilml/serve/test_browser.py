@@ -162,6 +162,17 @@ def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
     assert value == pytest.approx(28.0, abs=5.0)
 
 
+def test_a_log_brings_the_radius_of_its_wheel(tab, tmp_path):
+    file = runs_file(tmp_path, Model(Wheel(radius=0.11, width=0.12)))
+    header, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([f"{header},wheel_radius_m", *(f"{row},0.11" for row in rows)]))
+    tab.set_input_files("#file", file)
+    tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
+    assert number(tab, "gear-radius").input_value() == "110"
+    assert "the radius of this log, 110" in tab.locator("#table-panel").inner_text()
+    assert tab.locator("#estimate-error").is_hidden()
+
+
 def test_a_faulty_table_is_answered_beside_the_drop_zone(tab, tmp_path):
     (tmp_path / "bad.csv").write_text("run,slip,load_N,torque_Nm\na,30,60,2\n")
     tab.set_input_files("#file", tmp_path / "bad.csv")

@@ -10,6 +10,8 @@ from soilml.log_import.recording import Floats
 
 #: Range of an angle or counter that starts again, by unit.
 _PERIODS = (360.0, 2.0 * np.pi, 65536.0, 4096.0, 1024.0, 8192.0, 16384.0, 32768.0, 4294967296.0)
+#: Days of a spreadsheet of the years 1968 to 2119, and their largest step: 10 s.
+_DAYS = (25_000.0, 80_000.0, 1.2e-4)
 
 
 @dataclass(frozen=True)
@@ -89,12 +91,19 @@ def _wrap(own: Floats, steps: Floats) -> float:
     return 0.0
 
 
-def looks_like_time(values: Floats) -> float:
-    """How much a column looks like a clock, 0 to 1: it rises by even steps."""
+def looks_like_time(values: Floats, named: bool = False) -> float:
+    """How much a column looks like a clock, 0 to 1: it rises by even steps.
+
+    One whose name says that it is a time may show the same time several times.
+    """
     own = values[np.isfinite(values)]
     if own.size < 8:
         return 0.0
     steps = np.diff(own)
+    if named:
+        steps = steps[steps != 0.0]
+    if steps.size < 8:
+        return 0.0
     if np.mean(steps > 0.0) < 0.97:
         return 0.0
     middle = float(np.median(steps))
@@ -103,10 +112,10 @@ def looks_like_time(values: Floats) -> float:
 
 
 def time_unit(values: Floats) -> str:
-    """The likely unit of a clock: s, ms, us or ns, by its size and by its steps.
+    """The likely unit of a clock: s, ms, us, ns or d, by its size and by its steps.
 
     Loggers sample between once in two seconds and 20000 times a second; clocks since 1970 have ten
-    digits in s, thirteen in ms.
+    digits in s, thirteen in ms. Spreadsheets count days since 1900.
     """
     own = values[np.isfinite(values)]
     if own.size < 2:
@@ -115,7 +124,10 @@ def time_unit(values: Floats) -> str:
     for unit, least in (("ns", 5e17), ("us", 5e14), ("ms", 5e11), ("s", 5e8)):
         if first > least:
             return unit
-    step = float(np.median(np.diff(own)))
+    steps = np.diff(own)
+    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    if _DAYS[0] < first < _DAYS[1] and step < _DAYS[2]:
+        return "d"
     if step > 5e5:
         return "ns"
     if step >= 500.0 and float(np.ptp(own)) / 1e3 > 3600.0:

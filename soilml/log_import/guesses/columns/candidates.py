@@ -11,7 +11,7 @@ from soilml.log_import.guesses.columns.column_words import name_scores, words_of
 from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension
-from soilml.log_import.units.unit_names import spelling, unit_in_name
+from soilml.log_import.units.unit_names import is_raw_signal, spelling, unit_in_name
 
 #: What a role's unit may be, beside that of `ROLES`.
 _ALSO = {
@@ -23,6 +23,8 @@ _ALSO = {
     "motor_current": ("1",),
     "drawbar_pull": ("kg",),
 }
+#: Roles that a sensor may show in volts or counts, which need the calibration of the sensor.
+CALIBRATED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "position")
 #: Score from which a name says the role whatever the topic is called.
 _CLEAR = 4.0
 #: Most columns of text that are listed.
@@ -98,15 +100,19 @@ def _score(
     if role == "time":
         if kind not in (None, "s"):
             return 0.0
-        even = looks_like_time(recording.columns[name])
+        even = looks_like_time(recording.columns[name], score > 0.0)
         return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
     wanted = (ROLES[role][0], *_ALSO.get(role, ()))
+    if is_raw_signal(unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
+        kind = None  # the name decides
     if kind is not None:
         if kind not in wanted and not (kind == "1" and role == "slip"):
             return 0.0
+        if kind == "1" and role == "motor_current" and score < _CLEAR:
+            return 0.0  # i in per cent is a slip
         if kind == "1" and role != "slip" and spelling(unit) != "percent":
             return 0.0
-        score += 2.5 if kind not in ("1",) else 1.0
+        score += 2.5 if kind not in ("1",) else 2.0 if role == "slip" and score > 0.0 else 1.0
         if score <= 2.5 and not _unit_suffices(role, kind):
             return 0.0
     if score <= 0.0:

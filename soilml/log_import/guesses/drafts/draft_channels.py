@@ -9,8 +9,9 @@ from soilml.log_import.guesses.columns.candidates import Candidate
 from soilml.log_import.guesses.drafts.draft import Draft
 from soilml.log_import.guesses.drafts.draft_inputs import inputs_of
 from soilml.log_import.guesses.drafts.one_channel import draft_of, rotation_unit
-from soilml.log_import.guesses.drafts.signs import sign_of_pull, signs
+from soilml.log_import.guesses.drafts.signs import sign_of_pull, sign_of_slip, signs
 from soilml.log_import.guesses.drafts.tares import far_sinkage, lifted, tares
+from soilml.log_import.guesses.stated_constants import stated_radius
 
 
 def draft_channels(
@@ -31,8 +32,9 @@ def draft_channels(
     inputs = inputs_of(drafts, run)
     if inputs is not None:
         signs(drafts, inputs)
+        sign_of_slip(drafts, inputs)
         sign_of_pull(drafts, inputs)
         tares(drafts, inputs)
-        far_sinkage(drafts, inputs)
+        far_sinkage(drafts, inputs, stated_radius(stated))
         lifted(drafts, inputs)
     return drafts

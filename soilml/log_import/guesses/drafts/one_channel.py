@@ -7,10 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.columns.candidates import Candidate
+from soilml.log_import.guesses.columns.candidates import CALIBRATED, Candidate
+from soilml.log_import.guesses.columns.column_words import words_of
 from soilml.log_import.guesses.drafts.draft import Draft
 from soilml.log_import.guesses.drafts.unit_guess import guess_rotation_unit, guess_unit
+from soilml.log_import.guesses.stated_constants import stated_radius
+from soilml.log_import.guesses.stated_scales import stated_scale
+from soilml.log_import.mapping.channel import ROLES
 from soilml.log_import.units.conversion import dimension
+from soilml.log_import.units.unit_names import is_raw_signal
 
 #: What several columns of a channel are.
 _SEVERAL = {
@@ -45,6 +50,15 @@ def draft_of(
     unit, why = guess_unit(role, column, moving)
     if role == "position" and dimension(unit) == "count":
         draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
+    elif is_raw_signal(unit) and role in CALIBRATED:
+        lines = [line for recording in run.recordings for line in recording.about]
+        known_scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
+        example = f"1 {ROLES[role][0]}"
+        draft.put(
+            "scale", known_scale or example,
+            f"for 1 {unit}; stated in the log: {line[:60]}" if known_scale else
+            f"CHANGE: what 1 {unit} is, from the calibration of the sensor",
+        )  # fmt: skip
     elif dimension(unit) == "1" and role in ("torque", "motor_current"):
         one = "0.01 N m" if role == "torque" else "0.01 A"
         rated = "torque" if role == "torque" else "current"
@@ -66,6 +80,9 @@ def draft_of(
             True,
             "of a quaternion (REP 103): there the nose is down where it is positive",
         )
+    if role == "slip" and "kappa" in words_of(column.name):
+        why = "of a kappa, as of tyres; remove this line where it is 1 - v/(r omega)"
+        draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
     if role in ("wheel_angle", "wheel_speed", "motor_current"):
@@ -105,10 +122,7 @@ def rotation_unit(drafts: dict[str, Draft], stated: dict[str, tuple[str, str]]) 
     if rotation.column.unit or ground is None or ground.column is None:
         return
     factor = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0)
-    radius = 0.0
-    if "radius" in stated:
-        text = stated["radius"][0].split()
-        radius = float(text[0]) * (1e-3 if "mm" in text else 1.0)
+    radius = stated_radius(stated)
     unit, why = guess_rotation_unit(
         rotation.column.about.size, factor * ground.column.about.size, radius
     )

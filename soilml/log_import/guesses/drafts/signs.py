@@ -41,6 +41,18 @@ def signs(drafts: dict[str, Draft], inputs: Inputs) -> None:
             drafts[role].put("reverse", True, f"it is negative in the log; {why}")
 
 
+def sign_of_slip(drafts: dict[str, Draft], inputs: Inputs) -> None:
+    """Turn a slip that is below zero where the torque drives, as of logs that count braking up."""
+    if not {"slip", "torque"} <= inputs.values.keys() or "torque" not in drafts:
+        return
+    torque, slip = inputs.values["torque"], inputs.values["slip"]
+    sign = -1.0 if drafts["torque"].keys.get("reverse") else 1.0
+    size = float(np.nanpercentile(np.abs(torque), 90))
+    drives = (sign * torque > 0.5 * size) & np.isfinite(slip) & (slip != 0.0)
+    if drives.any() and float(np.mean(slip[drives] < 0.0)) > 0.9:
+        drafts["slip"].put("reverse", True, "it is negative in the log where the torque drives")
+
+
 def sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
     """Turn a pull that falls where the torque, or the current of the motor, rises."""
     known = drafts.keys() & inputs.values.keys()

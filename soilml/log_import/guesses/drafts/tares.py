@@ -14,6 +14,9 @@ from soilml.log_import.guesses.drafts.draft_inputs import moving
 _OFFSET = 0.01
 #: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.
 _FAR, _SUNK = 0.08, 0.01
+#: Share of the radius that no wheel sinks in at rest; fall of a reading, and reading at rest, m,
+#: that are more than noise.
+_MOST_AT_REST, _FALLS, _STANDS = 0.3, 0.002, 0.002
 #: Roles that read zero while a wheel rests.
 ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
 
@@ -35,15 +38,29 @@ def tares(drafts: dict[str, Draft], inputs: Inputs) -> None:
             )  # fmt: skip
 
 
-def far_sinkage(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Tare a sinkage that is the distance of a sensor to the ground, or a place on a scale."""
+def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -> None:
+    """Tare a sinkage that is the distance of a sensor to the ground, or a place on a scale.
+
+    That is one that is far, or a large share of the `radius` (m, 0 where unknown), or that falls as
+    the wheel drives. Where it might be, a comment says so.
+    """
     if "sinkage" not in drafts or "sinkage" not in inputs.values or "sinkage" not in inputs.rest:
         return
     rest = inputs.rest["sinkage"][0]
     level = float(np.nanmedian(inputs.values["sinkage"][moving(inputs)]))
-    if not math.isfinite(rest) or abs(level) < _FAR:
+    if not math.isfinite(rest):
         return
     draft = drafts["sinkage"]
+    turned = draft.keys.get("reverse", False)
+    far = min(_FAR, _MOST_AT_REST * radius) if radius > 0.0 else _FAR
+    falls = abs(level) < abs(rest) - _FALLS
+    if abs(rest) < far and abs(level) < _FAR and not falls:
+        if abs(rest) > _STANDS and (rest < 0.0) == turned:
+            draft.comments["column"] = (
+                f"it reads {1e3 * abs(rest):.3g} mm before the wheel starts; where that is "
+                'the zero of the sensor, and no sinkage, add tare = "rest" and bias = 0.01'
+            )
+        return
     if level < rest:
         draft.put("reverse", True, "it falls as the wheel sinks in")
     else:

@@ -37,8 +37,8 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
             return "count", f"it starts again at {column.about.wraps_at:g}"
         return ("deg", "its values are large") if moving > 60.0 else ("rad", "its values are small")
     large = {
-        "ground_speed": ((30.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
-        "rim_speed": ((30.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+        "ground_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+        "rim_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
         "position": ((25.0, "mm"), (0.0, "m")),
         "sinkage": ((1.0, "mm"), (0.0, "m")),
         "torque": ((300.0, "mN m"), (0.0, "N m")),

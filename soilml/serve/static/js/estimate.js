@@ -2,10 +2,10 @@
 
 import { jobFile } from "./api.js";
 import { byId, drawn, element, options, showError, wordList } from "./dom.js";
-import { setSoil, showReadings } from "./forward.js";
+import { setRadius, setSoil, showReadings } from "./forward.js";
 import { counted, number, percent, range, withUnit } from "./format.js";
 import { work } from "./jobs.js";
-import { clearModelFault, modelFault, modelOfEstimate } from "./model_box.js";
+import { clearModelFault, modelFault, modelIsOwn, modelOfEstimate } from "./model_box.js";
 import { pullPlots } from "./pull_plots.js";
 import { sweepPlots } from "./plots.js";
 
@@ -22,6 +22,8 @@ export function startEstimate() {
 /** Take a table: show it, then estimate. */
 export async function takeTable(file, table, links = null) {
   current.file = file;
+  const wheel = modelIsOwn() ? "" : setRadius(table.radius);
+  if (wheel) table = { ...table, remarks: [...table.remarks, wheel] };
   showTable(table, links);
   showReadings(table);
   options(byId("run"), [{ id: ALL, label: "all rows, as one soil" }, ...table.runs.map((run) => ({ id: run, label: `run ${run}` }))], ALL);

@@ -257,6 +257,16 @@ export function showReadings(table) {
   update();
 }
 
+/** Give the wheel of the sliders the radius of a log, in m; what was done in words, or "". */
+export function setRadius(radius) {
+  const slider = state.sliders.get("gear.radius");
+  if (!radius || !slider || Math.abs(slider.value / radius - 1) < 0.005) return "";
+  const before = withUnit(slider.shown, slider.unit);
+  slider.set(radius);
+  update();
+  return `The wheel has now the radius of this log, ${withUnit(slider.shown, slider.unit)} (it had ${before}): set its width, too.`;
+}
+
 /** Set soil parameters (SI units by path), as an estimate found them. */
 export function setSoil(values) {
   for (const [path, value] of Object.entries(values)) state.sliders.get(path)?.set(value);

@@ -15,6 +15,9 @@ function tell(what) {
 /** What the server takes as the model: the text, or the choice and the sliders. */
 export const modelOfEstimate = () => (own ? { model: text().value } : chosen());
 
+/** Whether the model is a text of the user's, which nothing else changes. */
+export const modelIsOwn = () => own;
+
 export function startModelBox() {
   text().addEventListener("input", () => {
     own = true;

@@ -1,0 +1,219 @@
+"""Logs that state calibrations and constants, whose wheels share columns, that know only slip."""
+
+import datetime
+
+import numpy as np
+import pytest
+from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
+
+from soilml.log_import import import_log, init_map
+from soilml.log_import.channels.whole_seconds import spread_over_seconds
+from soilml.log_import.guesses.columns.behaviour import time_unit
+from soilml.log_import.guesses.stated_constants import stated_constants
+from soilml.log_import.guesses.stated_scales import stated_scale
+from soilml.log_import.readers.text_layout import find_layout
+
+SLIPS = (0.1, 0.25, 0.45)
+
+
+def imported(folder, logs, edits=()):
+    text = init_map(logs)
+    for old, new in edits:
+        assert old in text, text
+        text = text.replace(old, new)
+    (folder / "map.toml").write_text(text, encoding="utf-8")
+    return import_log(logs, folder / "map.toml").table, text
+
+
+def check(rows, stages):
+    """Each row is a stage, and each stage a row."""
+    place = [int(np.argmin([abs(s - slip) / 0.05 + abs(w / load - 1) * 8 for s, w in stages]))
+             for slip, load in zip(rows["slip"], rows["load_N"], strict=True)]  # fmt: skip
+    assert {*place} == {*range(len(stages))}
+    slips, loads = np.array(stages)[place].T
+    torque, pull, _ = law(np.abs(slips), loads)
+    np.testing.assert_allclose(rows["slip"], slips, atol=0.012)
+    np.testing.assert_allclose(rows["load_N"], loads, rtol=0.04)
+    np.testing.assert_allclose(rows["torque_Nm"], np.sign(slips) * torque, rtol=0.06)
+    if "drawbar_pull_N" in rows:
+        np.testing.assert_allclose(rows["drawbar_pull_N"], pull, atol=1.0)
+
+
+def test_millivolts_and_a_carriage_speed_of_the_head(tmp_path):
+    """The calibrations, the radius and the speed of the carriage are all stated; no edit at all."""
+    rng = np.random.default_rng(60)
+    logs, stages = [], []
+    for k, load in enumerate((45, 70)):
+        d = drive(rng, SLIPS, [load] * 3, speed=0.02, cart=True)
+        lines = ["# Wheel diameter: 260 mm", "# Carriage speed: 20 mm/s (constant)",
+                 "# CH3 torque: 1 mV = 0.425 N m, excitation 5 V", "# CH4 load: 12.5 N/V",
+                 "Time,nWheel,TorqueCh3,Load_Ch4,Drawbar", "s,rpm,mV,V,kgf"]  # fmt: skip
+        lines += table((d.t, d.omega * 30 / np.pi, noisy(rng, d.torque / 0.425 + 1.37, 0.1),
+                        d.load / 12.5, noisy(rng, d.pull / 9.80665, 0.03)))  # fmt: skip
+        logs.append(tmp_path / f"test{k}.csv")
+        logs[-1].write_text("\n".join(lines))
+        stages += d.stages
+    rows, text = imported(tmp_path, logs)
+    assert 'value = "20 mm/s +- 1 %"' in text and 'scale = "0.425 N m"' in text
+    check(rows, stages)
+
+
+def test_speeds_of_carriages_that_differ_are_read_from_each_head(tmp_path):
+    logs = []
+    for k, speed in enumerate((0.02, 0.03)):
+        d = drive(np.random.default_rng(k), SLIPS, [60] * 3, speed=speed, cart=True)
+        lines = [f"# travel speed = {1000 * speed:g} mm/s", "t,omega,torque,Fz"]
+        logs.append(tmp_path / f"{k}.csv")
+        logs[-1].write_text("\n".join([*lines, *table((d.t, d.omega, d.torque, d.load))]))
+    rows, text = imported(tmp_path, logs, [RADIUS_EDIT])
+    assert "the logs state 20 mm/s, 30 mm/s" in text
+    check(rows, d.stages)
+
+
+@pytest.mark.parametrize(
+    ("line", "value"),
+    [
+        ("Torque cell: 1.98 mV/V at 20 N m", "10.101 N m"),
+        ("Torque cell 5 Nm per mV/V", "5 Nm"),
+        ("Torque: 1 V = 3 N m", ""),
+        ("Load: 1 mV/V = 300 N", ""),
+    ],
+)
+def test_calibrations_in_the_head(line, value):
+    assert stated_scale("torque", "mV/V", "torque", "N m", [line])[0] == value
+
+
+def test_of_several_calibrations_that_of_the_channel():
+    lines = ["CH1: 1 V = 50 N", "CH2: 1 V = 90 N"]
+    assert stated_scale("Fx ch2", "mV", "drawbar_pull", "N", lines)[0] == "0.09 N"
+    assert stated_scale("Fx", "mV", "drawbar_pull", "N", lines)[0] == ""
+
+
+def test_a_sensor_in_volts_asks_for_its_calibration(tmp_path):
+    d = drive(np.random.default_rng(1), SLIPS, [60] * 3)
+    path = tmp_path / "log.csv"
+    lines = ["t,omega,v,torque [mV],Fz", *table((d.t, d.omega, d.v, d.torque, d.load))]
+    path.write_text("\n".join(lines))
+    text = init_map(path)
+    assert 'scale = "1 N m"  # CHANGE: what 1 mV is, from the calibration of the sensor' in text
+
+
+@pytest.mark.parametrize("label", ["{}", "wheel {}"])
+def test_a_line_for_each_wheel(label, tmp_path):
+    """Wheels by an id, times with a zone, an irregular clock with lines that stand twice."""
+    rng = np.random.default_rng(61)
+    start = datetime.datetime.fromisoformat("2025-06-03T14:02:07+02:00")
+    lines, stages = [], []
+    for k, load in enumerate((40, 52, 68)):
+        d = drive(rng, SLIPS, [load] * 3)
+        clock = d.t + 0.01 * rng.random(d.t.size)
+        for i in np.flatnonzero(rng.random(d.t.size) < 0.8):
+            when = start + datetime.timedelta(seconds=float(clock[i]))
+            shown = f"{d.omega[i]:.4f},{d.v[i]:.5f},{d.torque[i]:.4f},{d.load[i]:.3f}"
+            line = f"{when.isoformat(timespec='milliseconds')},{label.format(k)},{shown}"
+            lines += [(clock[i], line)] * (1 + (rng.random() < 0.04))
+        stages += d.stages
+    head = "timestamp,wheel_id,wheel_omega_rad_s,v_m_s,torque_Nm,Fz_N"
+    path = tmp_path / "drive.csv"
+    path.write_text("\n".join([head, *(line for _, line in sorted(lines))]))
+    rows, text = imported(tmp_path, path, [RADIUS_EDIT])
+    assert 'column = "timestamp"' in text and 'column = "wheel_id"  # a line for each wheel' in text
+    assert {*rows["run"]} == {label.format(k) for k in range(3)}
+    check(rows, stages)
+
+
+def test_motors_by_number_share_the_mass(tmp_path):
+    """Travel in mm/min, and a hint at the radius that knows the stated gearbox."""
+    d = drive(np.random.default_rng(62), SLIPS, [50] * 3, speed=0.05)
+    current = d.torque / (71 * 0.0231 * 0.7)
+    twice = [np.repeat(x, 2) for x in (d.omega * 71 * 30 / np.pi, 6e4 * d.v, 1e3 * current)]
+    columns = (np.repeat(d.t, 2), np.tile([1.0, 2.0], d.t.size), *twice)
+    head = ["# gearbox 71:1", f"# rover mass {2 * 50 / 9.80665:.4f} kg",
+            "time,motor_id,motor_rpm,string_mm_min,motor_current_mA"]  # fmt: skip
+    (tmp_path / "rover.csv").write_text("\n".join([*head, *table(columns)]))
+    edits = [RADIUS_EDIT, ('"1.0 N m/A +- 5 %"', '"23.1 mN m/A"')]
+    rows, text = imported(tmp_path, tmp_path / "rover.csv", edits)
+    assert "wheels = 2\n" in text and "travel over rotation is 0.11" in text
+    check(rows, d.stages)
+
+
+def test_wheels_that_the_head_states():
+    assert stated_constants(["rover mass 22 kg, 4 wheels"])["wheels"][0] == "4"
+    assert stated_constants(["Wheels: 6"])["wheels"][0] == "6"
+    assert "wheels" not in stated_constants(["wheel radius 0.15 m"])
+
+
+def test_slip_in_per_cent_that_counts_braking_up(tmp_path):
+    """A force sensor of six axes and `i`, below zero where the wheel drives; nothing else."""
+    rng = np.random.default_rng(63)
+    d = drive(rng, (0.4, 0.25, 0.1), [60] * 3)
+    still = noisy(rng, 0 * d.t, 0.3)
+    braking = d.t > d.t[-1] - 2 - 12  # the last stage brakes by as much
+    act = np.clip(d.omega * RADIUS / 0.03, 0, 1)
+    slip = np.interp(d.t, [4, 4.4, 16, 16.4, 28, 28.4], [0, 0.4, 0.4, 0.25, 0.25, 0.1])
+    sign = np.where(braking, -1.0, 1.0)
+    lines = ["t;Fx;Fy;Fz;Mx;My;Mz;i;z", "[s];[N];[N];[N];[Nm];[Nm];[Nm];[%];[mm]"]
+    lines += table((d.t, d.pull + 3.2, still, -d.load, 0.1 * still, -sign * d.torque, 0.1 * still,
+                    -100 * sign * slip * (act > 0.1), 12.5 + 1000 * d.sinkage), ";")  # fmt: skip
+    (tmp_path / "ft.csv").write_text("\n".join(lines))
+    rows, text = imported(tmp_path, tmp_path / "ft.csv")
+    slip_table = text.partition("[slip]")[2].partition("[torque]")[0]
+    assert 'column = "i"' in slip_table and "reverse = true" in slip_table
+    assert "it reads 3.2 before the wheel starts" in text  # by the torque, as no speed is known
+    assert "it reads 16.5 mm before the wheel starts" in text
+    check(rows, [(0.4, 60), (0.25, 60), (-0.1, 60)])
+
+
+def test_braking_without_torque_is_no_rest(tmp_path):
+    """Where a towed wheel has no torque, it slips by less than zero."""
+    t = 0.04 * np.arange(1200)
+    stage = np.searchsorted([4.0, 16.0, 28.0, 40.0], t, side="right")
+    slip, torque = np.array([[0, 0.2, -0.1, 0.4, 0], [0, 2.0, 0.02, 3.0, 0]])[:, stage]
+    lines = ["t,slip,torque,Fz", *table((t, slip, torque, 60 + 0 * t))]
+    (tmp_path / "towed.csv").write_text("\n".join(lines))
+    rows, _ = imported(tmp_path, tmp_path / "towed.csv")
+    np.testing.assert_allclose(rows["slip"], [0.2, -0.1, 0.4])
+
+
+def test_kappa_is_slip_over_the_travel(tmp_path):
+    d = drive(np.random.default_rng(64), SLIPS, [60] * 3)
+    slip = np.asarray(SLIPS)[np.clip(((d.t - 4) // 12).astype(int), 0, 2)]
+    columns = (d.t, slip / (1 - slip), d.torque, d.load)
+    (tmp_path / "k.csv").write_text("\n".join(["t,kappa,torque,Fz", *table(columns)]))
+    rows, _ = imported(tmp_path, tmp_path / "k.csv")
+    check(rows, d.stages)
+
+
+def test_clocks_in_whole_seconds_and_in_days(tmp_path):
+    d = drive(np.random.default_rng(65), SLIPS, [60] * 3, rate=10)
+    whole, days = np.floor(d.t + 36000.6), 45812.375 + d.t / 86400
+    for name, clock in (("whole", whole), ("days", days)):
+        columns = [f"{x:.9f}" for x in clock]
+        lines = [f"{a},{b}" for a, b in zip(columns, table((d.omega, d.v, d.torque, d.load)),
+                                            strict=True)]  # fmt: skip
+        (tmp_path / f"{name}.csv").write_text("\n".join(["time,omega,v,torque,Fz", *lines]))
+        rows, text = imported(tmp_path, tmp_path / f"{name}.csv", [RADIUS_EDIT])
+        assert f'column = "time"\nunit = "{"d" if name == "days" else "s"}"' in text
+        check(rows, d.stages)
+    np.testing.assert_allclose(np.diff(spread_over_seconds(whole)), 0.1, atol=0.03)
+    assert spread_over_seconds(d.t) is d.t and time_unit(d.t) == "s"
+
+
+def test_units_in_a_comment_and_names_with_another_separator():
+    samples = ["0.0 1.0 2.0", "0.1 1.0 2.0", "0.2 1.1 2.1"]
+    found = find_layout(["# units: s, rad/s, N mm", "# t,omega,T", *samples])
+    assert (found.names, found.units) == (("t", "omega", "T"), ("s", "rad/s", "N mm"))
+
+
+def test_a_sinkage_that_no_wheel_has_at_rest_is_tared(tmp_path):
+    d = drive(np.random.default_rng(66), SLIPS, [60] * 3)
+    for name, sinkage, tared in (("high", 50 + 1000 * d.sinkage, True),
+                                 ("fall", 40 - 1000 * d.sinkage, True),
+                                 ("true", 1000 * d.sinkage, False)):  # fmt: skip
+        lines = table((d.t, d.omega, d.v, d.torque, d.load, sinkage))
+        head = ["# wheel radius 130 mm", "t,omega,v,torque,Fz,z_mm"]
+        (tmp_path / f"{name}.csv").write_text("\n".join([*head, *lines]))
+        rows, text = imported(tmp_path, tmp_path / f"{name}.csv")
+        assert ("sinkage counts from where the wheel rests" in text) == tared
+        expected = law(np.asarray(SLIPS), 60.0)[2] - 0.004 * tared
+        np.testing.assert_allclose(rows["sinkage_m"], expected, atol=3e-4)
