@@ -49,9 +49,8 @@ Feed = dict[str, NDArray[Any]]
 
 #: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
 ROWS_PER_CALL = 256
-#: Standard deviations that may be zero.
+#: Standard deviations that may be zero, and everything that is read of a row.
 MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
-#: Everything that is read of a row.
 KNOWN = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)
 #: Outputs that are read of the graph.
 OUTPUTS = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
@@ -77,10 +76,8 @@ class SetPosterior:
     sets_only : bool
         Whether the file has no regressors of single rows.
     common_errors : dict
-        Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`. Empty for a
-        file of an earlier version, which takes slip and load as exact.
-    error_columns : int
-        Columns of these errors in the residual system.
+        Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none in a file
+        of an earlier version. They have `error_columns` columns in the residual system.
     """
 
     terms: int
@@ -94,11 +91,11 @@ class SetPosterior:
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
         """From the entry `set` of a file's metadata."""
-        noise, context = metadata["noise"], metadata["context"]
+        context = metadata["context"].items()
         return SetPosterior(
             terms=int(metadata["terms"]),
-            noise={str(k): (float(v[0]), float(v[1])) for k, v in noise.items()},
-            context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context.items()},
+            noise={str(k): (float(v[0]), float(v[1])) for k, v in metadata["noise"].items()},
+            context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context},
             context_values={},
             common_errors=read_common_errors(metadata),
             error_columns=error_columns(metadata),
