@@ -124,7 +124,7 @@ def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
     near = {
         name: seconds
         for name, (seconds, called) in tests.items()
-        if (not mutant.scope and "/test_declarations.py" in name)
+        if (not mutant.scope and "/test_declarations_" in name)
         or any(path == mutant.path and mutant.scope in (line, 0) for path, line in called)
     }
     if not near:
