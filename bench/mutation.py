@@ -2,10 +2,11 @@
 
 A mutant is the source with one operator, comparison, number or truth value changed. It is tried in
 a copy of the tree, by those tests of its room that call the changed function, shortest first, up
-to a minute (a constant of a module: the tests that call any function of the file). It is killed
-where a test fails, and survives where none does; survivors are written with their difference into
-`build/mutants.txt`. A time-out counts as killed. Drawing is left out. Some mutants change no
-result, as those of a tolerance, and survive rightly: the share that is killed is a lower bound.
+to a minute (a constant of a module: the tests that call any function of the file, and those of the
+room's `test_declarations_*`). It is killed where a test fails, and survives where none does;
+survivors are written with their difference into `build/mutants.txt`. A time-out counts as killed.
+Drawing is left out. Some mutants change no result, as those of a tolerance, and survive rightly:
+the share that is killed is a lower bound.
 """
 
 from __future__ import annotations
@@ -123,10 +124,8 @@ def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
     near = {
         name: seconds
         for name, (seconds, called) in tests.items()
-        if any(
-            path == mutant.path and (line == mutant.scope or not mutant.scope)
-            for path, line in called
-        )
+        if (not mutant.scope and "/test_declarations_" in name)
+        or any(path == mutant.path and mutant.scope in (line, 0) for path, line in called)
     }
     if not near:
         return "survived"

@@ -1,0 +1,300 @@
+"""Results, priors of free parameters, warnings, and a parameter that a method holds fixed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import identify, read_case
+from soilml.config.model_discrepancy import Discrepancy
+from soilml.errors import FitError, InputError
+from soilml.identification.data.observations import Channel, Observations
+from soilml.identification.diagnostics import at_prior_bound, with_warnings
+from soilml.identification.fit_result import Fit
+from soilml.identification.fixed_parameter import with_fixed_parameter
+from soilml.identification.free_parameters import FreeParameter, select_free, values_at
+from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+from soilml.numerics.sampling.importance_sampling import ImportanceSample
+from soilml.parameters import declared
+from soilml.physics.operating_point import Operating
+from soilml.physics.soils import Soil
+
+COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
+
+
+def fit_of(**changes):
+    fit = Fit(
+        method="nonlinear",
+        names=("cohesion", "friction_angle"),
+        units=("Pa", "rad"),
+        values=np.asarray([10.0, 0.5]),
+        covariance=COVARIANCE,
+        warnings=("first",),
+        rows_used=3,
+        remaining_fraction={"cohesion": 0.3, "friction_angle": 0.2},
+    )
+    return replace(fit, **changes)
+
+
+def rows_of(load=(30.0, 60.0, 120.0), **changes):
+    n = len(load)
+    at = Operating(slip=np.linspace(0.1, 0.5, n), load=np.asarray(load))
+    channel = Channel("torque", np.ones(n), np.full(n, 0.1), True)
+    return replace(Observations(at, np.zeros(n), np.zeros(n), (channel,), ()), **changes)
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def test_a_fit_has_gaussian_intervals_unless_the_method_gives_others():
+    fit = fit_of()
+    assert fit.std.tolist() == [2.0, 1.0]
+    np.testing.assert_allclose(fit.correlation, [[1.0, 0.6], [0.6, 1.0]])
+    low, high = fit.interval
+    np.testing.assert_allclose(low, [10.0 - 1.645 * 2.0, 0.5 - 1.645], rtol=1e-3)
+    np.testing.assert_allclose(high, [10.0 + 1.645 * 2.0, 0.5 + 1.645], rtol=1e-3)
+    assert fit["friction_angle"] == 0.5
+    low, high = np.asarray([9.0, 0.1]), np.asarray([12.0, 0.7])
+    own = replace(fit, low=low, high=high)
+    assert own.interval[0] is low and own.interval[1] is high
+    assert replace(fit, low=low).interval[0] == pytest.approx(fit.interval[0])
+    assert "samples" not in repr(replace(fit, samples=1))
+    assert replace(fit_of(low=None), samples=1).samples == 1
+
+
+def test_intervals_for_a_figure_have_the_ranges_of_the_priors():
+    fit = fit_of(low=np.asarray([9.0, 0.1]), high=np.asarray([12.0, 0.7]))
+    shown = fit.intervals({"friction_angle": Prior.normal(0.2)}, "a label")
+    assert shown.names == fit.names and shown.units == fit.units
+    rows = [np.asarray(v) for v in vars(shown).values() if isinstance(v, np.ndarray)]
+    values, low, high, prior_low, prior_high = rows
+    assert values.tolist() == [[10.0, 0.5]]
+    assert low.tolist() == [[9.0, 0.1]] and high.tolist() == [[12.0, 0.7]]
+    np.testing.assert_allclose(prior_low, [np.nan, -2.5758 * 0.2], rtol=1e-3)
+    np.testing.assert_allclose(prior_high, [np.nan, 2.5758 * 0.2], rtol=1e-3)
+    uniform = fit.intervals({"cohesion": Prior(1.0, 20.0)})
+    ends = [v for v in vars(uniform).values() if isinstance(v, np.ndarray)][3:]
+    assert [e[0] for e in ends] == [1.0, 20.0] and np.isnan([e[1] for e in ends]).all()
+    none = [v for v in vars(fit.intervals()).values() if isinstance(v, np.ndarray)][3:]
+    assert np.isnan(none).all()
+
+
+def test_json_of_a_fit_names_every_number():
+    content = fit_of(remaining_fraction={"cohesion": 0.3}, channels=("torque_Nm",)).as_json()
+    assert content["parameters"]["cohesion"]["left_of_prior"] == 0.3
+    assert "left_of_prior" not in content["parameters"]["friction_angle"]
+    assert content["parameters"]["friction_angle"]["std"] == 1.0
+    assert content["correlation"]["cohesion"] == {"friction_angle": pytest.approx(0.6)}
+    assert content["correlation"]["friction_angle"] == {"cohesion": pytest.approx(0.6)}
+    assert content["misfit"] is None and content["rows_used"] == 3
+    assert fit_of(misfit=1.5).as_json()["misfit"] == 1.5
+    assert content["channels_used"] == ["torque_Nm"] and content["warnings"] == ["first"]
+
+
+def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
+    bare = replace(case, prior={"cohesion": Prior(0.0, 500.0)})
+    names = ["cohesion", "friction_angle", "shear_modulus", "n", "friction_angle"]
+    free = select_free(bare, names)
+    assert [f.path for f in free] == names[:4]
+    assert [f.assumed for f in free] == [False, True, True, True]
+    # 0 to 10 kPa, 10 to 55 degrees, 1 mm to 0.1 m, and exponents from loose to layered soil
+    assert free[0].prior == Prior(0.0, 500.0)
+    np.testing.assert_allclose(
+        np.rad2deg([free[1].prior.lower, free[1].prior.upper]), [10.0, 55.0], atol=0.3
+    )
+    assert free[2].prior == Prior(0.001, 0.1, log=True) and free[3].prior == Prior(0.3, 1.8)
+    assert select_free(replace(case, prior={}), ["cohesion"])[0].prior == Prior(0.0, 10000.0)
+    assert [f.unit for f in free] == ["Pa", "rad", "m", "1"]
+    assert free[3].nominal == case.soil.n
+    assert [f.path for f in select_free(case, None)] == list(case.prior)
+
+
+def test_a_prior_of_a_wide_parameter_lies_about_its_value(case):
+    soil = replace(case.soil, kphi=1e6, kc=0.0, a0=0.5, unit_weight=1000.0)
+    known = replace(case, soil=soil)
+    kphi, kc, a0, weight = select_free(known, ["kphi", "kc", "a0", "unit_weight"])
+    assert kphi.prior == Prior(1e6 / 30.0, 30e6, log=True)
+    bounds = declared(Soil)["kc"]
+    assert kc.prior == Prior(bounds.lower, bounds.upper)
+    assert a0.prior == Prior(0.0, 1.0)
+    assert weight.prior == Prior(0.0, 5e4)  # fifty times the value
+    near = select_free(replace(case, soil=replace(soil, unit_weight=499.0)), ["unit_weight"])[0]
+    assert near.prior == Prior(499.0 / 30.0, 499.0 * 30.0, log=True)
+
+
+def test_unknown_or_no_parameters_are_refused(case):
+    with pytest.raises(InputError, match="nothing to identify"):
+        select_free(replace(case, prior={}), None)
+    with pytest.raises(InputError, match=r"'cohesoin'.*cohesion.*this model has: "):
+        select_free(case, ["cohesoin"])
+
+
+def test_values_and_rates_at_fractions_are_those_of_the_priors():
+    priors = [Prior(1.0, 3.0), Prior(0.01, 1.0, log=True)]
+    free = [FreeParameter(str(i), "1", p, 1.0, False) for i, p in enumerate(priors)]
+    values, rates = values_at(free, np.asarray([0.25, 0.5]))
+    np.testing.assert_allclose(values, [1.5, 0.1])
+    np.testing.assert_allclose(rates, [2.0, 0.1 * np.log(100.0)])
+    assert free[0].fraction_precision == 12.0
+    error = FreeParameter("e", "1", Prior(-4.0, 4.0), 0.0, False, normal_std=0.5)
+    assert error.fraction_precision == pytest.approx((8.0 / 0.5) ** 2)
+
+
+def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
+    free = select_free(case, list(fit.names))
+    found = with_warnings(
+        fit, case, data, free, np.asarray(u), excess_residuals=excess, undeclared=undeclared
+    )
+    assert found.warnings[0] == "first"
+    return found.warnings[1:]
+
+
+def test_a_sound_fit_has_no_warnings(case):
+    assert warned(case, fit_of(), rows_of()) == ()
+    some = {"cohesion": 0.5, "friction_angle": 0.5}
+    assert warned(case, fit_of(remaining_fraction=some), rows_of()) == ()
+
+
+def test_what_the_rows_leave_open_is_said_by_how_much_of_the_prior_remains(case):
+    left = {"cohesion": 0.51, "friction_angle": 0.81}
+    assert warned(case, fit_of(remaining_fraction=left), rows_of()) == (
+        "cohesion is weakly identified: 51% of the prior's width remains",
+        "friction_angle is not identified: 81% of the prior's width remains",
+    )
+    weak = {"cohesion": 0.8, "friction_angle": 0.8}
+    assert all("weakly" in t for t in warned(case, fit_of(remaining_fraction=weak), rows_of()))
+    one_load = rows_of(load=(60.0, 60.0, 60.0))
+    said = warned(case, fit_of(remaining_fraction=left), one_load)
+    assert said[0] == "one load only: cohesion is not identified"
+    assert warned(case, fit_of(), one_load) == (
+        "one load only: cohesion is determined by the change with slip alone",
+    )
+    other = fit_of(
+        names=("n", "friction_angle"), remaining_fraction={"n": 0.1, "friction_angle": 0.1}
+    )
+    assert not any("one load" in t for t in warned(case, other, one_load))
+
+
+def test_values_at_bounds_and_assumed_priors_are_said(case):
+    said = warned(case, fit_of(), rows_of(), u=(0.0009, 0.9991))
+    assert said == (
+        "cohesion is at the lower bound of its prior: the prior determines the estimate",
+        "friction_angle is at the upper bound of its prior: the prior determines the estimate",
+    )
+    at_bound = at_prior_bound(np.asarray([0.0011, 0.9989, 0.0, 1.0]))
+    assert at_bound.tolist() == [False, False, True, True]
+    said = warned(replace(case, prior={}), fit_of(), rows_of())
+    assert said[0] == "cohesion has no prior: 0 to 10000 Pa is assumed"
+
+
+def test_few_readings_trade_offs_and_excess_are_said(case):
+    assert "1 reading for 2 parameters: the prior determines the rest" in warned(
+        case, fit_of(), rows_of(load=(60.0,))
+    )
+    assert not any("readings for" in t for t in warned(case, fit_of(), rows_of(load=(30.0, 60.0))))
+    tied = np.asarray([[4.0, -1.92], [-1.92, 1.0]])
+    said = warned(case, fit_of(covariance=tied), rows_of())
+    assert len(said) == 1
+    assert said[0].startswith("cohesion and friction_angle trade off (correlation -0.96)")
+    assert warned(case, fit_of(covariance=0.5 * (tied + COVARIANCE)), rows_of()) == ()
+    said = warned(case, fit_of(misfit=9.0), rows_of(), excess=True)
+    assert said[0].startswith("residuals are 3.0 times the declared noise: ")
+    unsure = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.1)})
+    said = warned(unsure, fit_of(misfit=9.0), rows_of(), excess=True)
+    assert said[0].startswith("residuals are 3.0 times the declared noise and discrepancy: ")
+    undeclared = replace(rows_of().channels[0], declared=False)
+    rows = rows_of(channels=(undeclared,), excluded_channels=("sinkage_m",))
+    said = warned(case, fit_of(), rows, undeclared=True)
+    assert said[0].startswith("noise of torque_Nm is not declared: estimated from the residuals")
+    assert said[1] == "sinkage_m is not used: its noise is not declared in [noise]"
+
+
+def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
+    """For a linear solution the covariance grows by the prior's variance times its square."""
+
+    def solve(one):
+        c = float(one.soil.cohesion)
+        values = np.asarray([c, 0.5 + 2e-4 * c])
+        return fit_of(values=values, covariance=np.diag([1.0, 1e-4]))
+
+    known = replace(case, soil=replace(case.soil, cohesion=200.0))
+    known = replace(known, prior={"cohesion": Prior(0.0, 1200.0)})
+    found = with_fixed_parameter(known, "cohesion", solve)
+    # a uniform prior has the variance (b - a)^2 / 12; the value is 400 Pa below its middle
+    slope = np.asarray([1.0, 2e-4])
+    spread = 1200.0**2 / 12.0 + 400.0**2
+    expected = np.diag([1.0, 1e-4]) + spread * np.outer(slope, slope)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
+    assert found.warnings == (
+        "cohesion is fixed at 200; the width of its prior is propagated into std",
+        "first",
+    )
+    exact = with_fixed_parameter(replace(known, prior={}), "cohesion", solve)
+    assert "treated as exact" in exact.warnings[0]
+    np.testing.assert_array_equal(exact.covariance, np.diag([1.0, 1e-4]))
+
+    def fails_above(one):
+        if float(one.soil.cohesion) > 600.0:
+            raise FitError("no")
+        return solve(one)
+
+    part = with_fixed_parameter(known, "cohesion", fails_above)
+    below = 600.0 - 1200.0 / 12.0**0.5 - 200.0
+    np.testing.assert_allclose(part.covariance[0, 0], 1.0 + 0.5 * below**2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("misfit", "said"), [(3.9, False), (4.1, True), (float("nan"), False)])
+def test_a_closed_form_says_where_it_does_not_hold(case, misfit, said):
+    prior = {"cohesion": Prior(0.0, 9.0), "friction_angle": Prior(0.5, 0.6)}
+    fit = fit_of(misfit=misfit)
+    texts = with_fixed_parameter(replace(case, prior=prior), "n", lambda _: fit).warnings[2:]
+    assert texts[0] == "cohesion is 10, outside its prior of 0 to 9: do not use it"
+    assert any(t.startswith("residuals are 2.0 times the declared noise") for t in texts) == said
+    assert len(texts) == 1 + said
+
+
+def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
+    from scipy.stats import chi2
+
+    for freedom in (1, 5, 40):
+        assert misfit_limit(freedom) == pytest.approx(chi2.ppf(0.999, freedom) / freedom, rel=0.04)
+    assert misfit_limit(0) == np.inf
+
+
+def test_a_small_effective_sample_size_is_said():
+    def of_size(size):
+        weights = np.full(size, 1.0 / size)
+        return _sampling_warnings(ImportanceSample(np.zeros((size, 1)), weights, 0.0))
+
+    assert of_size(100000) == ()
+    assert of_size(100) == (
+        "the effective sample size is 100 only: sampling error of the values is about 10 % of "
+        "their std",
+    )
+
+
+def test_the_misfit_counts_squares_within_condensed_rows():
+    class Density:
+        class data:  # noqa: N801
+            squares_within, reading_count = 3.0, 8
+
+        @staticmethod
+        def squared_residuals(u):
+            assert u.shape == (1, 2)
+            return 9.0
+
+    assert _misfit(Density, np.zeros(2), 2) == 2.0
+    assert _misfit(Density, np.zeros(2), 9) == 12.0
+
+
+def test_methods_are_checked_before_anything_is_read(case):
+    table = Table({"slip": np.zeros(1), "load_N": np.ones(1), "torque_Nm": np.ones(1)})
+    with pytest.raises(InputError, match="no method 'bayes'; there are: nonlinear, linear, newton"):
+        identify(case, table, method="bayes")
+    several = replace(case, gears={"a": case.model})
+    with pytest.raises(InputError, match="newton method is for one gear"):
+        identify(several, table, method="newton")

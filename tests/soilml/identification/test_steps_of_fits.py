@@ -1,0 +1,162 @@
+"""Steps of the fits against their formulas: noise, covariance, descent, Newton, samples."""
+
+from dataclasses import replace
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from soilml import Operating, read_case
+from soilml.errors import FitError
+from soilml.identification import descent
+from soilml.identification.data.observations import Channel, Observations
+from soilml.identification.free_parameters import select_free
+from soilml.identification.many_rows import condensed_rows
+from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.shared_errors.joint_sample import normal_start
+
+# the package has functions of these names
+linear, newton, nonlinear = (
+    import_module(f"soilml.identification.{name}") for name in ("linear", "newton", "nonlinear")
+)
+SLIP, LOAD = np.asarray([0.1, 0.3, 0.5, 0.2]), np.asarray([30.0, 60.0, 90.0, 120.0])
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def rows_of(case, **changes):
+    """Torque in all rows, sinkage in the last three."""
+    force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
+    torque = Channel("torque", np.asarray(force.torque), np.full(4, 0.05), True)
+    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
+    sinkage = Channel("sinkage", depth, np.full(4, 0.001), True)
+    at = Operating(slip=SLIP, load=LOAD)
+    data = Observations(at, np.zeros(4), np.zeros(4), (torque, sinkage), ())
+    return replace(data, **changes)
+
+
+def optimum(u, jacobian, residual=(0.0, 0.0), prior_cost=0.0):
+    arrays = (np.asarray(v, dtype=float) for v in (u, residual, jacobian))
+    return descent.Optimum(*arrays, prior_cost, None)
+
+
+def test_covariance_of_least_squares_includes_prior_and_distance_to_its_mean():
+    at = optimum([0.2, 0.5], [[3.0, 0.0], [0.0, 1.0]])
+    precision = np.asarray([12.0, 12.0])
+    found, std = nonlinear._covariance(at, at, 4.0, precision, precision)
+    variance = 1.0 / (np.asarray([9.0, 1.0]) / 4.0 + 12.0)
+    np.testing.assert_allclose(std, np.sqrt(variance))
+    to_mean = variance * 12.0 * np.asarray([0.3, 0.0])
+    np.testing.assert_allclose(np.diag(found), variance + to_mean**2)
+    other = optimum([0.9, 0.5], [[0.0, 0.0], [0.0, 1.0]])
+    found, _ = nonlinear._covariance(at, other, 4.0, precision, precision)
+    np.testing.assert_allclose(found[0, 0], 1.0 / 12.0 + 0.7**2)
+    assert found[0, 1] == 0.0
+
+
+def test_noise_before_and_after_a_fit_is_that_of_each_channel(case):
+    data = rows_of(case)
+    reading = np.asarray([3.0, 4.0, 3.0, 4.0, 1.0, 1.0, 1.0])
+    residual = np.asarray([1.0, -1.0, 1.0, -1.0, 0.1, 0.1, -0.2])
+    found = descent._residual_noise(data, reading, residual, 3)
+    # three parameters, shared among four and three readings
+    torque, sinkage = np.sqrt(4.0 / (4.0 - 12.0 / 7.0)), np.sqrt(0.06 / (3.0 - 9.0 / 7.0))
+    np.testing.assert_allclose(found, [torque] * 4 + [sinkage] * 3)
+    exact = descent._residual_noise(data, reading, 0.0 * residual, 3)
+    np.testing.assert_allclose(exact, [1e-6 * np.sqrt(12.5)] * 4 + [1e-6] * 3, rtol=1e-6)
+    many = descent._residual_noise(data, reading, residual, 7)
+    np.testing.assert_allclose(many[0], 2.0)  # at least one degree of freedom
+    first = nonlinear._initial_noise(data)
+    rms = np.sqrt(np.mean(data.channels[0].reading ** 2))
+    np.testing.assert_allclose(first[:4], 0.05 * rms)
+    assert first[4:] == pytest.approx(0.05 * np.sqrt(np.mean(data.channels[1].reading[1:] ** 2)))
+
+
+def test_a_trial_leads_to_a_known_optimum_where_the_cost_is_its_quadratic():
+    known = optimum([0.5, 0.5], np.eye(2), residual=[1.0, 0.0], prior_cost=0.2)
+    leads = descent._leads_to
+
+    def trial(distance, excess, prior=0.2, count=2):
+        residual = np.zeros(count)
+        residual[0] = np.sqrt(1.0 + excess)
+        return optimum([0.5 + distance, 0.5], np.eye(2), residual, prior)
+
+    assert leads(known, trial(0.02, 0.0004)) and not leads(known, trial(0.031, 0.0009))
+    assert leads(known, trial(0.02, 0.019)) and not leads(known, trial(0.02, 0.022))
+    assert not leads(known, trial(0.02, 0.0004, prior=0.25))
+    assert not leads(known, trial(0.02, 0.0004, count=1))
+    assert known.cost == 1.0
+
+
+def test_steps_of_newton_are_halved_until_the_cost_falls_inside_the_range():
+    def line(u):
+        return 10.0 * (u - 0.5), 10.0 * np.eye(3)
+
+    u, residual, _ = newton._minimise(line, np.full(3, 0.2))
+    np.testing.assert_allclose(u, 0.5)
+    np.testing.assert_allclose(residual, 0.0, atol=1e-9)
+    start = np.full(3, 0.2)
+    found = newton._line_search(line, start, np.full(3, 1.2), 3 * 9.0001)
+    np.testing.assert_allclose(found[0], 0.8)  # 1.4 is outside; 0.8 costs no more
+    assert newton._line_search(line, start, np.full(3, 1.2), 3 * 8.99)[0] == pytest.approx(0.5)
+    assert newton._line_search(line, start, np.full(3, -0.1), 3 * 9.0) is None
+    with pytest.raises(FitError, match="left the range"):
+        newton._minimise(lambda u: (np.full(3, np.nan), np.eye(3)), start)
+    with pytest.raises(FitError, match="does not converge"):
+        newton._minimise(lambda u: (np.exp(-u), np.eye(3)), start)
+    newton._check_rank(np.diag([1.0, 1.0, 1.1e-6]))
+    for singular in (np.diag([1.0, 1.0, 0.9e-6]), np.ones((2, 3))):
+        with pytest.raises(FitError, match="too similar"):
+            newton._check_rank(singular)
+
+
+def test_limits_of_the_linear_method_are_said(case):
+    free = select_free(case, ["cohesion", "friction_angle", "shear_modulus", "kphi"])
+    several = np.asarray([30.0, 60.0])
+    said = linear._limits(case, free, np.asarray([1.0, 0.5]), several)
+    assert said == ["kphi is not identified by the linear method"]
+    for solution in ([-1.0, 0.5], [1.0, -0.5]):
+        said = linear._limits(case, [], np.asarray(solution), several)
+        assert said == ["the linear method gives a negative value, which no soil has"]
+    said = linear._limits(case, [], np.zeros(2), np.full(2, 60.0))
+    assert said == ["one load only: cohesion is not identified"]
+    with pytest.raises(FitError, match="needs drawbar_pull"):
+        linear._channel(rows_of(case), "drawbar_pull")
+
+
+def test_samples_of_the_linearised_posterior_are_somewhat_wider(case):
+    data = rows_of(case)
+    density = PosteriorDensity(case, data, select_free(case, None), noise_scale=2.0)
+    jacobian = np.asarray([[90.0, 0.0, 30.0], [0.0, 80.0, 0.0], [0.0, 0.0, 100.0]])
+    found = normal_start(density, optimum([0.5, 0.4, 0.6], jacobian, np.zeros(3)))
+    covariance = 1.44 * np.linalg.inv(jacobian.T @ jacobian / 4.0 + 12.0 * np.eye(3))
+    np.testing.assert_allclose(found.u.mean(axis=0), [0.5, 0.4, 0.6], atol=2e-3)
+    np.testing.assert_allclose(np.cov(found.u.T), covariance, atol=0.1 * covariance.max())
+    assert found.weights.sum() == pytest.approx(1.0) and (np.abs(found.u - 0.5) < 0.5).all()
+    edge = normal_start(density, optimum([0.0, 1.0, 0.5], np.eye(3), np.zeros(3)))
+    assert (edge.u > 0.0).all() and (edge.u < 1.0).all()
+    assert np.mean(edge.u[:, 0] < 0.1) > 0.1  # reflected, not cut off
+
+
+def test_rows_of_other_gears_passes_and_directions_are_never_one():
+    at = Operating(
+        slip=np.asarray([0.1, -0.1, 0.1, 0.1, 0.2, 0.0]),
+        load=np.full(6, 60.0),
+        pass_number=np.asarray([1.0, 1.0, 2.0, 1.0, 1.0, 1.0]),
+        gear=np.asarray(["a", "a", "a", "b", "a", "a"]),
+    )
+    groups = condensed_rows._groups(at)
+    assert groups[0] == groups[4] == groups[5] and len(np.unique(groups)) == 4
+    solved = np.asarray([True, True, False, True, True, True])
+    number, first = np.asarray([0, 1, 2, 0, 0]), np.asarray([0, 1, 3])
+    means = condensed_rows._means(at, solved, number, first)
+    np.testing.assert_allclose(means.slip, [0.1, -0.1, 0.1])
+    assert means.gear.tolist() == ["a", "a", "b"] and means.pass_number.tolist() == [1.0, 1.0, 1.0]
+    joined = condensed_rows._joined(means, replace(at, slip=at.slip + 1.0))
+    np.testing.assert_allclose(joined.slip, [0.1, -0.1, 0.1, *(at.slip + 1.0)])
+    assert joined.load.shape == joined.gear.shape == (9,) and joined.speed is None
+    blocks = [b.tolist() for b in condensed_rows._blocks(50_002)]
+    assert len(blocks) == 2 and blocks[1] == [50_000, 50_001] and blocks[0][0] == 0

@@ -1,0 +1,143 @@
+"""Points of contacts, profiles and first guesses of the sinkage, by their formulas."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import LinearWheel, Midstance, Operating, Track, Wheel, soil
+from soilml.physics.contact import Contact, stress
+from soilml.physics.effects.running_gear.track_grousers import TrackGrousers
+from soilml.physics.load_case import LoadCase
+
+SAND = soil("wong1989/dry_sand", kc=2e4, n=1.1)
+FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
+TRACK = Track(radius=0.1, width=0.08, base=0.6)
+
+
+def at_rest(load, n=SAND.n):
+    return replace(SAND, n=n), Operating(slip=np.zeros(1), load=np.asarray([load]))
+
+
+@pytest.mark.parametrize("n", [0.5, 1.1, 2.8])
+@pytest.mark.parametrize("gear", [Wheel, LinearWheel])
+def test_a_wheel_is_first_guessed_where_its_normal_stress_alone_carries_it(gear, n):
+    ground, at = at_rest(60.0, n)
+    k = SAND.kc + 0.12 * SAND.kphi
+    expected = (3.0 * 60.0 / (max(3.0 - n, 0.5) * k * math.sqrt(0.3))) ** (2.0 / (2.0 * n + 1.0))
+    wheel = gear(radius=0.15, width=0.12)
+    assert wheel.initial_sinkage(ground, at) == pytest.approx(expected, rel=1e-12)
+    assert wheel.largest_sinkage() == 0.15
+
+
+@pytest.mark.parametrize(("load", "n"), [(20.0, 1.1), (9000.0, 1.1), (600.0, 0.4), (600.0, 2.9)])
+def test_a_track_is_first_guessed_flat_or_on_its_front_wheel(load, n):
+    ground, at = at_rest(load, n)
+    k = SAND.kc + 0.08 * SAND.kphi
+    flat = (load / (k * 0.6)) ** (1.0 / n)
+    front = (1.5 * load / (max(3.0 - n, 0.5) * k * math.sqrt(0.2))) ** (2.0 / (2.0 * n + 1.0))
+    found = float(TRACK.initial_sinkage(ground, at)[0])
+    assert found == pytest.approx(min(flat, front), rel=1e-12)
+    assert TRACK.largest_sinkage() * (1.0 + 0.2) == pytest.approx(0.1, rel=1e-15)
+
+
+def test_a_foot_is_first_guessed_as_a_plate_down_to_half_its_radius():
+    ground, at = at_rest(3.0)
+    area = FOOT.radius * FOOT.arc * 0.029
+    assert area == pytest.approx(FOOT.area, rel=1e-12)
+    plate = (3.0 / area / (SAND.kc / 0.029 + SAND.kphi)) ** (1.0 / SAND.n)
+    assert FOOT.initial_sinkage(ground, at) == pytest.approx(plate, rel=1e-12)
+    assert FOOT.initial_sinkage(*at_rest(1e6)) == pytest.approx(0.5 * FOOT.radius, rel=1e-12)
+    assert FOOT.largest_sinkage() == FOOT.radius
+
+
+@pytest.mark.parametrize("number", [float, np.asarray])
+def test_the_arc_of_a_foot_ends_at_the_length_and_rise_given(number):
+    foot = Midstance.of_foot(number(0.05), number(0.012), 0.03, 0.2)
+    assert foot.radius * np.sin(foot.arc) == pytest.approx(0.05, rel=1e-12)
+    assert foot.radius * (1.0 - np.cos(foot.arc)) == pytest.approx(0.012, rel=1e-12)
+    assert (foot.width, foot.leg_length, foot.tip_height) == (0.03, 0.2, 0.012)
+
+
+@pytest.mark.parametrize("sinkage", [0.002, 0.02, 0.1])  # low, medium and high
+def test_a_profile_of_a_foot_runs_evenly_from_its_top_to_below_the_hub(sinkage):
+    at = Operating(slip=np.asarray([0.3]), load=np.asarray([20.0]))
+    sole = FOOT.contact_geometry(np.asarray([sinkage]), SAND, at)
+    entry = math.acos(1.0 - sinkage / FOOT.radius)
+    peak = (SAND.a0 + 0.3 * SAND.a1) * entry
+    assert sole.peak == pytest.approx(peak)
+    assert sole.hub_offset == pytest.approx(0.18 + 0.0055 - FOOT.radius)
+    angle, contact = FOOT.profile_contact(sole, at, 41)
+    np.testing.assert_allclose(
+        angle[:, 0], np.linspace(min(entry, FOOT.arc), 0.0, 41), rtol=1e-7, atol=1e-12
+    )
+    # behind the maximum, the pressure is that of the angle before it at the same fraction
+    before = np.where(angle < peak, entry - angle / peak * (entry - peak), angle)
+    depth = FOOT.radius * (np.cos(before) - math.cos(entry))
+    np.testing.assert_allclose(contact.depth, np.maximum(depth, 0.0), rtol=1e-6, atol=1e-12)
+    moved = FOOT.radius * (entry - angle - 0.7 * (math.sin(entry) - np.sin(angle)))
+    np.testing.assert_allclose(contact.shear_displacement, moved, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(contact.surface_travel, FOOT.radius * (entry - angle), atol=1e-12)
+    assert not contact.area.any() and not contact.frontal_area.any()
+
+
+@pytest.mark.parametrize("slip", [-0.4, 0.0, 0.6])
+@pytest.mark.parametrize(
+    "shape",
+    [{}, {"leaving": 0.3, "rebound": 0.2}, {"settling": 0.5, "rear_leaving": 0.3}],
+    ids=["usual", "slack", "tail down"],
+)
+def test_a_profile_of_a_belt_is_that_of_the_points_of_its_contact(slip, shape):
+    track = replace(TRACK, **shape)
+    at = Operating(slip=np.full(2, slip), load=np.full(2, 600.0))
+    belt = track.contact_geometry(np.asarray([0.01, 0.05]), SAND, at)
+    assert not track.geometry_status(belt).any()
+    contact = track.contact(belt, at)
+    angle, profile = track.profile_contact(belt, at, 200_001)
+    for row in range(2):
+        along = profile.surface_travel[:, row]
+        assert along[0] == 0.0 and (np.diff(along, 2) < 1e-12).all()
+        used = contact.area[:, row] > 0.0
+        place = contact.surface_travel[used, row]
+        for name in ("depth", "shear_displacement"):
+            values = getattr(profile, name)[:, row]
+            points = np.interp(place, along, values)
+            near = 2e-3 * np.abs(values).max()
+            np.testing.assert_allclose(
+                getattr(contact, name)[used, row], points, atol=near, err_msg=name
+            )
+        tangent = contact.frontal_area[used, row] / contact.area[used, row]
+        np.testing.assert_allclose(
+            tangent, np.sin(np.interp(place, along, angle[:, row])), atol=1e-3
+        )
+        assert angle[0, row] == pytest.approx(belt.entry[row])
+        assert angle[-1, row] == pytest.approx(-belt.exit[row])
+        length = contact.area[:, row].sum() / track.width
+        assert length <= along[-1] * (1.0 + 1e-9)
+    assert profile.shear_lever_arm == contact.shear_lever_arm == track.radius
+    assert not profile.area.any() and not profile.horizontal_area.any()
+
+
+def test_a_profile_of_straight_lines_has_their_two_ends():
+    wheel, at = LinearWheel(radius=0.15, width=0.12), at_rest(60.0)[1]
+    rim = wheel.contact_geometry(np.asarray([0.02]), SAND, at)
+    angle, contact = wheel.profile_contact(rim, at, 101)
+    np.testing.assert_array_equal(angle, [[0.0], rim.peak])
+    assert contact.depth[1] == pytest.approx(0.15 * (np.cos(rim.peak) - np.cos(rim.entry)))
+
+
+@pytest.mark.parametrize("slip", [-0.3, 0.3])
+def test_soil_between_grousers_is_compressed_and_then_rubs(slip):
+    modulus, height, width = 0.01, 0.02, 0.08
+    ground = replace(SAND, cohesion=2000.0, shear_modulus=modulus)
+    j = np.asarray([0.0, 0.25, 1.0, 4.0]) * 3.0 * modulus
+    one = np.ones_like(j)
+    at = Operating(slip=np.asarray(slip), load=600.0)
+    sign = math.copysign(1.0, slip)
+    bare = stress(Contact(0.01 * one, sign * j, j, one, one, 0.0 * one, one, width), ground, at)
+    effect = TrackGrousers(spacing=0.6, height=height, yielding=3.0, power=0.5)
+    found = effect.on_stress(bare, LoadCase(TRACK, ground, at)).shear
+    block = 2000.0 * (1.0 + 2.0 * height / width) + bare.normal * np.tan(ground.friction_angle)
+    between = sign * block * np.sqrt([0.0, 0.25, 1.0, 1.0])
+    np.testing.assert_allclose(found, 0.4 * bare.shear + 0.6 * between, rtol=1e-9, atol=1e-9)

@@ -1,0 +1,115 @@
+"""What the classes of the room declare: bounds, defaults, cards, and that values do not change."""
+
+import csv
+import inspect
+from dataclasses import FrozenInstanceError, fields, is_dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from pkgutil import walk_packages
+
+import numpy as np
+import pytest
+
+import soilml.physics
+from soilml import EFFECTS, Midstance, Operating, Track, Wheel, soil
+from soilml.errors import InputError
+from soilml.parameters import check, declared
+from soilml.physics.coarse_search import SinkageEstimate
+from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.gears import GEARS
+from soilml.physics.gears.rigid_wheel import WheelArc
+
+#: Bounds and defaults that files of users rely on: one that becomes narrower refuses files that
+#: were valid, and another default changes what they mean.
+PUBLISHED = list(
+    csv.DictReader(Path(__file__).with_name("declared_parameters.csv").read_text().splitlines())
+)
+NODES = [
+    soil("wong1989/dry_sand"),
+    Operating(slip=0.2, load=60.0, speed=0.1, pass_number=2.0, slip_angle=0.1),
+    *(cls(radius=0.15, width=0.12) for name, cls in GEARS.items() if "wheel" in name),
+    Track(radius=0.1, width=0.08, base=0.6),
+    Midstance(radius=0.15, width=0.03, arc=0.3, leg_length=0.18, tip_height=0.01),
+    *(cls() for cls in EFFECTS.values()),
+]
+#: A node that has each parameter, by the class that declares it and the name of the field.
+DECLARING = {
+    (owner.__name__, field): node
+    for node in reversed(NODES)
+    for owner in type(node).__mro__
+    for field in declared(type(node)).keys() & inspect.get_annotations(owner).keys()
+}
+CLASSES = [
+    cls
+    for module in walk_packages(soilml.physics.__path__, "soilml.physics.")
+    for _, cls in inspect.getmembers(import_module(module.name), is_dataclass)
+    if cls.__module__ == module.name
+]
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_values_are_frozen_and_parameters_given_by_name(cls):
+    blank = object.__new__(cls)
+    with pytest.raises(FrozenInstanceError):
+        blank.anything = 1.0
+    # those with a class of parameters of their own are built from model files by name
+    if declared(cls) and issubclass(cls, (Effect, *(type(node) for node in NODES))):
+        assert all(field.kw_only for field in fields(cls) if field.name in declared(cls))
+
+
+def test_every_parameter_of_the_room_is_published():
+    assert DECLARING.keys() == {(row["class"], row["field"]) for row in PUBLISHED}
+
+
+@pytest.mark.parametrize("row", PUBLISHED, ids=lambda row: f"{row['class']}.{row['field']}")
+def test_a_parameter_is_accepted_up_to_its_bounds_and_no_further(row):
+    node, field = DECLARING[row["class"], row["field"]], row["field"]
+    for end, outwards in (("lower", -np.inf), ("upper", np.inf)):
+        bound = float(row[end])
+        check(_with(node, field, bound))
+        with pytest.raises(InputError, match=f"{field} is .*"):
+            check(_with(node, field, float(np.nextafter(bound, outwards))))
+    default = next(f for f in fields(type(node)) if f.name == field).default
+    assert default is None or isinstance(default, float) == bool(row["default"])
+    assert declared(type(node))[field].unit == row["unit"]
+    if row["default"]:
+        assert default == float(row["default"])
+
+
+def _with(node, field, value):
+    """The node with one field replaced, without what `__post_init__` asks of several together."""
+    changed = replace(node)
+    object.__setattr__(changed, field, value)
+    return changed
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_card_names_a_size_within_bounds_and_signs(name):
+    card, parameters = EFFECTS[name].about, declared(EFFECTS[name])
+    assert set(card.signs.values()) <= {-1, 1}
+    assert set(card.signs) <= {"torque", "drawbar_pull", "sinkage"}
+    for field, size in card.reference.items():
+        assert parameters[field].lower <= size <= parameters[field].upper
+    assert (card.calibration is None) == (card.kind not in ("rig", "sensor"))
+    if card.calibration is not None:
+        # a fault that a checked setup still has is not larger than one that matters
+        assert 0.0 < card.calibration <= abs(card.reference[card.size])
+
+
+def test_an_effect_is_for_all_gears_unless_its_card_says_otherwise():
+    card = EffectCard("a text", "a source", "soil", {"size": 1.0}, {}, "runs")
+    assert not card.wheel and not card.track and card.calibration is None
+    assert card.size == "size"
+
+
+def test_what_is_not_given_changes_nothing():
+    one = np.ones(1)
+    assert not SinkageEstimate(one, one).nearest
+    rim = WheelArc(one, 0 * one, 0.5 * one, one, 0.1, 0.1, 0.1, 0.1)
+    assert rim.travelled(np.asarray([0.25]), "displacement-sign") == pytest.approx(0.75)
+    assert Wheel(radius=0.1, width=0.1).braking == "displacement-sign"
+
+
+def test_the_catalogue_of_effects_holds_effects_alone():
+    assert EFFECTS and Effect not in EFFECTS.values()
+    assert all(issubclass(cls, Effect) and cls.name == name for name, cls in EFFECTS.items())

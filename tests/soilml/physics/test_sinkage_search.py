@@ -1,0 +1,179 @@
+"""The searches for the sinkage agree, do little work, and say why a row has no answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import EFFECTS, Model, Operating, Status, Track, Wheel, soil
+from soilml.physics import coarse_search, secant_steps, sinkage_search
+from soilml.physics.forces import load_at_sinkage
+from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.model import flattened
+
+SAND = soil("wong1989/dry_sand")
+WHEEL = Wheel(radius=0.15, width=0.12)
+
+
+def batch(slip, load, ground=SAND, gear=WHEEL, effects=()):
+    slip, load = np.broadcast_arrays(np.asarray(slip, float), np.asarray(load, float))
+    return flattened(LoadCase(gear, ground, Operating(slip=slip, load=load), effects))[0]
+
+
+def box(count=60, seed=0):
+    rng = np.random.default_rng(seed)
+    ground = replace(
+        SAND,
+        cohesion=rng.uniform(0.0, 3000.0, count),
+        friction_angle=rng.uniform(0.3, 0.8, count),
+        shear_modulus=rng.uniform(0.002, 0.05, count),
+        kphi=np.exp(rng.uniform(np.log(2e5), np.log(5e6), count)),
+        n=rng.uniform(0.6, 1.4, count),
+    )
+    return batch(rng.uniform(0.02, 0.9, count), rng.uniform(10.0, 120.0, count), ground)
+
+
+def test_the_three_searches_find_the_same_sinkage():
+    case = box()
+    found = [
+        search(case)
+        for search in (
+            sinkage_search._solve_from_coarse,
+            sinkage_search._solve_by_secant,
+            sinkage_search._solve_by_scan,
+        )
+    ]
+    carried = load_at_sinkage(case, found[1][0].sinkage) / case.at.load
+    np.testing.assert_allclose(carried, 1.0, atol=1e-7)
+    for force, solved in found:
+        assert solved.all() and not force.status.any()
+        for name in ("sinkage", "torque", "drawbar_pull", "entry_angle", "load"):
+            reference = getattr(found[1][0], name)
+            np.testing.assert_allclose(getattr(force, name), reference, rtol=1e-6, atol=1e-7)
+
+
+def test_ordinary_rows_need_few_evaluations(monkeypatch):
+    counts = dict.fromkeys(("coarse", "full"), 0)
+    coarse, full = coarse_search.load_at_sinkage, secant_steps.forces_at_sinkage
+
+    def counted_coarse(*args, **options):
+        counts["coarse"] += 1
+        assert options["coarse"] and args[1].dtype == np.float32
+        return coarse(*args, **options)
+
+    def counted_full(*args, **options):
+        counts["full"] += 1
+        return full(*args, **options)
+
+    monkeypatch.setattr(coarse_search, "load_at_sinkage", counted_coarse)
+    monkeypatch.setattr(secant_steps, "forces_at_sinkage", counted_full)
+    assert not sinkage_search.first_equilibrium(box()).status.any()
+    assert 2 <= counts["coarse"] <= 4
+    assert 2 <= counts["full"] <= 4
+
+
+def test_driving_alone_lets_the_load_rise_all_the_way():
+    rises = sinkage_search.load_rises_with_sinkage
+    assert rises(batch([0.0, 0.5], 60.0))
+    assert not rises(batch([-0.01, 0.5], 60.0))
+    assert rises(batch(0.3 + np.zeros(1), 60.0, effects=(EFFECTS["slip-sinkage"](n1=0.1),)))
+    for name in ("exit-angle", "depth-cohesion", "bulldozing"):
+        assert not rises(batch([0.3], 60.0, effects=(EFFECTS[name](),)))
+
+
+def test_a_load_above_that_at_the_hub_is_too_heavy_and_one_below_is_not():
+    at_hub = float(load_at_sinkage(batch([0.3], 60.0), np.asarray([0.15]))[0])
+    case = batch(np.full(3, 0.3), at_hub * np.asarray([0.5, 0.999, 1.001]))
+    force, heavy = sinkage_search._too_heavy(case)
+    assert heavy.tolist() == [False, False, True]
+    assert force.status.tolist() == [0, 0, Status.TOO_HEAVY]
+    np.testing.assert_allclose(force.load, at_hub, rtol=1e-12)
+    np.testing.assert_allclose(force.sinkage, 0.15, rtol=1e-12)
+    answer = sinkage_search.first_equilibrium(case)
+    assert answer.status.tolist() == [0, 0, Status.TOO_HEAVY]
+    assert answer.load[2] == pytest.approx(at_hub, rel=1e-12)
+
+
+@pytest.mark.parametrize("slip", [-0.6, -0.95])
+def test_a_row_that_nothing_carries_states_the_largest_load(slip):
+    ground = replace(SAND, shear_modulus=0.002, cohesion=500.0, friction_angle=0.7)
+    every = np.geomspace(1e-6, 0.15, 4000)
+    carried = load_at_sinkage(batch(slip + 0.0 * every, 60.0, ground), every)
+    most = float(carried.max())
+    loads = most * np.asarray([1.002, 1.5, 20.0])
+    found = sinkage_search.first_equilibrium(batch(np.full(3, slip), loads, ground))
+    assert (found.status == Status.TOO_HEAVY).all()
+    np.testing.assert_allclose(found.load, most, rtol=1e-3)
+    below = sinkage_search.first_equilibrium(
+        batch(np.full(2, slip), [0.3 * most, 0.99 * most], ground)
+    )
+    assert not below.status.any()
+    # no smaller sinkage carries these loads
+    for sinkage, load in zip(below.sinkage, (0.3 * most, 0.99 * most), strict=True):
+        first = every[np.argmax(carried >= load)]
+        assert sinkage == pytest.approx(first, rel=5e-3)
+
+
+def test_the_largest_load_below_a_sinkage_is_found_coarsely():
+    case = batch(np.asarray([0.3, -0.9, -0.8]), 60.0)
+    sinkage = np.asarray([0.03, 0.05, 0.08])
+    index = np.asarray([0, 2])
+    found = sinkage_search._largest_load_below(case, sinkage, index)
+    for i, load in zip(index, found, strict=True):
+        smaller = sinkage[i] * np.linspace(0.01, 0.9, 200)
+        one = rows(case, np.full(200, i))
+        most = load_at_sinkage(one, smaller).max()
+        assert load == pytest.approx(most, rel=0.1)
+
+
+def test_a_row_whose_load_falls_with_sinkage_is_in_doubt():
+    doubt = sinkage_search._load_may_fall_with_sinkage
+    sinkage = np.full(3, 0.03)
+    slips = np.asarray([0.3, -1e-4, -0.9])
+    assert doubt(batch(slips, 60.0), sinkage).tolist() == [False, False, True]
+    on_stress = batch(slips, 60.0, effects=(EFFECTS["depth-cohesion"](),))
+    assert doubt(on_stress, sinkage).all()
+    pull = batch(slips[:2], 60.0, effects=(EFFECTS["load-transfer"](ratio=0.3),))
+    assert doubt(pull, sinkage[:2]).all()
+    none = batch(slips[:2], 60.0, effects=(EFFECTS["bulldozing"](share=1.0),))
+    assert not doubt(none, sinkage[:2]).any()
+
+
+def test_a_peak_is_refined_between_its_neighbours():
+    grid = np.stack([np.arange(5.0), 10.0 * np.arange(5.0)], axis=1)
+    found = sinkage_search._refined_about(grid, np.asarray([2, 4]))
+    assert found.shape == (17, 2)
+    np.testing.assert_allclose(found[:, 0], np.linspace(1.0, 3.0, 17))
+    np.testing.assert_allclose(found[:, 1], np.linspace(30.0, 40.0, 17))
+    np.testing.assert_allclose(
+        sinkage_search._refined_about(grid, np.asarray([0, 0]))[[0, -1], 0], [0.0, 1.0]
+    )
+
+
+@pytest.mark.parametrize("gear", [WHEEL, Track(radius=0.1, width=0.12, base=0.6)])
+def test_soil_bears_where_both_moduli_over_the_width_are_above_zero(gear):
+    ground = replace(SAND, kphi=1e6, kc=np.asarray([-0.119e6, -0.121e6]))
+    force = Model(gear)(ground, Operating(slip=0.2, load=1.0))
+    assert force.status[1] == Status.NO_BEARING and np.isnan(force.torque[1])
+    assert force.status[0] != Status.NO_BEARING
+
+
+def test_bulldozing_without_friction_has_the_limits_of_its_factors():
+    clay = replace(SAND, friction_angle=0.0, cohesion=5000.0)
+    at = Operating(slip=0.3, load=60.0)
+    plain = Model(WHEEL)(clay, at)
+    pushed = (Model(WHEEL) + EFFECTS["bulldozing"](share=2.0))(clay, at)
+    z = plain.sinkage
+    # Prandtl's N_c, and (2 N_gamma / tan phi + 1) for N_q = 1
+    wall = 0.12 * (0.67 * 5000.0 * z * (np.pi + 2.0) + 0.5 * z**2 * SAND.unit_weight * 9.0)
+    assert plain.drawbar_pull - pushed.drawbar_pull == pytest.approx(2.0 * wall, rel=1e-4)
+
+
+def test_the_catalogue_is_read_again_as_it_was():
+    from soilml.physics.soils.catalogue import soil_catalogue
+
+    again = soil_catalogue.__wrapped__()
+    assert again == soil_catalogue()
+    entry = again["comin2017/es-3"]
+    assert entry.assumed == tuple(sorted(entry.assumed)) and entry.soil.cohesion == 0.0
+    assert not set(entry.assumed) & set(entry.published)
