@@ -52,6 +52,28 @@ def test_finite_readings_are_stacked_by_channel():
 def test_rows_without_time_are_in_their_order():
     table = Table({name: SMALL[name] for name in ("run", "slip", "load_N", "torque_Nm")})
     assert stacked(table).order.tolist() == [0, 0, 1, 1, 2]
+    several = Table({**table.columns, "run": np.asarray(["c", "a", "b", "c", "a"])})
+    assert stacked(several).order.tolist() == [0, 0, 0, 1, 1]
+
+
+def test_a_table_without_a_reading_has_none():
+    table = Table({name: SMALL[name] for name in ("run", "slip", "load_N")})
+    found = stacked(table)
+    assert (len(found), found.channels, found.noise) == (0, (), ())
+    assert found.row.size == found.channel.size == found.std.size == 0
+    assert (found.slip_std, found.load_std) == (0.0, 0.0)
+
+
+def test_levels_are_those_of_each_reading():
+    found = stack_readings(case_of(), driven(case_of(), loads=(40.0, 60.0, 90.0), slips=4))
+    part = found.subset(found.load > 50.0)  # rows without a reading have no level
+    for levels, values, count in (
+        (part.load_levels, part.load, 2),
+        (part.slip_levels, part.slip, 4),
+    ):
+        assert levels.count == count and levels.index.shape == values.shape
+        expected = np.unique(values, return_inverse=True)[1]
+        assert levels.index.tolist() == expected.tolist()
 
 
 def test_noise_that_is_not_positive_is_not_declared():
@@ -72,10 +94,14 @@ def test_noise_is_that_of_expected_values_and_never_nothing():
     torque = found.channel == found.channels.index("torque")
     expected = 2.0 * found.reading
     expected[0] = 0.0
-    std = found.with_noise_at(expected).std
+    other = replace(noise, share=3.0 * noise.share)
+    std = replace(found, noise=(noise, other, other)).with_noise_at(expected).std
     floor = 1e-3 * np.median(found.std[torque])
     own = np.maximum(noise.std(expected[torque]), floor)
     assert std[torque] == pytest.approx(own, rel=1e-12) and std[torque].min() > 0.0
+    floors = np.asarray([1e-3 * np.median(found.std[found.channel == i]) for i in found.channel])
+    own = np.maximum(other.std(expected), floors)
+    assert std[~torque] == pytest.approx(own[~torque], rel=1e-12)
     fixed = replace(found, noise=(None,) * 3, std=np.where(torque, found.std, 0.5))
     fixed.std[torque.argmax()] = 1e-9
     kept = fixed.with_noise_at(expected).std
