@@ -1,0 +1,103 @@
+"""Rows held out before an analysis, soil that is free, and other gears that are proposed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import case_of
+
+from soilml.errors import InputError
+from soilml.gap.data.free_soil import fixed_parameters, free_soil_parameters
+from soilml.gap.data.holdout import split_holdout
+from soilml.gap.design.gear_changes import LUG_EFFECTS, gear_changes
+from soilml.io.table import Table
+from soilml.physics.effects import EFFECTS
+
+
+def table_of(runs, line=False):
+    names = np.repeat([f"run_{i}" for i in range(runs)], 2)
+    load = np.where(np.arange(2 * runs) % 2, 90.0, 40.0)
+    table = Table({"run": names, "load_N": load, "slip": np.linspace(0.1, 0.5, 2 * runs)})
+    return replace(table, line=np.arange(2 * runs) + 2) if line else table
+
+
+@pytest.mark.parametrize("runs, count", [(4, 1), (7, 1), (8, 2), (11, 2), (12, 3)])
+def test_one_run_in_four_is_held_out(runs, count):
+    table = table_of(runs)
+    found = split_holdout(table, "run", 5)
+    out, kept = set(found.held_out["run"]), set(found.analysed["run"])
+    assert len(out) == count and len(kept) == runs - count and not out & kept
+    assert len(found.held_out) + len(found.analysed) == len(table)
+    assert found.name == "held_out_runs"
+    assert found.description == f"runs {', '.join(sorted(out))}, held out"
+    others = {split_holdout(table, "run", seed).description for seed in range(20)}
+    assert len(others) > 2 and split_holdout(table, "run", 5).description == found.description
+
+
+@pytest.mark.parametrize("line", [False, True])
+def test_rows_with_a_value_are_held_out(line):
+    found = split_holdout(table_of(3, line), "load_N=90", 0)
+    assert found.held_out["load_N"].tolist() == [90.0] * 3
+    assert found.analysed["load_N"].tolist() == [40.0] * 3
+    assert (found.name, found.description) == ("held_out_region", "load_N=90, held out")
+
+
+def test_what_cannot_be_held_out_is_refused():
+    whole = split_holdout(table_of(3), None, 0)
+    assert whole.held_out is None and len(whole.analysed) == 6
+    with pytest.raises(InputError, match=r"needs four runs or more; the table has 3$"):
+        split_holdout(table_of(3), "run", 0)
+    with pytest.raises(InputError, match=r"^--holdout is 'load_N'; needed is run, or COLUMN=VALUE"):
+        split_holdout(table_of(3), "load_N", 0)
+    same = Table({"run": np.asarray(["a", "b"]), "load_N": np.asarray([90.0, 90.0])})
+    with pytest.raises(InputError, match="load_N=90 holds out every row; no row remains"):
+        split_holdout(same, "load_N=90", 0)
+
+
+def test_a_soil_parameter_is_free_or_fixed():
+    case = case_of()
+    free = free_soil_parameters(case, ["cohesion"])
+    assert [f.path for f in free] == ["cohesion"]
+    fixed = fixed_parameters(case, free)
+    assert fixed[:4] == ["friction_angle", "shear_modulus", "kphi", "n"]
+    gear = [path for path in case.parameters() if path.startswith("gear.")]
+    assert fixed[4:] == gear and "gear.radius" in gear
+    alone = free_soil_parameters(replace(case, prior={}), None)
+    assert {f.path for f in alone} == {"cohesion", "friction_angle", "shear_modulus"}
+    one = replace(case, prior={"cohesion": case.prior["cohesion"]})
+    assert [f.path for f in free_soil_parameters(one, None)] == ["cohesion"]
+    with pytest.raises(InputError, match=r"^--free gear.radius is not a soil parameter"):
+        free_soil_parameters(case, ["cohesion", "gear.radius"])
+
+
+def changes(case, *names):
+    return {c.kind: c for c in gear_changes(case, [EFFECTS[name] for name in names])}
+
+
+def test_another_gear_is_proposed_for_the_effects_that_it_tells_apart():
+    case = case_of()
+    gear = case.model.gear
+    narrow = changes(case, "sidewall-shear")["narrower gear"]
+    assert narrow.size == pytest.approx(0.5 * gear.width, rel=0.05)
+    assert narrow.columns() == {"wheel_width_m": narrow.size} and narrow.removed == frozenset()
+    assert narrow.text == f"a width of {narrow.size:g} m"
+    assert narrow.apply(case).model.gear.width == narrow.size
+    assert narrow.apply(case).model.gear.radius == gear.radius
+    large = changes(case, "stress-shift")["larger wheel"]
+    assert large.size == pytest.approx(1.5 * gear.radius, rel=0.05)
+    assert large.columns() == {"wheel_radius_m": large.size}
+    assert changes(case, "slip-sinkage") == {}
+    assert set(changes(case, "sidewall-shear", "stress-shift")) == {"narrower gear", "larger wheel"}
+
+
+def test_a_smooth_gear_has_no_lugs_and_all_else():
+    case = case_of()
+    lugged = replace(case, model=case.model + EFFECTS["grousers"]() + EFFECTS["slip-sinkage"]())
+    (smooth,) = changes(lugged, "grousers").values()
+    assert (smooth.kind, smooth.text) == ("smooth gear", "lugs removed or covered")
+    assert smooth.removed == LUG_EFFECTS and smooth.columns() == {"grouser_height_m": 0.0}
+    left = [effect.name for effect in smooth.apply(lugged).model.effects]
+    assert left == [e.name for e in lugged.model.effects if e.name != "grousers"]
+    assert "slip-sinkage" in left
+    several = replace(case, gears={"own": case.model})
+    assert changes(several, "grousers", "stress-shift") == {}
