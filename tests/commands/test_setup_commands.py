@@ -91,7 +91,7 @@ def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkey
     monkeypatch.setattr("soilml.cli.execution.setup.doctor._version", lambda name: "1.2.3")
     assert main(["doctor"]) == 1
     said = capsys.readouterr().out
-    assert "! scipy is 1.2.3; needed is 1.14 or newer: pip install -U scipy" in said
+    assert "! scipy is 1.2.3; needed is 1.15 or newer: pip install -U scipy" in said
 
 
 def test_doctor_names_a_damaged_file(capsys, monkeypatch, tmp_path):
