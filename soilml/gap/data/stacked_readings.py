@@ -33,7 +33,8 @@ class StackedReadings:
     """Operating points of n rows, and the m readings of all channels in one vector.
 
     `row` and `channel` are the row and the index in `channels` of each reading; `std` is its
-    declared noise, NaN where none is declared.
+    declared noise, NaN where none is declared, and `sensor_std` the part of it that is not noise of
+    slip and load, where these were added.
     """
 
     at: Operating
@@ -48,6 +49,7 @@ class StackedReadings:
     noise: tuple[Noise | None, ...]  # of each channel, where the case declares it
     slip_std: float = 0.0  # declared measurement noise of a slip, 0 where none is declared
     load_std: float = 0.0  # likewise of a load, N
+    sensor_std: Floats | None = None  # (m,)
 
     def __len__(self) -> int:
         return len(self.reading)
@@ -117,6 +119,7 @@ class StackedReadings:
             channel=self.channel[selected],
             reading=self.reading[selected],
             std=self.std[selected],
+            sensor_std=None if self.sensor_std is None else self.sensor_std[selected],
         )
 
     def with_noise_at(self, expected: Floats) -> StackedReadings:
@@ -125,13 +128,18 @@ class StackedReadings:
         Noise that is a fraction of the reading itself would give low readings too much weight. A
         standard deviation is at least a thousandth of its channel's median.
         """
-        std = self.std.copy()
+        own = self.std if self.sensor_std is None else self.sensor_std
+        std = own.copy()
         for i, noise in enumerate(self.noise):
             in_channel = self.channel == i
             if noise is not None:
                 std[in_channel] = noise.std(expected[in_channel])
-        floor = np.asarray([1e-3 * np.median(self.std[self.channel == i]) for i in self.channel])
-        return replace(self, std=np.maximum(std, floor))
+        floor = np.asarray([1e-3 * np.median(own[self.channel == i]) for i in self.channel])
+        return replace(self, std=np.maximum(std, floor), sensor_std=None)
+
+    def with_noise_of_operation(self, std: Floats) -> StackedReadings:
+        """The readings with noise (m,) in addition that their slip and load cause."""
+        return replace(self, std=np.hypot(self.std, std), sensor_std=self.std)
 
     def with_known_noise(self) -> tuple[StackedReadings, list[str]]:
         """The channels with known noise, if there are any, and notes about the excluded ones."""

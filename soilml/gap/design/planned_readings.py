@@ -117,6 +117,7 @@ def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedR
         channel=np.concatenate([first.channel, second.channel]),
         reading=np.concatenate([first.reading, second.reading]),
         std=np.concatenate([first.std, second.std]),
+        sensor_std=None,
     )
 
 

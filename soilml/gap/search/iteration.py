@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.fitting.coordinates import soil_coordinate
 from soilml.gap.fitting.least_squares import GapFit
+from soilml.gap.fitting.operating_noise import noise_of_operation
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.residual_test import ResidualTest
@@ -166,6 +167,7 @@ def _reestimate_covariance(
     several_runs = len(readings.runs) > 1
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
     readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
+    readings = readings.with_noise_of_operation(noise_of_operation(case, readings))
 
     covariance = assemble_covariance(readings, columns, typical)
     alike = readings.driven_alike * len(readings.channels) + readings.channel
