@@ -88,9 +88,9 @@ disk-faults: $(VENV)/.ready ## run commands on a disk that is full or read-only,
 mutation: $(VENV)/.ready ## change the source at random places and see whether a test fails: make mutation MUTANTS=12
 	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)
 
-test-oldest: $(VENV)/.ready ## quick tests with the oldest libraries that are allowed, twenty minutes on two cores
+test-oldest: ## quick tests with the oldest libraries that are allowed, twenty minutes on two cores
 	@$(PYTHON) -m venv .venv-oldest
-	@mkdir -p build && $(BIN)/python bench/oldest.py > build/oldest.txt
+	@mkdir -p build && $(PYTHON) bench/oldest.py > build/oldest.txt
 	@PIP_CONSTRAINT=build/oldest.txt .venv-oldest/bin/python -m pip install --quiet \
 	  --disable-pip-version-check '.[ground,logs,cluster,serve]' \
 	  array-api-strict filelock hypothesis pytest pytest-xdist sympy
