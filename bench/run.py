@@ -23,6 +23,7 @@ import peers
 import physics
 import prospects
 import slip
+import soil_tests
 import streams
 import summary
 import systems
@@ -94,6 +95,7 @@ PARTS = (
         "are left out; `identify` samples the model for them.",
         lambda folder: identification.text(),
     ),
+    Part("soil-tests", "Plate and shear tests beside a wheel", soil_tests.ABOUT, soil_tests.text),
     Part(
         "sets",
         "Set posterior",

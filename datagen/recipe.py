@@ -167,6 +167,11 @@ def parse_recipe(text: str, where: str) -> Recipe:
 
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
     case = take_case(settings, effects)
+    if case.soil_tests:
+        settings.fail(
+            "[[soil.test]] is read by identify, gap, audit, advise and pull alone; the soils of a "
+            "recipe are drawn from [soil.prior]"
+        )
     if case.gears:
         settings.fail("a recipe has one gear, in [gear]; [gears.NAME] is for measured rows")
     if not case.prior:

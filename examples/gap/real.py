@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import runpy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -34,6 +35,7 @@ def run() -> None:
     straight(cmu, "driving", 0.0, 1.0)
     straight(cmu, "braking", -1.0, 0.0)
     straight(cmu, "all", -1.0, 1.0)
+    with_plate_tests(cmu.parent)
 
 
 def smooth(table: Path) -> None:
@@ -91,6 +93,16 @@ def straight(table: Path, name: str, lowest: float, highest: float) -> None:
     runs = OUT / f"cmu_{name}.csv"
     _written(runs, rows)
     _ran(["gap", str(HERE / "cmu.toml"), str(runs), "--out", str(OUT / f"cmu_{name}")])
+
+
+def with_plate_tests(folder: Path) -> None:
+    """The trials again, with plate tests of the same sand as tests of the soil."""
+    tests = runpy.run_path(str(HERE.parent / "bevameter" / "real.py"))
+    tests["OUT"].mkdir(parents=True, exist_ok=True)
+    tests["cmu"](folder)
+    for name in ("driving", "braking"):
+        runs, out = OUT / f"cmu_{name}.csv", OUT / f"cmu_{name}_plates"
+        _ran(["gap", "demo/bevameter/cmu.toml", str(runs), "--out", str(out)])
 
 
 def _ran(command: list[str]) -> None:

@@ -19,6 +19,7 @@ from soilml.identification.compatibility import (
     recipe_case,
     value_differences,
 )
+from soilml.identification.data.soil_test_remarks import ignored_soil_tests
 from soilml.identification.trained_estimator import (
     condition_on_case,
     narrower_priors,
@@ -97,6 +98,8 @@ def apply_case_option(
         given.append(estimator)
     if case is not None and case.discrepancy:
         notes.append(_discrepancy_note(args, given[0], case))
+    if case is not None:
+        notes += ignored_soil_tests(case)
     return given, case, notes
 
 

@@ -15,19 +15,18 @@ from soilml.config.model_settings import (
     take_effects,
     take_gear,
     take_gears,
-    take_instance,
-    take_priors,
 )
 from soilml.config.sensor_bias import take_bias
-from soilml.config.units import take_quantity
+from soilml.config.soil_settings import take_soil
 from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import Parameter, check, declared, located, with_values
+from soilml.parameters import Parameter, located, with_values
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.model import Model
-from soilml.physics.soils import Soil, soil
+from soilml.physics.soils import Soil
+from soilml.physics.soils.soil_tests import SoilTest
 from soilml.quantities import COLUMNS
 
 
@@ -55,6 +54,8 @@ class Case:
         Errors that all readings of a sensor share, by column name: `torque_Nm`, `slip`.
     rover
         The vehicle on such gears, where the file describes it.
+    soil_tests
+        Plate and shear tests of the soil, which take part like further readings.
     """
 
     model: Model
@@ -65,6 +66,7 @@ class Case:
     gears: dict[str, Model] = field(default_factory=dict)
     bias: dict[str, Noise] = field(default_factory=dict)
     rover: WheeledRover | None = None
+    soil_tests: tuple[SoilTest, ...] = ()
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value.
@@ -252,7 +254,7 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         model = Model(next(iter(gears.values())).gear)
     else:
         model = Model(take_gear(settings.table("gear")))
-    own_soil, prior = _take_soil(settings.table("soil"))
+    own_soil, prior, soil_tests = take_soil(settings.table("soil"))
     model, effect_priors = take_effects(settings.tables("effect"), effects, model)
     for name, other in gears.items():
         for effect in model.effects:
@@ -273,26 +275,6 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
     rover = (
         take_rover(settings.table("rover"), gears or {"": model}) if "rover" in settings else None
     )
-    return Case(model, own_soil, prior, noise, discrepancy, gears, rover=rover)
-
-
-def _take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior]]:
-    priors = settings.table("prior")
-    if "name" in settings:
-        name = settings.text("name")
-        try:
-            base = soil(name)
-        except InputError as error:
-            settings.fail(str(error))
-        values = {
-            key: take_quantity(settings, key, parameter.unit)
-            for key, parameter in declared(Soil).items()
-            if key in settings
-        }
-        settings.permit(declared(Soil))
-        made = with_values(base, values)
-        check(made, f"{settings.where}: ")
-    else:
-        made = take_instance(Soil, settings)
-    settings.finish()
-    return made, take_priors(priors, Soil)
+    return Case(
+        model, own_soil, prior, noise, discrepancy, gears, rover=rover, soil_tests=soil_tests
+    )

@@ -16,6 +16,7 @@ from soilml.physics.effects import Effect
 from soilml.physics.gears.base import Gear
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.soils import Soil
+from soilml.physics.soils.soil_tests import SoilTest
 
 
 def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
@@ -34,7 +35,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         for effect in model.effects:
             lines += [*_effect_lines(case, effect, f"{key}.effect", f"{effect.name}@{name}"), ""]
     soil = {name: getattr(case.soil, name) for name in declared(Soil)}
-    lines += _soil_lines(soil, {p: v for p, v in case.prior.items() if "." not in p})
+    priors = {p: v for p, v in case.prior.items() if "." not in p}
+    lines += _soil_lines(soil, priors, case.soil_tests)
     if case.noise:
         lines += ["", "[noise]"]
         lines += [f"{key} = {_setting(noise.as_setting())}" for key, noise in case.noise.items()]
@@ -53,17 +55,25 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
 
 
 def soil_as_toml(
-    soil: Mapping[str, float], prior: Mapping[str, Prior], comments: Sequence[str] = ()
+    soil: Mapping[str, float],
+    prior: Mapping[str, Prior],
+    comments: Sequence[str] = (),
+    tests: Sequence[SoilTest] = (),
 ) -> str:
-    """The sections [soil] and [soil.prior] of a model file, for some of the soil's parameters."""
-    return "\n".join([f"# {line}" for line in comments] + _soil_lines(soil, prior)) + "\n"
+    """[soil], [soil.prior] and [[soil.test]] of a model file, for some of the soil's parameters."""
+    return "\n".join([f"# {line}" for line in comments] + _soil_lines(soil, prior, tests)) + "\n"
 
 
-def _soil_lines(soil: Mapping[str, float], prior: Mapping[str, Prior]) -> list[str]:
+def _soil_lines(
+    soil: Mapping[str, float], prior: Mapping[str, Prior], tests: Sequence[SoilTest]
+) -> list[str]:
     lines = ["[soil]", *(f"{name} = {_number(value)}" for name, value in soil.items())]
     if prior:
         lines += ["", "[soil.prior]"]
         lines += [f"{name} = {_setting(p.as_setting())}" for name, p in prior.items()]
+    for test in tests:
+        lines += ["", "[[soil.test]]"]
+        lines += [f"{key} = {_number(getattr(test, key))}" for key in declared(type(test))]
     return lines
 
 

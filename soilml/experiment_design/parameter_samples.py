@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
+from soilml.identification.data.prior_fractions import prior_fractions
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.numerics.maximum_entropy import prior_quantiles
@@ -50,13 +51,14 @@ class ParameterSamples:
 
 
 def samples_of_prior(
-    free: Sequence[FreeParameter], count: int = SAMPLES, seed: int = 0
+    free: Sequence[FreeParameter], count: int = SAMPLES, seed: int = 0, case: Case | None = None
 ) -> ParameterSamples:
-    """Samples of the prior by Latin hypercube, equally weighted."""
-    rng = np.random.default_rng(seed)
-    return ParameterSamples(
-        tuple(free), latin_hypercube(count, len(free), rng), np.full(count, 1.0 / count)
-    )
+    """Samples of the prior by Latin hypercube, equally weighted.
+
+    The tests of the case's soil, if there are any, take part.
+    """
+    u = prior_fractions(free, count, np.random.default_rng(seed), case)
+    return ParameterSamples(tuple(free), u, np.full(count, 1.0 / count))
 
 
 def samples_of_rows(

@@ -17,6 +17,7 @@ from soilml.gap.report_parts import (
     RemainingDiscrepancy,
     Suspect,
 )
+from soilml.gap.soil_test_agreement import SoilTestAgreement, soil_test_agreement
 
 #: Status of a report, and its meaning.
 STATUSES = {
@@ -140,6 +141,11 @@ class GapReport:
 
         return plot_gap(self.gap, ax, part)
 
+    @property
+    def soil_tests(self) -> list[SoilTestAgreement]:
+        """The tests of the model's soil, beside the soil before and after."""
+        return soil_test_agreement(self.model, self.soil_before, self.soil_after)
+
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
@@ -162,6 +168,7 @@ class GapReport:
                 "before": {k: v.as_json() for k, v in self.soil_before.items()},
                 "after": {k: v.as_json() for k, v in self.soil_after.items()},
             },
+            "soil_tests": [test.as_json() for test in self.soil_tests],
             "mimic_radius": self.mimic_radius,
             "candidates": [t.as_json() for t in self.candidates],
             "next_runs": [

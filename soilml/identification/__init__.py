@@ -14,6 +14,7 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.identification.data.observations import Observations, read_observations
+from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
 from soilml.identification.discrepancy import ignored_discrepancy, included_discrepancy
 from soilml.identification.fit_result import Fit
 from soilml.identification.free_parameters import FreeParameter, select_free
@@ -133,7 +134,12 @@ def identify(
     fit = METHODS[method](case, data, selected)
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)
-    texts = [*_method_limits(fit, data, free), *_about_discrepancy(case, fit, data), *data.notes]
+    texts = [
+        *_method_limits(fit, data, free),
+        *_about_discrepancy(case, fit, data),
+        *_about_soil_tests(case, fit),
+        *data.notes,
+    ]
     return replace(fit, warnings=(*fit.warnings, *texts))
 
 
@@ -166,6 +172,20 @@ def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[str]:
             *([f"the {fit.method} method ignores [bias]"] if case.bias else []),
         ]
     return [*included_discrepancy(case, data), *included_bias(case)]
+
+
+def _about_soil_tests(case: Case, fit: Fit) -> list[str]:
+    """Whether tests of the soil take part, and which ones the rows disagree with."""
+    if not case.soil_tests:
+        return []
+    if fit.method in CLOSED_FORM:
+        return [f"the {fit.method} method ignores [[soil.test]]"]
+    values = dict(zip(fit.names, fit.values, strict=True))
+    return [
+        f"the rows disagree with a test of the soil: {text}; an effect may be missing from the "
+        "model, or the test was made on another soil"
+        for text in disagreeing_soil_tests(case, values)
+    ]
 
 
 __all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
 from soilml.identification.data.observations import Observations
-from soilml.identification.free_parameters import FreeParameter, values_at
+from soilml.identification.data.spread_rows import spread_rows
+from soilml.identification.free_parameters import (
+    FreeParameter,
+    soil_test_deviations,
+    soil_test_rates,
+    values_at,
+)
 from soilml.identification.predictions import (
     Linearisation,
     linearise,
@@ -32,8 +38,6 @@ Floats = NDArray[np.float64]
 STARTS = 4
 #: Tolerance of a descent; and of those from several starts, which only tell optima apart.
 TOLERANCE, START_TOLERANCE = 1e-10, 1e-5
-#: Readings of each channel by which the points are compared.
-ROWS_OF_STARTS = 16
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
 #: A descent that comes this close to an optimum of equal cost ends there.
@@ -52,7 +56,7 @@ class Optimum:
     u: Floats  # (p,) fractions of the priors
     residual: Floats  # (k,) of unit covariance
     jacobian: Floats  # (k, p)
-    prior_cost: float  # squared deviations from normal priors
+    prior_cost: float  # squared deviations from normal priors and from tests of the soil
     about: Linearisation  # of the readings
 
     @property
@@ -96,6 +100,11 @@ class LeastSquaresProblem:
         values, rates = values_at(self.free, u)
         return values / self.normal_std, rates / self.normal_std
 
+    def of_soil_tests(self, u: Floats) -> tuple[Floats, Floats]:
+        """Deviations (t,) from tests of the soil at u (p,), and their derivatives (t, p) by u."""
+        deviation = soil_test_deviations(self.case, self.free, u[None, :])[0]
+        return deviation, soil_test_rates(self.case, self.free, u)
+
     def predict(self, u: Floats) -> Floats:
         """Predictions (sets, k) at u (sets, p)."""
         return stack_channels(self.data, predict_channels(self.case, self.free, u, self.data.at))
@@ -113,7 +122,7 @@ class LeastSquaresProblem:
         """The problem at u (p,), found from a linearisation `near` it where there is one."""
         about = linearise(self.case, self.data, self.free, u, near)
         jacobian = self.whitener(np.nan_to_num(about.jacobian).T).T
-        from_prior = self.normal_deviation(u)[0]
+        from_prior = np.append(self.normal_deviation(u)[0], self.of_soil_tests(u)[0])
         prior_cost = float(from_prior @ from_prior)
         return Optimum(u, self.whitened(about.prediction), jacobian, prior_cost, about)
 
@@ -187,6 +196,7 @@ def _ranked_starts(problem: LeastSquaresProblem) -> tuple[Floats, list[int]]:
     starts = np.vstack([nominal, np.hstack([soils, without])])
     part = problem.of_rows(spread_rows(problem.data))
     costs = (part.whitened(part.predict(starts)) ** 2).sum(axis=1)
+    costs += (soil_test_deviations(problem.case, free, starts) ** 2).sum(axis=1)
     return starts, [int(i) for i in np.argsort(costs, kind="stable")]
 
 
@@ -199,7 +209,7 @@ def descend(
     known: Optimum | None = None,
     near: Linearisation | None = None,
 ) -> Optimum:
-    """The local optimum from a start, normal priors included.
+    """The local optimum from a start, with normal priors and tests of the soil.
 
     It ends where cost, step and gradient change by less than the tolerance, relative; and with
     `known`, if it comes as close to that optimum as tells that it would end there. A linearisation
@@ -237,9 +247,13 @@ def descend(
 
     try:
         found = least_squares(
-            lambda u: np.append(linearised(u).residual, prior(u)[0]),
+            lambda u: np.concatenate(
+                [linearised(u).residual, prior(u)[0], problem.of_soil_tests(u)[0]]
+            ),
             np.clip(start, 1e-6, 1.0 - 1e-6),
-            jac=lambda u: np.vstack([linearised(u).jacobian, np.diag(prior(u)[1])]),
+            jac=lambda u: np.vstack(
+                [linearised(u).jacobian, np.diag(prior(u)[1]), problem.of_soil_tests(u)[1]]
+            ),
             bounds=(0.0, 1.0),
             ftol=tolerance,
             xtol=10.0 * tolerance,
@@ -270,17 +284,6 @@ def _leads_to(known: Optimum, trial: Optimum) -> bool:
     excess = trial.cost + trial.prior_cost - known.cost - known.prior_cost
     quadratic = float(np.sum((known.jacobian @ distance) ** 2))
     return abs(excess - quadratic) < EQUAL_COST
-
-
-def spread_rows(data: Observations) -> NDArray[np.int64]:
-    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
-    rows = []
-    for channel in data.channels:
-        measured = np.flatnonzero(np.isfinite(channel.reading))
-        in_order = measured[np.lexsort((data.slip[measured], data.load[measured]))]
-        few = np.linspace(0, len(in_order) - 1, min(ROWS_OF_STARTS, len(in_order)))
-        rows.append(in_order[few.round().astype(int)])
-    return np.unique(np.concatenate(rows))
 
 
 def _residual_noise(data: Observations, reading: Floats, residual: Floats, p: int) -> Floats:

@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
+from soilml.physics.soils.soil_tests import deviation_rates, deviations
 
 Floats = NDArray[np.float64]
 
@@ -94,6 +95,19 @@ def values_at(free: Sequence[FreeParameter], u: Floats) -> tuple[Floats, Floats]
     values = [float(f.prior.at(x)[0]) for f, x in zip(free, each, strict=True)]
     rates = [float(f.prior.rate(x)[0]) for f, x in zip(free, each, strict=True)]
     return np.asarray(values), np.asarray(rates)
+
+
+def soil_test_deviations(case: Case, free: Sequence[FreeParameter], u: Floats) -> Floats:
+    """Deviations (sets, t) from the case's tests of the soil, at fractions u (sets, p)."""
+    values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
+    return deviations(case.soil_tests, case.soil, [f.path for f in free], values)
+
+
+def soil_test_rates(case: Case, free: Sequence[FreeParameter], u: Floats) -> Floats:
+    """Derivatives (t, p) of `soil_test_deviations` by the fractions, at u (p,)."""
+    values, rates = values_at(free, u)
+    names = [f.path for f in free]
+    return deviation_rates(case.soil_tests, case.soil, names, values) * rates
 
 
 def _wide_prior(parameter: Parameter, nominal: float) -> Prior:

@@ -43,12 +43,12 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     noise, discrepancy and these errors. Errors that the model is solved with (of slip, load,
     bearing and contact) are estimated with the soil, and left out of the result.
 
-    Normal priors take part in the sum. The covariance is that of the linearised problem with a
-    Gaussian prior of the uniform one's variance, enlarged by the squared distance between the
-    optimum and the posterior mean: `std` stays realistic for a parameter that the rows do not
-    determine. Where the optimum lies at a bound, equally good values lie along a valley that bends
-    away from it. Covariance and distance are then also computed at the optimum with the Gaussian
-    prior included, and the larger std is used.
+    Normal priors and tests of the soil take part in the sum. The covariance is that of the
+    linearised problem with a Gaussian prior of the uniform one's variance, enlarged by the squared
+    distance between the optimum and the posterior mean: `std` stays realistic for a parameter that
+    the rows do not determine. Where the optimum lies at a bound, equally good values lie along a
+    valley that bends away from it. Covariance and distance are then also computed at the optimum
+    with the Gaussian prior included, and the larger std is used.
 
     Parameters
     ----------
@@ -131,14 +131,16 @@ def _fit(
     # mean plus two standard deviations of chi-squared over its degrees of freedom
     limit = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else SIGNIFICANT_COST / k
     excess = bool(not undeclared and per_reading > limit)
-    precision = problem.prior_precision
+    precision = np.diag(problem.prior_precision)
+    for_tests = problem.of_soil_tests(optimum.u)[1]
+    precision += for_tests.T @ for_tests
     noise_variance = per_reading if excess else 1.0
     covariance, linear_std = _covariance(
         optimum,
         with_prior,
         noise_variance,
         precision,
-        np.where(np.isinf(problem.normal_std), precision, 0.0),
+        np.where(np.isinf(problem.normal_std), problem.prior_precision, 0.0),
     )
     covariance = covariance[:p, :p]
     values, rate = values_at(free, optimum.u[:p])
@@ -187,9 +189,9 @@ def _covariance(
 
 
 def _posterior_covariance(at: Optimum, noise_variance: float, precision: Floats) -> Floats:
-    """Inverse of the Gauss-Newton Hessian with Gaussian priors of the priors' variances."""
+    """Inverse of the Gauss-Newton Hessian, with the precision (p, p) of priors and soil tests."""
     information = at.jacobian.T @ at.jacobian / noise_variance
-    return np.asarray(np.linalg.inv(information + np.diag(precision)))
+    return np.asarray(np.linalg.inv(information + precision))
 
 
 def _initial_noise(data: Observations) -> Floats:

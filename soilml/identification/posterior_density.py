@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification.data.observations import Observations
 from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
-from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.free_parameters import FreeParameter, soil_test_deviations
 from soilml.identification.predictions import (
     noise_at_prediction,
     predict_channels,
@@ -37,7 +37,8 @@ class PosteriorDensity:
 
     Errors that all rows share and that the model is solved with are parameters too, behind those of
     the soil; each is taken as a reading of zero, in standard deviations. Other errors that all rows
-    share are integrated out.
+    share are integrated out. Tests of the soil stand behind the readings, as predictions of their
+    deviations.
     """
 
     def __init__(
@@ -58,7 +59,9 @@ class PosteriorDensity:
         self.data, self.noise_scale = data, noise_scale
         #: how many of the parameters are errors
         self.errors = len(self.free) - len(free)
-        self.reading = np.append(stacked_readings(data)[0], np.zeros(self.errors))
+        #: how many predictions stand behind those of the readings: errors, and tests of the soil
+        self.others = self.errors + len(case.soil_tests)
+        self.reading = np.append(stacked_readings(data)[0], np.zeros(self.others))
         self.columns = discrepancy_columns(case, data)
         self.noisy_input = bool(np.any(data.slip_std > 0.0) or np.any(data.load_std > 0.0))
         #: noise that slip and load cause, (k,); linearised at the best of the first samples
@@ -76,7 +79,7 @@ class PosteriorDensity:
         """The density of some of the rows alone."""
         part = copy(self)
         part.data = self.data.of_rows(rows)
-        part.reading = np.append(stacked_readings(part.data)[0], np.zeros(self.errors))
+        part.reading = np.append(stacked_readings(part.data)[0], np.zeros(self.others))
         part.columns = discrepancy_columns(self.case, part.data)
         part.input_std = None
         return part
@@ -87,7 +90,7 @@ class PosteriorDensity:
         return float(self._squares_and_log_determinant(y, self._std(y))[0].sum())
 
     def predict(self, u: Floats) -> Floats:
-        """Readings (sets, k) that parameter sets `u` (sets, p) predict."""
+        """Readings (sets, k) that parameter sets `u` (sets, p) predict, and the others."""
         size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
         y = np.concatenate([self._predict(u[i : i + size]) for i in range(0, len(u), size)])
         if self.noisy_input and self.input_std is None:
@@ -106,6 +109,7 @@ class PosteriorDensity:
         squares, log_determinant = self._squares_and_log_determinant(y, self._std(y))
         # the factor on all noise enters the determinant as a constant, which does not matter
         logs = -0.5 * squares / self.noise_scale**2 - log_determinant
+        logs -= 0.5 * (y[:, y.shape[1] - len(self.case.soil_tests) :] ** 2).sum(axis=1)
         return np.where(np.isfinite(logs), logs, -np.inf)
 
     def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
@@ -132,12 +136,15 @@ class PosteriorDensity:
         std = noise_at_prediction(self.case, self.data, y)
         if self.input_std is not None:
             std = np.asarray(np.hypot(std, self.input_std))
-        return np.hstack([std, np.ones((len(y), self.errors))]) if self.errors else std
+        return np.hstack([std, np.ones((len(y), self.others))]) if self.others else std
 
     def _predict(self, u: Floats) -> Floats:
         channels = predict_channels(self.case, self.free, u, self.data.at)
         y = stack_channels(self.data, channels)
-        return np.hstack([y, errors_at(self.free, u)]) if self.errors else y
+        y = np.hstack([y, errors_at(self.free, u)]) if self.errors else y
+        if not self.case.soil_tests:
+            return y
+        return np.hstack([y, soil_test_deviations(self.case, self.free, u)])
 
     def _linearise(self, u: Floats) -> None:
         """Take changes of the readings with slip and load at fractions (p,)."""

@@ -12,6 +12,7 @@ from soilml.identification.compatibility import (
     recipe_case,
     value_differences,
 )
+from soilml.identification.data.soil_test_remarks import ignored_soil_tests
 from soilml.identification.discrepancy import ignored_discrepancy
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.trained_estimator import std_with_discrepancy
@@ -55,6 +56,7 @@ def onboard_draws(
     elif case.discrepancy:
         noise = estimator.sets.noise
         readings |= std_with_discrepancy(case.discrepancy, readings, noise, together=True)
+    warnings += ignored_soil_tests(case)
     estimate = estimator.run(**readings)
     if not estimate.in_range:
         warnings.append(

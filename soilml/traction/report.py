@@ -132,7 +132,7 @@ def pull_report(
     slip = slip_grid(slip_limit, measured_range)
     error = draw_pull_discrepancy(case, table, draws, loads, slip, noise_scale=soil.noise_scale)
     predictions = predictions_by_load(
-        case, draws, prior_draws(unknown), loads, slip, measured_range, covariates, error
+        case, draws, prior_draws(unknown, case=case), loads, slip, measured_range, covariates, error
     )
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
+from soilml.identification.data.prior_fractions import prior_fractions
 from soilml.identification.free_parameters import FreeParameter
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
-from soilml.numerics.resampling import latin_hypercube, systematic_resampling
+from soilml.numerics.resampling import systematic_resampling
 
 Floats = NDArray[np.float64]
 
@@ -52,10 +53,11 @@ def posterior_draws(
     return PosteriorDraws(_soil_draws(free, found.sample.u[rows]), found)
 
 
-def prior_draws(free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0) -> SoilDraws:
-    """Draws of the priors by Latin hypercube."""
-    rng = np.random.default_rng(seed)
-    return _soil_draws(free, latin_hypercube(count, len(free), rng))
+def prior_draws(
+    free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0, case: Case | None = None
+) -> SoilDraws:
+    """Draws of the priors by Latin hypercube; tests of the case's soil take part."""
+    return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(seed), case))
 
 
 def _soil_draws(free: Sequence[FreeParameter], u: Floats) -> SoilDraws:

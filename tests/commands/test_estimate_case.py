@@ -78,12 +78,14 @@ def test_another_wheel_is_refused_in_one_line(folder, capsys, file, case, said):
 
 def test_what_a_file_of_one_wheel_ignores_of_the_case_is_said(folder, capsys):
     other = MODEL.replace('torque_Nm = "2 %"', 'torque_Nm = "7 %"').replace("3000.0", "2000.0")
+    other += "[[soil.test]]\nnormal_stress = 8000\nstrength = 5000\nscatter = 0.1\n"
     (folder / "other.toml").write_text(other + '[discrepancy]\ntorque_Nm = "2 %"\n')
     assert main(["estimate", WHEEL, "runs.csv", "--case", "other.toml"]) == 0
     said = capsys.readouterr().err
     assert "prior [0.0, 3000.0] of cohesion, other.toml has [0.0, 2000.0], which is ignored" in said
     assert "noise of torque_Nm as in its recipe, other.toml has another one" in said
     assert "ignores the [discrepancy] of torque_Nm" in said
+    assert "[[soil.test]] is ignored" in said
 
 
 @pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])

@@ -35,8 +35,9 @@ names are taken where the header states units, such as z [mm] and p [kPa].
 
 The unit is the test, not the sample: ranges follow from how tests scatter. The
 second range is where the value at another place of the soil would lie, and is
-the prior that --out writes for identify and gap. With --model, SOIL.toml is that
-model file with this soil; without it, [soil] and [soil.prior] alone.
+the prior that --out writes for identify and gap, with [[soil.test]]: what the
+tests say of the parameters together. With --model, SOIL.toml is that model file
+with this soil; without it, [soil] with priors and tests alone.
 """
 
 

@@ -79,7 +79,10 @@ def run(args: argparse.Namespace) -> int:
             f"at most {MAX_POINTS} operating points are possible"
         )
     with working("rating the rows that could be next"):
-        samples = samples_of_prior(free) if at is None else samples_of_rows(case, data, free)
+        if at is None:
+            samples = samples_of_prior(free, case=case)
+        else:
+            samples = samples_of_rows(case, data, free)
         known = {} if at is None else mean_covariates(at)
         advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:

@@ -225,10 +225,14 @@ def _discrimination(rival: GapFit, present: Difference, new: Difference) -> floa
 
 
 def _adapted_misfit(rival: GapFit, parts: Sequence[Difference]) -> float:
-    """Squared sigma that remain after the rival has adapted its parameters, prior included."""
-    prior = np.diag([1.0 / c.std for c in rival.coordinates])
-    difference = np.concatenate([*[d for d, _ in parts], -rival.x * np.diag(prior)])
-    jacobian = np.vstack([*[j for _, j in parts], prior])
+    """Squared sigma that remain after the rival has adapted its parameters.
+
+    Priors and tests of the soil are included.
+    """
+    prior, tests = np.diag([1.0 / c.std for c in rival.coordinates]), rival.soil_tests
+    known = -rival.x * np.diag(prior), -tests.deviation(rival.x)
+    difference = np.concatenate([*[d for d, _ in parts], *known])
+    jacobian = np.vstack([*[j for _, j in parts], prior, tests.rates(rival.x)])
     if not (np.isfinite(difference).all() and np.isfinite(jacobian).all()):
         return float("nan")
     step = np.linalg.lstsq(jacobian, difference, rcond=LEAST_SQUARES_TOLERANCE)[0]

@@ -48,10 +48,14 @@ def identifiability(
     jacobian: Floats,
     effects: Mapping[str, type[Effect]],
 ) -> list[EffectIdentifiability]:
-    """Norms, cosines and separations of signatures on readings with independent noise."""
+    """Norms, cosines and separations of signatures on readings with independent noise.
+
+    `jacobian`, (m + t, p), has the derivatives of the whitened readings by the soil, and behind
+    them those of tests of the soil, which no effect changes.
+    """
     if not signatures:
         return []
-    columns = np.stack([s.column for s in signatures], axis=1) / std[:, None]
+    columns = _whitened(signatures, std, len(jacobian))
     projected = project_out(columns, jacobian)
     signal, residual = np.linalg.norm(columns, axis=0), np.linalg.norm(projected, axis=0)
     unit = projected / np.maximum(residual, 1e-300)
@@ -89,7 +93,7 @@ def indistinguishable_classes(
     """Effects that this design cannot distinguish at their reference sizes."""
     if not signatures:
         return ()
-    columns = np.stack([s.column for s in signatures], axis=1) / std[:, None]
+    columns = _whitened(signatures, std, len(jacobian))
     projected = project_out(columns, jacobian)
     norm = np.linalg.norm(projected, axis=0)
     unit = projected / np.maximum(norm, 1e-300)
@@ -105,3 +109,10 @@ def indistinguishable_classes(
         tuple(s.name for s, k in zip(signatures, label, strict=True) if k == g) for g in set(label)
     ]
     return tuple(sorted(g for g in groups if len(g) > 1))
+
+
+def _whitened(signatures: Sequence[Signature], std: Floats, rows: int) -> Floats:
+    """Whitened signatures (rows, k), zero behind the readings."""
+    columns = np.zeros((rows, len(signatures)))
+    columns[: len(std)] = np.stack([s.column for s in signatures], axis=1) / std[:, None]
+    return columns

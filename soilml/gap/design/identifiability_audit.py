@@ -23,6 +23,7 @@ from soilml.gap.design.planned_readings import expected_readings, joined_reading
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.fitting.coordinates import SoilCoordinate, linearise, soil_coordinate
+from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
@@ -160,6 +161,8 @@ def audit(
     coordinates = [soil_coordinate(f) for f in soil]
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in soil])
     jacobian = linearise(case, coordinates, nominal, readings)[1] / readings.std[:, None]
+    of_tests = SoilTestTerms(case, coordinates).rates(nominal)
+    jacobian = np.vstack([jacobian, of_tests])
     signatures, untestable = effect_signatures(case, readings, effects)
     table = identifiability(signatures, readings.std, jacobian, effects)
     before = {e.name for e in table if e.separating_snr >= NAMEABLE_SIGMA}
@@ -211,6 +214,7 @@ def _with_added_run(
         usual = {s.name: s.column for s in effect_signatures(case, plain, effects)[0]}
         if _are_equal(usual, by_part[0], stds[0]):
             return []
+    of_tests = SoilTestTerms(case, coordinates).rates(x)
     pooled = []
     for name in sorted(set().union(*by_part)):
         columns = [
@@ -219,7 +223,7 @@ def _with_added_run(
         ]
         signature = next(own[name] for own in by_part if name in own)
         pooled.append(replace(signature, column=np.concatenate(columns)))
-    return identifiability(pooled, np.concatenate(stds), np.vstack(jacobians), effects)
+    return identifiability(pooled, np.concatenate(stds), np.vstack([*jacobians, of_tests]), effects)
 
 
 def _are_equal(usual: Mapping[str, Floats], new: Mapping[str, Signature], std: Floats) -> bool:

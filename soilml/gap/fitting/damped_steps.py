@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.config.case import Case
 from soilml.gap.fitting.coordinates import FitCoordinate
+from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 
 Floats = NDArray[np.float64]
 
@@ -33,21 +35,25 @@ class DampedSteps:
     offset : array (p,)
         What is added to a coordinate to obtain a multiple of the parameter, where the parameter
         moves by ratios; infinite where it moves by differences.
+    tests : SoilTestTerms
+        Tests of the soil, which stand beside the residuals.
     """
 
     lower: Floats
     upper: Floats
     weight: Floats
     offset: Floats
+    tests: SoilTestTerms = field(default_factory=SoilTestTerms)
 
     @staticmethod
-    def of(coordinates: Sequence[FitCoordinate]) -> DampedSteps:
-        """The steps in these coordinates."""
+    def of(coordinates: Sequence[FitCoordinate], case: Case | None = None) -> DampedSteps:
+        """The steps in these coordinates, with the tests of a case's soil."""
         return DampedSteps(
             np.asarray([c.lower for c in coordinates]),
             np.asarray([c.upper for c in coordinates]),
             np.asarray([1.0 / c.std for c in coordinates]),
             np.asarray([_offset(c) for c in coordinates]),
+            SoilTestTerms(case, coordinates),
         )
 
     def within(self, x: Floats) -> Floats:
@@ -55,8 +61,10 @@ class DampedSteps:
         return np.clip(x, self.lower, self.upper)
 
     def objective(self, residual: Floats, x: Floats) -> Floats:
-        """Sum of squares of residuals (..., m) and of priors at x (..., p)."""
-        return np.asarray((residual**2).sum(axis=-1) + ((x * self.weight) ** 2).sum(axis=-1))
+        """Sum of squares of residuals (..., m), of priors and of soil tests at x (..., p)."""
+        of_prior = ((x * self.weight) ** 2).sum(axis=-1)
+        of_tests = (self.tests.deviation(x) ** 2).sum(axis=-1)
+        return np.asarray((residual**2).sum(axis=-1) + of_prior + of_tests)
 
     def are_held(self, x: Floats, residual: Floats, jacobian: Floats) -> bool:
         """Whether bounds hold every coordinate of x (p,) against the descent."""
@@ -65,7 +73,11 @@ class DampedSteps:
     def from_points(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
         r"""Where damped steps lead from several points, (b, p).
 
-        .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u = J^T r - P x
+        .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
+            = J^T r - P_0 x - T^T z
+
+        with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
+        and P = P_0 + T^T T.
 
         Parameters
         ----------
@@ -78,10 +90,12 @@ class DampedSteps:
         damping : array (b,)
             Factor lambda of each step.
         """
-        normal = jacobian.T @ jacobian + np.diag(self.weight**2)
-        scale = np.diag(normal) + 1e-9
+        of_readings = jacobian.T @ jacobian + np.diag(self.weight**2)
         moved = np.empty_like(x)
         for i, point in enumerate(x):
+            of_tests = self.tests.rates(point)
+            normal = of_readings + of_tests.T @ of_tests
+            scale = np.diag(normal) + 1e-9
             descent = self._descent(point, residual[i], jacobian)
             free = self._free(point, descent)
             damped = normal + damping[i] * np.diag(scale)
@@ -92,7 +106,8 @@ class DampedSteps:
 
     def _descent(self, x: Floats, residual: Floats, jacobian: Floats) -> Floats:
         """Half the negative gradient of the objective, (p,)."""
-        return np.asarray(jacobian.T @ residual - self.weight**2 * x)
+        of_tests = self.tests.rates(x).T @ self.tests.deviation(x)
+        return np.asarray(jacobian.T @ residual - self.weight**2 * x - of_tests)
 
     def _free(self, x: Floats, descent: Floats) -> NDArray[np.bool_]:
         """The coordinates that no bound holds, (p,)."""

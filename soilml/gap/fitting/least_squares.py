@@ -21,6 +21,7 @@ from soilml.gap.fitting.batched_predictions import (
 from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate
 from soilml.gap.fitting.damped_steps import DampedSteps
 from soilml.gap.fitting.readings_by_gear import readings_by_gear
+from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.coarse_search import SinkageEstimate
 
@@ -45,8 +46,9 @@ MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 class GapFit:
     """An optimum of generalised least squares: coordinates, residuals, Jacobian and objective.
 
-    `objective` is the sum of squared whitened residuals plus the sum of squared coordinates over
-    their prior variances; `converged` is false where the iteration limit was reached.
+    `objective` is the sum of squared whitened residuals, of squared coordinates over their prior
+    variances, and of squared deviations from tests of the soil; `converged` is false where the
+    iteration limit was reached.
     """
 
     case: Case
@@ -71,6 +73,11 @@ class GapFit:
         return np.asarray([c.std**-2 for c in self.coordinates])
 
     @property
+    def soil_tests(self) -> SoilTestTerms:
+        """Deviations from tests of the soil."""
+        return SoilTestTerms(self.case, self.coordinates)
+
+    @property
     def covariance(self) -> Floats:
         """Linearised posterior covariance of the coordinates, (p, p).
 
@@ -82,9 +89,8 @@ class GapFit:
                 for c in self.coordinates
             ]
         )
-        return np.asarray(
-            np.linalg.pinv(self.jacobian.T @ self.jacobian + np.diag(self.precision + uniform))
-        )
+        jacobian = np.vstack([self.jacobian, self.soil_tests.rates(self.x)])
+        return np.asarray(np.linalg.pinv(jacobian.T @ jacobian + np.diag(self.precision + uniform)))
 
     def values(self) -> dict[str, float]:
         """Parameters at the optimum, by path."""
@@ -147,11 +153,11 @@ def levenberg_marquardt(
 def descend_together(requests: Sequence[FitRequest]) -> list[GapFit | InputError]:
     r"""Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
 
-    .. math:: \min_x \|L^{-1} (y - f(x))\|^2 + \sum_k (x_k / \sigma_k)^2
+    .. math:: \min_x \|L^{-1} (y - f(x))\|^2 + \sum_k (x_k / \sigma_k)^2 + \sum_i z_i(x)^2
 
-    The descents are independent; the result of each is that of a descent alone, within the
-    tolerance of the search for equilibrium. Where the model refuses the coordinates of a trial, its
-    `InputError` takes the place of the fit.
+    with the deviations z from tests of the soil. The descents are independent; the result of each
+    is that of a descent alone, within the tolerance of the search for equilibrium. Where the model
+    refuses the coordinates of a trial, its `InputError` takes the place of the fit.
 
     References
     ----------
@@ -216,7 +222,7 @@ def _descent(request: FitRequest) -> _Descent:
     trial.
     """
     coordinates, readings = tuple(request.coordinates), request.readings
-    steps = DampedSteps.of(coordinates)
+    steps = DampedSteps.of(coordinates, request.case)
     gears = readings_by_gear(request.case, coordinates, readings)
 
     def whitened_residual(y: Floats) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any
 from soilml.gap.html.discrepancy_map import discrepancy_maps
 from soilml.gap.html.gap_bars import gap_bars
 from soilml.gap.html.prediction_curves import prediction_curves
-from soilml.gap.html.soil_table import soil_table
+from soilml.gap.html.soil_table import soil_table, soil_test_table
 from soilml.gap.html.verdict_section import (
     advice,
     effect_descriptions,
@@ -94,6 +94,7 @@ def _content(report: GapReport) -> dict[str, Any]:
         "maps": discrepancy_maps(report),
         "curves": report.curves and prediction_curves(report.curves, changed),
         "soil": soil_table(report),
+        "soil_tests": soil_test_table(report),
         "soil_changed": report.soil_before != report.soil_after,
         "suspects": suspect_table(report),
         "variance_components": [

@@ -1,4 +1,4 @@
-"""Section "The soil": the soil parameters before and after, and their change."""
+"""Section "The soil": its parameters before and after, their change, and tests of the soil."""
 
 from __future__ import annotations
 
@@ -38,6 +38,25 @@ def soil_table(report: GapReport) -> list[dict[str, Any]]:
                 "moved": with_unit(format_change(step, std), unit),
                 "share": f"{percent:+.0f} %".replace("-", "−") if abs(percent) < 1000.0 else "",
                 "strip": _strip(old, new),
+            }
+        )
+    return rows
+
+
+def soil_test_table(report: GapReport) -> list[dict[str, str]]:
+    """One row for each plate or shear test that the model file has."""
+    rows = []
+    for test in report.soil_tests:
+        factor, unit = display_unit(test.unit, test.measured)
+        rows.append(
+            {
+                "name": test.label,
+                "unit": unit,
+                "measured": f"{factor * test.measured:.3g}",
+                "before": f"{factor * test.before:.3g}",
+                "after": f"{factor * test.after:.3g}",
+                "sigma_before": f"{test.sigma_before:+.1f} σ".replace("-", "−"),
+                "sigma_after": f"{test.sigma_after:+.1f} σ".replace("-", "−"),
             }
         )
     return rows

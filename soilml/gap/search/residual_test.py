@@ -34,7 +34,8 @@ def residual_test(
     """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
 
     All that the coordinates of the fit can explain is projected out, with second-order terms in
-    the laws of its effects; see `soilml.gap.search.candidate_fits.shape_directions`.
+    the laws of its effects; see `soilml.gap.search.candidate_fits.shape_directions`. What another
+    soil could explain is, with tests of the soil, what these permit.
     """
     whiten = problem.discrepancy.whiten(problem.declared_amplitude)
     fit = fit.whitened_by(whiten)
@@ -43,6 +44,12 @@ def residual_test(
     signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
     directions = [whiten @ columns for columns in shape_directions(problem, fit)]
     space = np.column_stack([fit.jacobian, *directions])
+    # tests of the soil are residuals that no effect changes: a change of the soil costs something
+    deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
+    tests, k = len(deviation), len(fit.x)
+    columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
+    space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])
+    residual = np.append(fit.residual, -deviation)
     degrees_of_freedom = problem.covariance.components.degrees_of_freedom
-    test = score_test(fit.residual, columns, space, signs, degrees_of_freedom, seed)
+    test = score_test(residual, columns, space, signs, degrees_of_freedom, seed)
     return ResidualTest(tuple(signatures), test)

@@ -143,8 +143,10 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> L
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
     block = np.column_stack([jacobian, whiten @ (fit.reading - fit.prediction)])
     priors = [_prior(c, float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)]
-    precision = np.asarray([p for p, _, _ in priors])
+    precision = [p for p, _, _ in priors]
     k = added.shape[1]
+    deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
+    rates = np.column_stack([rates, np.zeros((len(rates), k))])
     lower = np.asarray([c.lower for c in fit.coordinates])
     upper = np.asarray([c.upper for c in fit.coordinates])
     movable = (fit.x > lower) & (fit.x < upper)
@@ -152,10 +154,10 @@ def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> L
         divisions=model._divisions,
         cross=model.columns.T @ block,
         plain=block.T @ block,
-        precision=np.concatenate([precision, np.full(k, WEAK_PRECISION)]),
-        pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]),
+        precision=np.diag([*precision, *np.full(k, WEAK_PRECISION)]) + rates.T @ rates,
+        pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]) + rates.T @ deviation,
         movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
-        constant=sum(constant for _, _, constant in priors),
+        constant=sum(constant for _, _, constant in priors) + float(deviation @ deviation),
     )
 
 

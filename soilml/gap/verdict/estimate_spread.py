@@ -71,6 +71,8 @@ def by_undetected_effects(
     """
     fit = soil.whitened_by(problem.covariance.whiten)
     normal = fit.jacobian.T @ fit.jacobian + np.diag(fit.precision + UNIFORM_PRECISION)
+    of_tests = fit.soil_tests.rates(fit.x)
+    normal += of_tests.T @ of_tests
     stds = {c.effect: c.std for c in problem.size_coordinates([s.name for s in signatures])}
     logs, offsets = [np.zeros(1)], [np.zeros((1, len(fit.x)))]
     for s in signatures:

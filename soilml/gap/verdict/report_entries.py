@@ -28,6 +28,7 @@ from soilml.gap.statistics.evidence import LARGEST_SIZE, Evidence
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.gap.statistics.repeats import overstated_noise_notes
 from soilml.gap.verdict.cross_validation import gap_reduction, held_out
+from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.report.numbers import format_quantity
 
@@ -156,6 +157,12 @@ def analysis_notes(
             else "1 reading is an outlier and was"
         )
         notes.append(f"{many} excluded: {listed}")
+    soil = analysis.result.soil
+    notes += [
+        f"with the soil alone, the rows disagree with a test of the soil: {text}; part of the gap "
+        "lies there, unless the test was made on another soil"
+        for text in disagreeing_soil_tests(soil.case, soil.values())
+    ]
     notes += _bound_notes(after.coordinates, after.x.tolist())
     notes += size_notes(shown.coordinates, shown.x.tolist())
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):

@@ -9,6 +9,7 @@ from soilml.identification.bevameter.pressure_sinkage import (
     PressureSinkageFit,
     fit_pressure_sinkage,
 )
+from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
 from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
 from soilml.identification.bevameter.result import BevameterResult
 from soilml.identification.bevameter.shear_strength import ShearFit, fit_shear_strength
@@ -21,6 +22,7 @@ from soilml.identification.bevameter.soil_section import (
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.numerics.rounding import significant
+from soilml.physics.soils.soil_tests import SoilTest
 
 
 def bevameter(
@@ -71,18 +73,22 @@ def bevameter(
     prior: dict[str, Prior] = {}
     remarks: list[str] = []
     plate_fit = shear_fit = None
+    tests: list[SoilTest | None] = []
     if plates is not None:
         plate_fit = fit_pressure_sinkage(read_plate_tests(plates))
         values, priors, notes = plate_section(plate_fit, case)
         soil, prior = soil | values, prior | priors
         remarks += [*plate_remarks(plate_fit), *notes]
+        tests.append(pressure_test(plate_fit, case))
     if shear is not None:
         shear_fit = fit_shear_strength(read_shear_tests(shear))
         values, priors, notes = shear_section(shear_fit, case)
         soil, prior = soil | values, prior | priors
         remarks += [*shear_remarks(shear_fit), *notes]
+        tests.append(strength_test(shear_fit))
     soil = within_bounds({name: significant(value) for name, value in soil.items()})
-    return BevameterResult(plate_fit, shear_fit, soil, prior, tuple(remarks))
+    kept = tuple(test for test in tests if test is not None)
+    return BevameterResult(plate_fit, shear_fit, soil, prior, tuple(remarks), kept)
 
 
 __all__ = ["BevameterResult", "PressureSinkageFit", "ShearFit", "bevameter"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from soilml.identification.bevameter.estimate import SpreadEstimate
 from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.numerics.prior import Prior
+from soilml.physics.soils.soil_tests import SoilTest
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,9 @@ class BevameterResult:
         tests leave a parameter open.
     remarks
         What the tests cannot tell, how far repeats differ, and where a law does not fit.
+    tests
+        For [[soil.test]]: what the tests determine best, the pressure at one depth and the strength
+        under one normal stress, with the scatter from place to place.
     """
 
     plates: PressureSinkageFit | None
@@ -34,6 +38,7 @@ class BevameterResult:
     soil: dict[str, float]
     prior: dict[str, Prior]
     remarks: tuple[str, ...]
+    tests: tuple[SoilTest, ...] = ()
 
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine, by name; `k` is kc / b + kphi for the one width tested."""
@@ -48,6 +53,7 @@ class BevameterResult:
             "estimates": {name: e.as_json() for name, e in self.estimates().items()},
             "soil": self.soil,
             "prior": {name: prior.as_setting() for name, prior in self.prior.items()},
+            "tests": [asdict(test) for test in self.tests],  # type: ignore[call-overload]
             "remarks": list(self.remarks),
             "plate_tests": [] if self.plates is None else _plate_entries(self.plates),
             "shear_tests": [] if self.shear is None else _shear_entries(self.shear),

@@ -34,7 +34,7 @@ def plate_section(fit: PressureSinkageFit, case: Case | None) -> Section:
     kc, kphi = fit.moduli
     values = {"kc": kc, "kphi": kphi, "n": fit.exponent}
     prior = {"n": _prior("n", fit.exponent, fit.estimates()["n"].place_range)}
-    widths = _widths(case)
+    widths = widths_of_gears(case)
     remarks: list[str] = []
     if len(widths) > 1 and fit.several_sizes:
         for name in ("kc", "kphi"):
@@ -100,7 +100,7 @@ def within_bounds(values: Mapping[str, float]) -> dict[str, float]:
     return {k: min(max(v, bounds[k].lower), bounds[k].upper) for k, v in values.items()}
 
 
-def _widths(case: Case | None) -> tuple[float, ...]:
+def widths_of_gears(case: Case | None) -> tuple[float, ...]:
     """Distinct widths of the gears of a case (m); none where a gear has no width."""
     if case is None:
         return ()

@@ -11,6 +11,7 @@ from soilml.identification.descent import (
     descend,
     global_optimum,
 )
+from soilml.identification.free_parameters import soil_test_rates
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.sampling.surface_sampling import MOST_ROUNDS, surface_sample
@@ -72,6 +73,8 @@ def normal_start(density: PosteriorDensity, optimum: Optimum) -> ImportanceSampl
     """Samples of the linearised posterior about the most probable parameters, of equal weights."""
     precision = optimum.jacobian.T @ optimum.jacobian / density.noise_scale**2
     prior = np.diag([f.fraction_precision for f in density.free])
+    of_tests = soil_test_rates(density.case, density.free, optimum.u)
+    prior += of_tests.T @ of_tests
     root = np.linalg.cholesky(np.linalg.inv(precision + prior))
     normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.u)))
     u = optimum.u + WIDER * normal @ root.T

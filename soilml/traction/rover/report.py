@@ -115,7 +115,7 @@ def rover_report(
     key = column("speed")
     speed = float(np.nanmedian(table[key])) if key in table else None
     found = rover_performance(case, soil.draws, slopes, slip, speed)
-    before = _steepest_before(case, prior_draws(soil.unknown), slip, speed)
+    before = _steepest_before(case, prior_draws(soil.unknown, case=case), slip, speed)
     warnings = (*soil.warnings, *_warnings(case, found, measured))
     return RoverReport(len(table), measured, found, before, warnings)
 

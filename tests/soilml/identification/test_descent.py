@@ -9,6 +9,7 @@ from conftest import THREE_CHANNEL_MODEL
 from soilml import Operating, identify, read_case
 from soilml.identification import descent
 from soilml.identification.data.observations import read_observations
+from soilml.identification.data.spread_rows import READINGS, spread_rows
 from soilml.identification.free_parameters import select_free
 from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.predictions import linearise
@@ -89,7 +90,7 @@ def test_sixty_four_rows_take_few_linearisations(tmp_path, monkeypatch):
     )
     identify(case, table)
     few = len(calls)
-    assert sum(sets) <= 65 * 3 * descent.ROWS_OF_STARTS
+    assert sum(sets) <= 65 * 3 * READINGS
     calls.clear()
     monkeypatch.setattr(descent, "NEARLY_SAME", 0.0)
     monkeypatch.setattr(descent, "START_TOLERANCE", descent.TOLERANCE)
@@ -103,10 +104,10 @@ def test_few_rows_for_the_starts_hold_all_channels_and_the_heaviest_load(tmp_pat
     sinkage = np.where(np.arange(300) % 100 == 7, table["sinkage_m"], np.nan)
     columns = {name: table[name] for name in table.columns} | {"sinkage_m": sinkage}
     data = read_observations(case, Table(columns))
-    rows = descent.spread_rows(data)
+    rows = spread_rows(data)
     assert {7, 107, 207} <= set(rows.tolist())
     assert data.load[rows].max() == data.load.max()
-    assert len(rows) <= 2 * descent.ROWS_OF_STARTS + 3
+    assert len(rows) <= 2 * READINGS + 3
 
 
 def test_the_optimum_is_the_lowest_of_descents_from_all_points(tmp_path):

@@ -46,13 +46,13 @@ def optimum(u, jacobian, residual=(0.0, 0.0), prior_cost=0.0):
 def test_covariance_of_least_squares_includes_prior_and_distance_to_its_mean():
     at = optimum([0.2, 0.5], [[3.0, 0.0], [0.0, 1.0]])
     precision = np.asarray([12.0, 12.0])
-    found, std = nonlinear._covariance(at, at, 4.0, precision, precision)
+    found, std = nonlinear._covariance(at, at, 4.0, np.diag(precision), precision)
     variance = 1.0 / (np.asarray([9.0, 1.0]) / 4.0 + 12.0)
     np.testing.assert_allclose(std, np.sqrt(variance))
     to_mean = variance * 12.0 * np.asarray([0.3, 0.0])
     np.testing.assert_allclose(np.diag(found), variance + to_mean**2)
     other = optimum([0.9, 0.5], [[0.0, 0.0], [0.0, 1.0]])
-    found, _ = nonlinear._covariance(at, other, 4.0, precision, precision)
+    found, _ = nonlinear._covariance(at, other, 4.0, np.diag(precision), precision)
     np.testing.assert_allclose(found[0, 0], 1.0 / 12.0 + 0.7**2)
     assert found[0, 1] == 0.0
 

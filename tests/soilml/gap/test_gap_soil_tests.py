@@ -1,0 +1,160 @@
+"""Plate and shear tests of the soil beside the runs of a wheel."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Case, Model, Operating, Table, Wheel, soil
+from soilml.config.measurement_noise import Noise
+from soilml.gap import audit, gap
+from soilml.gap.fitting.coordinates import soil_coordinate
+from soilml.gap.fitting.soil_test_terms import SoilTestTerms
+from soilml.gap.html.page import page
+from soilml.identification.bevameter import bevameter
+from soilml.identification.bevameter.model_file import updated_soil
+from soilml.identification.free_parameters import select_free
+from soilml.numerics.prior import Prior
+from soilml.physics.effects import EFFECTS
+from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
+
+SAND = soil("wong1989/dry_sand")
+KNOWN = {
+    "kc": SAND.kc,
+    "kphi": SAND.kphi,
+    "n": SAND.n,
+    "cohesion": SAND.cohesion,
+    "friction_angle": SAND.friction_angle,
+}
+CASE = Case(
+    Model(Wheel(radius=0.15, width=0.12)),
+    SAND,
+    {
+        "cohesion": Prior(0.0, 3000.0),
+        "friction_angle": Prior(0.3, 0.8),
+        "shear_modulus": Prior(0.005, 0.05),
+        "kphi": Prior(1e5, 1e7, log=True),
+    },
+    {"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.03)},
+)
+SLIP, LOAD = np.tile(np.linspace(0.05, 0.6, 7), 3), np.repeat([40.0, 70.0, 120.0], 7)
+
+
+def sand_tests():
+    """A plate test and a shear test that agree with the sand."""
+    plate = PlatePressure(plate_width=0.05, sinkage=0.02, pressure=1.0, scatter=0.1)
+    shear = ShearStrength(normal_stress=7500.0, strength=1.0, scatter=0.05)
+    return (
+        replace(plate, pressure=float(plate.predicted(KNOWN))),
+        replace(shear, strength=float(shear.predicted(KNOWN))),
+    )
+
+
+def runs(effects=(), seed=1):
+    force = Model(CASE.model.gear, effects)(SAND, Operating(slip=SLIP, load=LOAD))
+    z = np.random.default_rng(seed).standard_normal((2, SLIP.size))
+    return Table(
+        {
+            "run": np.repeat(["a", "b", "c"], 7),
+            "slip": SLIP,
+            "load_N": LOAD,
+            "torque_Nm": force.torque * (1.0 + 0.02 * z[0]),
+            "sinkage_m": force.sinkage * (1.0 + 0.03 * z[1]),
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def reports():
+    rows = runs((EFFECTS["slip-sinkage"](n1=0.3),))
+    return [gap(replace(CASE, soil_tests=t), rows) for t in ((), sand_tests())]
+
+
+def test_tests_of_the_soil_add_to_the_odds_of_the_cause(reports):
+    alone, both = reports
+    assert both.status == "named"
+    assert both.cause_set == (("slip-sinkage",),)
+    assert both.effects[0].log_odds > alone.suspects[0].log_odds + 1.0
+    assert both.soil_after["cohesion"].std < alone.soil_after["cohesion"].std
+
+
+def test_report_compares_the_soil_with_its_tests(reports):
+    plate, shear = reports[1].as_json()["soil_tests"]
+    assert shear["test"] == "shear strength under 7.5 kPa"
+    assert abs(shear["sigma_before"]) > 2.5 > 1.5 > abs(shear["sigma_after"])
+    assert abs(plate["sigma_after"]) < 1.5
+    text = page(reports[1], "model.toml", "runs.csv")
+    assert "Plate and shear tests of the soil, which took part in the fit" in text
+    assert "pressure under a plate of 0.05 m at 0.02 m" in text
+    assert "Plate and shear tests" not in page(reports[0], "model.toml", "runs.csv")
+    assert reports[0].as_json()["soil_tests"] == []
+    assert reports[1].model.soil_tests == sand_tests()
+
+
+def test_runs_that_agree_with_the_tests_have_no_gap():
+    report = gap(replace(CASE, soil_tests=sand_tests()), runs())
+    assert report.status == "no-gap"
+    assert all(abs(t.sigma_after) < 2.0 for t in report.soil_tests)
+
+
+def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():
+    _, shear = sand_tests()
+    other = replace(shear, strength=2.0 * shear.strength)
+    report = gap(replace(CASE, soil_tests=(other,)), runs())
+    assert any("disagree with a test of the soil" in note for note in report.notes)
+
+
+def test_audit_knows_that_tests_hold_the_soil():
+    design = runs()
+    absorbed = [
+        {e.name: e.absorbed for e in audit(replace(CASE, soil_tests=t), design).effects}
+        for t in ((), sand_tests())
+    ]
+    assert absorbed[0].keys() == absorbed[1].keys()
+    assert all(absorbed[1][name] <= absorbed[0][name] + 1e-9 for name in absorbed[0])
+    assert min(absorbed[1][name] - absorbed[0][name] for name in absorbed[0]) < -0.05
+
+
+def test_terms_of_a_fit_are_derivatives_of_deviations():
+    case = replace(CASE, soil_tests=sand_tests())
+    coordinates = [soil_coordinate(f) for f in select_free(case, None)]
+    terms, x = SoilTestTerms(case, coordinates), np.asarray([0.4, 0.5, 0.3, 0.6])
+    steps = 1e-6 * np.eye(4)
+    expected = (terms.deviation(x + steps) - terms.deviation(x - steps)).T / 2e-6
+    np.testing.assert_allclose(terms.rates(x), expected, rtol=1e-5, atol=1e-7)
+    assert SoilTestTerms().deviation(x).shape == (0,)
+
+
+def test_bevameter_hands_its_tests_on():
+    z, size = np.tile(np.linspace(0.005, 0.04, 8), 2), np.repeat([0.05, 0.1], 8)
+    plates = Table(
+        {
+            "test": np.repeat(["small", "large"], 8),
+            "plate_radius_m": size,
+            "sinkage_m": z,
+            "pressure_Pa": (SAND.kc / size + SAND.kphi) * z**SAND.n,
+        }
+    )
+    sigma, j = np.repeat([4e3, 8e3, 12e3], 10), np.tile(np.linspace(0.005, 0.15, 10), 3)
+    strength = SAND.cohesion + sigma * np.tan(SAND.friction_angle)
+    shear = Table(
+        {
+            "test": np.repeat(["p", "q", "r"], 10),
+            "normal_stress_Pa": sigma,
+            "shear_displacement_m": j,
+            "shear_stress_Pa": strength * (1.0 - np.exp(-j / SAND.shear_modulus)),
+        }
+    )
+    earlier = ShearStrength(normal_stress=1e3, strength=1e3, scatter=0.1)
+    result = bevameter(plates, shear, CASE)
+    case = updated_soil(replace(CASE, soil_tests=(earlier,)), result)
+    plate, shear_test = case.soil_tests
+    assert plate.plate_width == CASE.model.gear.width
+    assert abs(float(plate.deviation(KNOWN))) < 0.05
+    assert abs(float(shear_test.deviation(KNOWN))) < 0.05
+    assert shear_test.normal_stress == pytest.approx(8e3)
+    assert plate.scatter >= 0.15  # the usual scatter of repeats
+    assert result.as_json()["tests"][1]["strength"] == shear_test.strength
+    narrow = replace(CASE, model=Model(Wheel(radius=0.15, width=0.3)))
+    one_size = Table({name: plates[name][:8] for name in plates.columns})
+    assert bevameter(one_size, None, narrow).tests == ()
