@@ -40,7 +40,7 @@ def take_quantity(settings: Settings, key: str, unit: str) -> float:
     >>> round(take_quantity(settings, "friction_angle", "rad"), 4)
     0.576
     """
-    value = settings.take(key, (int, float, str), f"a number in {unit}")
+    value = settings.take(key, (int, float, str), _number(unit))
     return in_si(settings, key, value, unit)
 
 
@@ -54,4 +54,8 @@ def in_si(settings: Settings, key: str, value: Any, unit: str) -> float:
         with suppress(ValueError):
             return float(match[1]) * known[match[2]]
     units = f", or a text with one of the units {', '.join(known)}" if known else ""
-    raise InputError(f"{settings.where}: {key} is {value!r}; needed is a number in {unit}{units}")
+    raise InputError(f"{settings.where}: {key} is {value!r}; needed is {_number(unit)}{units}")
+
+
+def _number(unit: str) -> str:
+    return "a number" if unit == "1" else f"a number in {unit}"

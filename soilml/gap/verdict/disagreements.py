@@ -16,6 +16,7 @@ from soilml.gap.statistics.reml_covariance import (
 )
 from soilml.gap.statistics.repeats import repeat_disagreement
 from soilml.gap.verdict.cross_validation import held_out_region
+from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.report.numbers import decimal
 
@@ -49,6 +50,10 @@ def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
             f"varies by {components.bearing_std:.0%}"
         )
     found += _region(problem, soil)
+    found += [
+        f"the rows disagree with a test of the soil: {text}"
+        for text in disagreeing_soil_tests(soil.case, soil.values())
+    ]
     return found
 
 

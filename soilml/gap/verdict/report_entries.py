@@ -158,10 +158,11 @@ def analysis_notes(
         )
         notes.append(f"{many} excluded: {listed}")
     soil = analysis.result.soil
+    far = disagreeing_soil_tests(soil.case, soil.values()) if analysis.result.has_gap else []
     notes += [
         f"with the soil alone, the rows disagree with a test of the soil: {text}; part of the gap "
         "lies there, unless the test was made on another soil"
-        for text in disagreeing_soil_tests(soil.case, soil.values())
+        for text in far
     ]
     notes += _bound_notes(after.coordinates, after.x.tolist())
     notes += size_notes(shown.coordinates, shown.x.tolist())

@@ -158,3 +158,15 @@ def test_bevameter_hands_its_tests_on():
     narrow = replace(CASE, model=Model(Wheel(radius=0.15, width=0.3)))
     one_size = Table({name: plates[name][:8] for name in plates.columns})
     assert bevameter(one_size, None, narrow).tests == ()
+
+
+def test_runs_that_agree_are_no_gap_only_where_the_tests_agree_too():
+    plate, shear = sand_tests()
+    known = {name: prior for name, prior in CASE.prior.items() if name != "kphi"}
+    case = replace(CASE, prior=known, soil_tests=(plate, shear))
+    assert gap(case, runs()).status == "no-gap"
+    firm = replace(plate, pressure=1.6 * plate.pressure)  # no unknown parameter can explain it
+    report = gap(replace(case, soil_tests=(firm, shear)), runs())
+    assert report.status == "undecided"
+    assert any("disagree with a test of the soil" in reason for reason in report.reasons)
+    assert not any("part of the gap" in text for text in report.notes)
