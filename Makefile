@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-browser check models limit kls1 gap-real bench bench-gap fuzz faults disk-faults mutation bounds endurance release lock sbom licences audit-packages docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-browser check models limit kls1 gap-real bench bench-gap fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -84,6 +84,13 @@ faults: $(VENV)/.ready ## kill commands at random moments and run them again: ma
 
 disk-faults: $(VENV)/.ready ## run commands on a disk that is full or read-only, as root
 	@$(BIN)/python tests/faults/disk_run.py
+
+coverage: $(VENV)/.ready ## statements and branches that `make test` reaches, by room, half an hour on two cores
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[coverage]'
+	@mkdir -p build
+	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long" --cov --cov-report=json:build/coverage.json
+	@$(BIN)/python bench/reached.py
 
 mutation: $(VENV)/.ready ## change the source at random places and see whether a test fails: make mutation MUTANTS=12
 	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)
