@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from soilml.errors import InputError
 from soilml.gap.report_parts import GapReduction
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
-from soilml.report.numbers import channel_name, format_number
+from soilml.report.numbers import channel_name, format_number, format_residual
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def draw_bars(axes: Axes, rows: Sequence[Bar], most: float, least: float) -> Non
             end = min(max(value, low), high) if math.isfinite(value) else 1.0
             axes.barh(y, end - 1.0, 0.3, left=1.0, color=colour)
             axes.plot([end], [y], "|", color=colour, ms=14, mew=2, clip_on=False)
-            text = format_number(value) if math.isfinite(value) else "not finite"
+            text = format_residual(value) if math.isfinite(value) else "not finite"
             axes.annotate(
                 text, (max(end, 1.0), y), xytext=(7, 0), textcoords="offset points",
                 va="center", ha="left", annotation_clip=False,

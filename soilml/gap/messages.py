@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy
 from soilml.gap.results import GapReport
 from soilml.gap.verdict.decision import NOT_DECISIVE
-from soilml.report.numbers import decimal
+from soilml.report.numbers import decimal, format_residual
 
 #: Suspects that the sentence lists.
 LISTED_SUSPECTS = 3
@@ -36,7 +36,7 @@ def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
             declared = " and the declared discrepancy" if report.model.discrepancy else ""
             return (
                 f"Model and measurements agree within the noise{declared}: mean squared residual "
-                f"{decimal(report.gap['train'].before, 2)}, p = {decimal(report.p_gap, 2)}."
+                f"{format_residual(report.gap['train'].before, 2)}, p = {decimal(report.p_gap, 2)}."
             )
         case "undecided":
             return (
@@ -80,9 +80,10 @@ def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
 
 def _reduction(figures: GapReduction) -> str:
     """The gap before and after, and why it grows where it does."""
+    before, after = format_residual(figures.before), format_residual(figures.after)
     grows = "; it grows because the fit leaves a smooth discrepancy, which is not subtracted"
     return (
-        f"mean squared residual {decimal(figures.before)} -> {decimal(figures.after)} "
+        f"mean squared residual {before} -> {after} "
         f"(noise alone gives 1{grows if figures.after > figures.before else ''})"
     )
 

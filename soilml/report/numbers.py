@@ -59,6 +59,11 @@ def decimal(value: float, digits: int = 3) -> str:
     return f"{value:.{max(0, digits - 1 - exponent)}f}"
 
 
+def format_residual(x: float, digits: int = 3) -> str:
+    """A mean squared residual; those far below that of noise are not told apart."""
+    return "< 0.001" if 0.0 <= x < 1e-3 else format_number(x, digits)
+
+
 def format_number(x: float, digits: int = 3) -> str:
     """A number to this many significant digits: 320, 1.00, 0.0832, 1.2 × 10⁷; a dash for NaN."""
     if math.isnan(x):

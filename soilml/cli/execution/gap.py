@@ -23,6 +23,7 @@ from soilml.io.read_table import RUNS
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
+from soilml.report.numbers import format_residual
 from soilml.report.origin import Origin
 from soilml.report.terminal import rounded, shown_unit, significant
 
@@ -141,9 +142,13 @@ def _text(report: Any) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+def _residual(x: float) -> str:
+    return significant(x, 3) if not x < 1e-3 else format_residual(x)
+
+
 def _gap_table(report: Any) -> str:
     rows = [
-        (name.replace("_", " "), significant(s.before, 3), significant(s.after, 3), s.description)
+        (name.replace("_", " "), _residual(s.before), _residual(s.after), s.description)
         for name, s in report.gap.items()
     ]
     return format_table(("gap", "before", "after", "rows"), rows, last_left=True) if rows else ""

@@ -10,7 +10,7 @@ from soilml.gap.gap_figure import TITLES, Bar, draw_bars
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.results import GapReport
 from soilml.report.figure_style import SvgImage, new_figure, report_style, svg_image
-from soilml.report.numbers import channel_name, format_number
+from soilml.report.numbers import channel_name, format_residual
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,6 @@ def _as_text(rows: Sequence[Bar]) -> str:
     """The rows of a chart as its text alternative."""
     parts = []
     for row in rows:
-        after = "" if math.isnan(row.after) else f" before, {format_number(row.after)} after"
-        parts.append(f"{row.label} {format_number(row.before)}{after}")
+        after = "" if math.isnan(row.after) else f" before, {format_residual(row.after)} after"
+        parts.append(f"{row.label} {format_residual(row.before)}{after}")
     return "; ".join(parts)

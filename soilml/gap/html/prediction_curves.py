@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.report_parts import ReadingsAndPredictions
+from soilml.identification.data.levels import load_levels
 from soilml.quantities import Z_90
 from soilml.report.figure_style import (
     AFTER,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.bool_]
 
 #: Colours of loads from light to heavy (the colour map plasma without its yellow), and markers that
 #: distinguish the runs in grey prints.
@@ -45,38 +47,57 @@ MOST_RUNS = 6
 
 def prediction_curves(curves: ReadingsAndPredictions, changed: bool) -> dict[str, Any]:
     """A figure for each channel, and the legend of the runs."""
-    runs = select_runs(curves)
+    runs, parts = select_runs(curves), runs_at_one_load(curves)
     return {
         "panels": [_channel_figure(curves, i, runs, changed) for i in range(len(curves.channels))],
         "runs": [_legend_entry(run) for run in runs],
-        "of": len(set(curves.run)),
+        "of": len(parts),
+        "several_loads": len(parts) > len(set(curves.run)),
         "hidden": bool(curves.held_out.any()),
     }
 
 
 @dataclass(frozen=True)
 class ShownRun:
-    """A run in the figure: its name, its load (N), its colour and its marker."""
+    """A run in the figure, at one level of load: its name, its load (N), colour and marker."""
 
     run: str
     load: float
     colour: str
     marker: str
+    rows: Rows
+
+
+def runs_at_one_load(curves: ReadingsAndPredictions) -> dict[tuple[str, float], Rows]:
+    """Readings (m,) of each run at each of its loads, by the run and the median load (N).
+
+    A line through all readings of a run would jump between its loads. Loads of which each has
+    several slips were set; others count by their levels.
+    """
+    names, found = np.asarray(curves.run), {}
+    for run in dict.fromkeys(curves.run):
+        own = names == run
+        driven = np.unique(np.stack([curves.load[own], curves.slip[own]]), axis=1)
+        loads, slips = np.unique(driven[0], return_counts=True)
+        number = np.arange(len(loads)) if slips.min() > 1 else load_levels(loads).index
+        for k in range(int(number.max()) + 1):
+            rows = own & np.isin(curves.load, loads[number == k])
+            found[str(run), float(np.median(curves.load[rows]))] = rows
+    return found
 
 
 def select_runs(curves: ReadingsAndPredictions) -> list[ShownRun]:
     """Runs spread over the measured loads, the lightest first; one per load where loads vary."""
-    loads: dict[str, list[float]] = {}
-    for run, load in zip(curves.run, curves.load, strict=True):
-        loads.setdefault(run, []).append(float(load))
-    ordered = sorted((float(np.median(v)), str(k)) for k, v in loads.items())
+    parts = runs_at_one_load(curves)
+    ordered = sorted((load, run) for run, load in parts)
     by_load = {f"{load:.3g}": (load, run) for load, run in reversed(ordered)}
     options = sorted(by_load.values()) if len(by_load) > 1 else ordered
     picked = np.unique(np.linspace(0, len(options) - 1, MOST_RUNS).round().astype(int))
     colours = np.linspace(0, len(LOAD_COLOURS) - 1, len(picked)).round().astype(int)
+    shown = [options[i] for i in picked]
     return [
-        ShownRun(options[i][1], options[i][0], LOAD_COLOURS[k], MARKERS[j])
-        for j, (i, k) in enumerate(zip(picked, colours, strict=True))
+        ShownRun(run, load, LOAD_COLOURS[k], MARKERS[j], parts[run, load])
+        for j, ((load, run), k) in enumerate(zip(shown, colours, strict=True))
     ]
 
 
@@ -93,9 +114,8 @@ def _channel_figure(
         canvas = new_figure(460)
         top = canvas.add_axes((0.14, 0.47, 0.83, 0.475))
         low = canvas.add_axes((0.14, 0.1, 0.83, 0.265), sharex=top)
-        names = np.asarray(curves.run)
         for run in runs:
-            here = np.flatnonzero((curves.channel == number) & (names == run.run))
+            here = np.flatnonzero((curves.channel == number) & run.rows)
             if here.size:
                 _plot_run(top, curves, here[np.argsort(curves.slip[here])], factor, run, changed)
         top.set_title(
