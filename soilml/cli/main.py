@@ -146,8 +146,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         number of the signal for a signal that asks the process to stop. `papers` gives 1 where a
         number is not reproduced. An output file is complete or absent in every case.
     """
-    with StopSignals():
-        status = _run(arguments)
+    try:
+        with StopSignals():
+            status = _run(arguments)
+    except (KeyboardInterrupt, Terminated) as stop:  # while the data of the command were freed
+        status = _interrupted(stop)
     if arguments is None and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process ends; all is said
     return status
@@ -169,10 +172,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except SoilmlError as error:
         return fail(str(error), 2)
     except (KeyboardInterrupt, Terminated) as stop:
-        code = stop.code if isinstance(stop, Terminated) else 128 + signal.SIGINT
-        written = f"complete before that: {', '.join(replaced)}" if replaced else ""
-        said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")
-        return fail(said, int(code or 0))
+        return _interrupted(stop)
     except BrokenPipeError:
         silence_stdout()
         return 0
@@ -187,6 +187,14 @@ def _run(arguments: Sequence[str] | None) -> int:
         return fail(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
     except MemoryError:
         return fail("this machine has too little memory for the command: ask for fewer rows", 2)
+
+
+def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:
+    """Say that a signal stopped the command, and what was complete; returns the exit status."""
+    code = stop.code if isinstance(stop, Terminated) else 128 + signal.SIGINT
+    written = f"complete before that: {', '.join(replaced)}" if replaced else ""
+    said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")
+    return fail(said, int(code or 0))
 
 
 def _join_negative_values(words: list[str]) -> list[str]:
