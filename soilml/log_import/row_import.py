@@ -11,6 +11,7 @@ from soilml.io.table import Table
 from soilml.log_import.channels.inputs import channel_constant, our_slip
 from soilml.log_import.channels.runs import Run, run_names
 from soilml.log_import.channels.shared_errors import shared_errors
+from soilml.log_import.channels.slopes import slope_of
 from soilml.log_import.channels.wheel_quantities import constants_of
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
@@ -133,8 +134,8 @@ def _channel(run: Run, channel: Channel, count: int) -> tuple[Floats, Floats]:
     if not channel.columns:
         return np.full(count, channel_constant(run, channel)), np.zeros(count)
     read = [run.find(address)[1] for address in channel.columns]
-    if channel.role == "slope" and len(read) == 3:
-        given = channel.scale * np.arctan2(read[0], np.hypot(read[1], read[2]))
+    if channel.role == "slope":
+        given = channel.scale * slope_of(read)
     else:
         given = channel.scale * sum(read[1:], start=read[0])
         given = given / len(read) if channel.role == "sinkage" else given

@@ -16,6 +16,7 @@ from soilml.log_import.channels.resampling import (
     unwrapped,
 )
 from soilml.log_import.channels.runs import Run
+from soilml.log_import.channels.slopes import slope_of
 from soilml.log_import.mapping.channel import Channel
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.recording import Floats
@@ -118,9 +119,8 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
 def _add(inputs: Inputs, channel: Channel, sampled: list[Floats]) -> None:
     """Add a channel in the units of soilml; places are added with their rate."""
     role, grid = channel.role, inputs.time
-    if role == "slope" and len(sampled) == 3:
-        forward, side, up = sampled
-        inputs.values[role] = channel.scale * np.arctan2(forward, np.hypot(side, up))
+    if role == "slope":
+        inputs.values[role] = channel.scale * slope_of(sampled)
     elif role == "position":
         place = channel.scale * along_path(sampled)
         inputs.places[role] = place

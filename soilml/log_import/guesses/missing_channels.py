@@ -11,6 +11,9 @@ from soilml.log_import.guesses.stated_constants import number_in_names
 from soilml.log_import.guesses.toml_value import toml_value
 from soilml.log_import.mapping.channel import ROLES
 
+#: Words of a torque, also in the name of the force that measures it on a lever.
+_OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
+
 
 def load_lines(
     found: Assignment,
@@ -71,6 +74,26 @@ def load_lines(
     ]
 
 
+def _slip_of_heads(
+    stated: dict[str, tuple[str, str]], heads: dict[str, tuple[str, str, list[str]]]
+) -> list[str]:
+    """A slip that the lines before the headers state, of all logs together or of each its own."""
+    if "slip" in stated:
+        value, line = stated["slip"]
+        return ["", "[slip]", f'value = "{value} +- 0.01"  # stated in the log: {line[:60]}']
+    if "slip" not in heads:
+        return []
+    pattern, unit, values = heads["slip"]
+    large = max(float(value.split()[0]) for value in values) > 1.0
+    return [
+        "",
+        "[slip]",
+        f"head = {toml_value(pattern)}  # the logs state {', '.join(values[:4])}",
+        f"unit = {toml_value(unit or ('%' if large else '1'))}",
+        "noise = 0.01  # CHANGE: how far the slip may be from what was set",
+    ]
+
+
 def absent_lines(
     role: str,
     found: Assignment,
@@ -82,6 +105,8 @@ def absent_lines(
     """What stands for another role that no column has: what is needed, or the runner-up."""
     others: list[Candidate] = found.others.get(role, [])
     if role == "slip" and not ({"position", "ground_speed"} & found.roles()):
+        if lines := _slip_of_heads(stated, heads):
+            return lines
         in_name = number_in_names("slip", run_names)
         if in_name is not None:
             return [
@@ -115,6 +140,15 @@ def absent_lines(
             "",
             "# NEEDED for a soil: no column is a torque. One of these:",
             "# [torque]",
+            *(
+                line
+                for c in columns
+                if c.kind == "N" and _OF_TORQUE & {*words_of(c.name)}
+                for line in (
+                    f"# column = {toml_value(c.address)}",
+                    '# scale = "0.2 N m +- 1 %"  # 1 N on a lever arm of 0.2 m',
+                )
+            ),
             "# [motor_current]",
         ]
     if role == "ground_speed" and not ({"position", "slip"} & found.roles() or others):

@@ -23,12 +23,15 @@ _STATED = {
     "torque_constant": (r"(?:torque[ _]?const\w*|kt|k_t|km)", "N m/A"),
     "efficiency": (r"(?:gear[ _]?)?(?:efficiency|eta|wirkungsgrad)", "1"),
     "counts_per_turn": (r"(?:cpr|ppr|counts[ _]?per[ _]?(?:turn|rev\w*)|resolution)", "1"),
+    "rated_torque": (r"(?:rated|nominal|nenn)[ _-]?(?:torque|(?:dreh)?moment)", "N m"),
+    "rated_current": (r"(?:rated|nominal|nenn)[ _-]?(?:current|strom)", "A"),
     "mass": (r"(?:mass|masse|rover[ _]?mass|vehicle[ _]?mass)", "kg"),
     "ground_speed": (
         r"(?:carriage|cart|travel|trolley|ground|traverse|forward|wagen|schlitten|vorschub)[ _]?"
         r"(?:speed|velocity|feed|geschwindigkeit)",
         "m/s",
     ),
+    "slip": (r"(?:target|set|commanded|nominal|soll)?[ _-]?(?:slip|schlupf)(?:[ _]?ratio)?", "1"),
     "load": (r"(?:normal[ _]?|vertical[ _]?|wheel[ _]?)?(?:load|weight)", "N"),
 }
 _WHEELS = re.compile(
@@ -38,7 +41,7 @@ _WHEELS = re.compile(
 _IN_NAMES = (
     ("load", r"(?<![a-z])(?:load|w|fz|fn|n)[_=-]?(\d+(?:[.p]\d+)?)n?(?![a-z0-9])", "N"),
     ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)n(?![a-z0-9])", "N"),
-    ("load", r"(?<![a-z0-9.])(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
+    ("load", r"(?<![a-z0-9.])(?:load|weight|w|m|fz|fn)?[_=-]?(\d+(?:\.\d+)?)kg(?![a-z0-9])", "kgf"),
     ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
     ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
 )

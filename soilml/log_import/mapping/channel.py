@@ -26,7 +26,7 @@ ROLES: dict[str, tuple[str, str]] = {
     "load": ("N", "vertical load on the wheel"),
     "drawbar_pull": ("N", "pull of the wheel on its axle"),
     "sinkage": ("m", "sinkage of the wheel"),
-    "slope": ("rad", "pitch or slope of the ground, positive uphill; or three accelerations"),
+    "slope": ("rad", "slope of the ground, positive uphill; or accelerations, or a quaternion"),
 }
 #: Channels that an encoder before the gearbox, or a motor, may give.
 GEARED = ("wheel_speed", "wheel_angle", "torque", "motor_current")
@@ -35,7 +35,7 @@ SLIP_DEFINITIONS = ("1 - v/(r omega)", "v/(r omega)", "(r omega - v)/v")
 #: How many columns a channel may have, where more than one: x, y, z; cells that are added up;
 #: sensors of which the mean is taken.
 _SEVERAL: dict[str, Sequence[int]] = {
-    "position": (1, 2, 3), "slope": (1, 3), "load": range(1, 9), "drawbar_pull": range(1, 9),
+    "position": (1, 2, 3), "slope": (1, 3, 4), "load": range(1, 9), "drawbar_pull": range(1, 9),
     "sinkage": range(1, 5),
 }  # fmt: skip
 _EXACT, _NOTHING = Uncertain(1.0), Uncertain(0.0)
@@ -128,8 +128,8 @@ def take_channel(settings: Settings, role: str) -> Channel:
         if dimension(unit or "count") not in ("count", "count/s"):
             settings.fail(f"counts_per_turn is given, and unit is {unit!r}; needed is 'count'")
         scale = 2.0 * math.pi / turn
-    elif role == "slope" and len(columns) == 3:
-        scale = 1.0  # an angle of gravity, whatever the unit of the accelerations
+    elif role == "slope" and len(columns) > 1:
+        scale = 1.0  # an angle, whatever the unit of accelerations
     else:
         scale = factor(unit, ours, where)
     if settings.take("reverse", bool, "true or false", False):

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from soilml.errors import InputError
+from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.recording import Recording
 
 #: Ending -> module and function; any other ending is read as text.
@@ -44,6 +45,6 @@ def read_log(path: str | Path) -> list[Recording]:
     found = import_module(f"soilml.log_import.readers.{module}")
     read: Callable[[Path], list[Recording]] = getattr(found, function)
     try:
-        return read(file)
+        return [without_codes(recording) for recording in read(file)]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

@@ -8,6 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from soilml.log_import.units.unit_names import known_unit
+
 #: Cells that stand for a missing number.
 MISSING = frozenset(
     (
@@ -39,6 +41,10 @@ _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{
 _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
 _SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
+#: A quantity over its unit, as `Zeit / s` and `T in N m`.
+_OVER_UNIT = re.compile(r"^(.+?\w)\s+(?:/|in)\s+(\S.{0,15})$")
+#: A name with its unit in brackets, or a word.
+_NAMED = re.compile(r"[^\s\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))?")
 #: What stands before units in a line of comment.
 _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*", re.IGNORECASE)
 _SEPARATORS = (";", "\t", ",", "|")
@@ -109,6 +115,8 @@ def is_number(cell: str, decimal_comma: bool = False) -> bool:
 
 def name_and_unit(cell: str) -> tuple[str, str]:
     """Name and unit of a header such as `Fz [N]` or `speed (mm/s)`; the unit is "" without one."""
+    if (match := _OVER_UNIT.match(cell)) and known_unit(_bare(match[2])):
+        return match[1].strip(), _bare(match[2])
     match = _BRACKETS.match(cell)
     if match and match[1].strip():
         return match[1].strip(), match[2].strip()
@@ -198,6 +206,10 @@ def _header(
 def _header_cells(text: str, separator: str, width: int) -> list[str]:
     """The cells of a line before the samples; names may have another separator than the samples."""
     cells = split_line(text, separator)
+    if separator == " " and len(cells) != width:
+        for own in (re.split(r"\s{2,}", text), _NAMED.findall(text)):
+            if len(own) == width and not any(is_number(cell) for cell in own):
+                return own
     for other in _SEPARATORS if separator == " " or len(cells) < width else ():
         own = split_line(text, other)
         if len(own) == width and not any(is_number(cell) for cell in own):
@@ -207,11 +219,13 @@ def _header_cells(text: str, separator: str, width: int) -> list[str]:
 
 def _are_units(cells: list[str]) -> bool:
     """Whether the cells of a line below the header look like units."""
-    from soilml.log_import.units.unit_names import known_unit
-
     texts = [cell.strip("[](){} ") for cell in cells]
     texts = [text for text in texts if text not in ("", "-")]
     return bool(texts) and sum(known_unit(text) for text in texts) > len(texts) / 2
+
+
+def _bare(unit: str) -> str:
+    return unit.strip().strip("[](){}").strip()
 
 
 def _plain(line: str) -> str:

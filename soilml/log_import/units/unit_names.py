@@ -44,6 +44,11 @@ _SUFFIXES = (
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
     "newtons amps inc mn mm_min cm_min m_min mv uv"
 )
+#: Per cent of something that a data sheet states.
+_SHARE = re.compile(
+    r"(?:%|pct|percent|prozent)[ _]*(?:(?:of|von|vom)\b.*|rated\b.*|nominal\b.*|nenn.*|f\.?s\.?)",
+    re.IGNORECASE,
+)
 _POWER = re.compile(r"([A-Za-z]+)\s*(?:\^|\*\*)?\s*(-?\d)(?!\d)")
 
 
@@ -52,6 +57,8 @@ def spelling(unit: str) -> str:
     text = unit.strip().strip("[](){}").strip()
     if text in _EXACT:
         return _EXACT[text]
+    if _SHARE.fullmatch(text):
+        return "percent"
     text = text.replace("µ", "u").replace("μ", "u").replace("·", "*").replace("⋅", "*")
     text = text.replace("²", "^2").replace("⁻¹", "^-1").replace("⁻", "^-").replace("×", "*")
     if text.lower() in _SPELLINGS and not (text[:1] == "M" and text.lower()[0] == "m"):

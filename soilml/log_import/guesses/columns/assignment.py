@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from soilml.log_import.guesses.columns.axes import accelerations_of, axes_of
+from soilml.log_import.guesses.columns.axes import accelerations_of, axes_of, quaternion_of
 from soilml.log_import.guesses.columns.candidates import Candidate
 from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, wheel_word, words_of
 
@@ -86,9 +86,11 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
     if axes and found.shared.get("position") is place:
         found.parts["position"] = axes
     _take_wheels(found)
-    if not {"slope", "load"} & found.roles() and (gravity := accelerations_of(candidates)):
+    if not {"slope", "load"} & found.roles() and (
+        angle := quaternion_of(candidates) or accelerations_of(candidates)
+    ):
         # the load follows from the mass, on the slope that they show
-        found.shared["slope"], found.parts["slope"] = gravity[0], gravity[1:]
+        found.shared["slope"], found.parts["slope"] = angle[0], angle[1:]
     if {"wheel_speed", "wheel_angle", "rim_speed"} & found.roles() and (
         {"ground_speed", "position"} & found.roles()
     ):

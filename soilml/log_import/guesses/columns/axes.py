@@ -13,6 +13,7 @@ from soilml.log_import.guesses.columns.column_words import words_of
 _OF_A_ROVER = {"odom", "odometry", "vo", "pose", "gps", "marker", "tracking"}
 _ACCELERATIONS = {"acc", "accel", "acceleration", "beschleunigung", "aceleracion", "aceleración"}
 _ACCELERATIONS |= {"accelerazione", "accélération", "ax", "accx", "accelx", "xacc", "acx"}
+_ORIENTATIONS = {"orientation", "quaternion", "quat", "attitude", "orientierung", "q", "qx"}
 #: Gravity as accelerometers show it: g, m/s^2, mg; and how far from it a resting one may be.
 _GRAVITY, _ABOUT = (1.0, 9.80665, 1000.0), 0.06
 _X = re.compile(r"[xX]")
@@ -37,6 +38,20 @@ def axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candidat
         if others:
             return [column, *others]
     return [column]
+
+
+def quaternion_of(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Four columns of a quaternion of unit length, x first; empty where there are none."""
+    known = {candidate.address: candidate for candidate in candidates}
+    for column in candidates:
+        if not _ORIENTATIONS & {*words_of(column.address)} or column.address[-1:] not in "xX":
+            continue
+        letters = "yzw" if column.address.endswith("x") else "YZW"
+        others = [known.get(column.address[:-1] + letter) for letter in letters]
+        found = [column, *(other for other in others if other is not None)]
+        if len(found) == 4 and abs(sum(c.about.middle**2 for c in found) - 1.0) < _ABOUT:
+            return found
+    return []
 
 
 def accelerations_of(candidates: Sequence[Candidate]) -> list[Candidate]:

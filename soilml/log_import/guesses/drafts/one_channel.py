@@ -22,7 +22,7 @@ _SEVERAL = {
     "load": "CHANGE: cells that carry the wheel together are added; leave out others",
     "drawbar_pull": "CHANGE: cells that pull together are added; leave out others",
     "sinkage": "the mean of them",
-    "slope": "CHANGE: accelerations forward, to the left and up",
+    "slope": "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w",
 }
 
 
@@ -46,7 +46,7 @@ def draft_of(
         moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
                      (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
     if role == "slope" and more:
-        return draft  # an angle between accelerations, whatever their unit
+        return draft  # an angle, whatever the unit of accelerations
     unit, why = guess_unit(role, column, moving)
     if role == "position" and dimension(unit) == "count":
         draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
@@ -60,9 +60,17 @@ def draft_of(
             f"CHANGE: what 1 {unit} is, from the calibration of the sensor",
         )  # fmt: skip
     elif dimension(unit) == "1" and role in ("torque", "motor_current"):
-        one = "0.01 N m" if role == "torque" else "0.01 A"
-        rated = "torque" if role == "torque" else "current"
-        draft.put("scale", one, f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
+        rated, one = ("torque", "N m") if role == "torque" else ("current", "A")
+        said = stated.get(f"rated_{rated}")
+        draft.put(
+            "scale",
+            f"{float(said[0].split()[0]) / 100:g} {' '.join(said[0].split()[1:])}"
+            if said
+            else f"0.01 {one}",
+            f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
+            if said
+            else f"CHANGE: what 1 % is, a hundredth of the rated {rated}",
+        )
     elif dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
         known_turn = "counts_per_turn" in stated
