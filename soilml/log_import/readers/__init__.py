@@ -17,11 +17,20 @@ from soilml.log_import.recording import Recording
 _READERS = {
     ".parquet": ("parquet_log", "read_parquet_log"),
     ".mat": ("matlab", "read_matlab"),
+    ".h5": ("matlab", "read_matlab"),
+    ".hdf5": ("matlab", "read_matlab"),
+    ".json": ("json_lines", "read_json_log"),
+    ".jsonl": ("json_lines", "read_json_log"),
+    ".ndjson": ("json_lines", "read_json_log"),
     ".mcap": ("bags", "read_bag"),
     ".bag": ("bags", "read_bag"),
 }
-#: Endings of spreadsheets, which are no logs.
-_SPREADSHEETS = (".xls", ".xlsx", ".ods")
+#: What to do with files of other kinds, by their ending.
+_OTHERS = {
+    **dict.fromkeys((".xls", ".xlsx", ".ods"), "is a spreadsheet; save its sheet as CSV"),
+    **dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".tar"), "is packed; unpack it"),
+    ".tdms": "is a binary file of LabVIEW; save it as text (.lvm or CSV)",
+}
 
 
 def read_log(path: str | Path) -> list[Recording]:
@@ -30,8 +39,8 @@ def read_log(path: str | Path) -> list[Recording]:
     if not file.exists():
         raise InputError(f"{file}: there is no such file")
     suffix = file.suffix.lower()
-    if suffix in _SPREADSHEETS:
-        raise InputError(f"{file} is a spreadsheet; save its sheet as CSV and import that")
+    if suffix in _OTHERS and file.is_file():
+        raise InputError(f"{file} {_OTHERS[suffix]} and import that")
     if suffix == ".db3":
         file = file.parent
     if file.is_dir():

@@ -1,4 +1,4 @@
-"""MATLAB files: variables and nested structs; timeseries of Simulink; version 7.3 by h5py."""
+"""MATLAB files: variables and nested structs; timeseries of Simulink; HDF5, as version 7.3 is."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
         import h5py
     except ImportError:
         raise InputError(
-            f"{path} is a MATLAB file of version 7.3, which needs h5py: pip install "
+            f"{path} is an HDF5 file, as MATLAB 7.3 writes them, which needs h5py: pip install "
             "'soilml[logs]'; or save it in MATLAB with save(..., '-v7')"
         ) from None
     leaves: list[tuple[str, Any]] = []
@@ -148,5 +148,5 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
         with h5py.File(path, "r") as opened:
             opened.visititems(visit)
     except OSError as error:
-        raise InputError(f"{path} is not a complete MATLAB file: {error}") from None
+        raise InputError(f"{path} is not a complete HDF5 file: {error}") from None
     return leaves, tuple(about)

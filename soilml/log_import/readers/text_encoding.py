@@ -35,7 +35,7 @@ def decode_text(data: bytes, file: Path) -> tuple[str, str]:
     if b"\0" in head:
         raise InputError(
             f"{file} is not a text file, and its name has no ending of another format; known are "
-            ".csv, .txt, .tsv, .dat, .parquet, .mat, .mcap and .bag"
+            ".csv, .txt, .tsv, .dat, .json, .parquet, .mat, .h5, .mcap and .bag"
         )
     try:
         return data.decode("utf-8"), "utf-8"

@@ -85,6 +85,11 @@ def test_times_of_day_are_seconds():
         ("a.csv", b"no numbers here\nat all\n", "no line of this file looks like samples"),
         ("a.bin", bytes(range(256)) * 20, "is not a text file"),
         ("a.xlsx", b"PK", "save its sheet as CSV"),
+        ("a.csv.gz", b"PK", "unpack it and import that"),
+        ("a.tdms", b"TDSm", "save it as text"),
+        ("a.json", b"[1, 2, 3]", "needed is a JSON object with numbers for each sample"),
+        ("a.jsonl", b'{"t": 0}\nno\n', "needed is a JSON object with numbers for each sample"),
+        ("a.h5", b"\x89HDF cut off", "is not a complete HDF5 file"),
         ("a.mat", b"MATLAB 5.0 MAT-file, cut off" + bytes(200), "is not a complete MATLAB file"),
         ("a.parquet", b"PAR1", "is not a complete Parquet file"),
         ("a.mcap", b"not mcap", "cannot be read as a bag"),
@@ -94,6 +99,8 @@ def test_times_of_day_are_seconds():
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path, name, content, words):
     if name in ("a.mcap", "a.bag"):
         pytest.importorskip("rosbags")
+    if name == "a.h5":
+        pytest.importorskip("h5py")
     (tmp_path / name).write_bytes(content)
     with pytest.raises(SoilmlError, match=words) as raised:
         read_log(tmp_path / name)

@@ -1,0 +1,71 @@
+"""JSON logs: one object for each sample, line by line or in one array; or an object of columns."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from soilml.errors import InputError
+from soilml.log_import.readers.message_fields import TopicColumns
+from soilml.log_import.readers.text_encoding import decode_text
+from soilml.log_import.recording import Recording
+
+#: Fewer samples are none, as in text logs.
+_FEWEST = 3
+
+
+def read_json_log(path: Path) -> list[Recording]:
+    """The numbers of a JSON log by dotted name, and its texts.
+
+    Lines that are no object are left out. Raises `InputError` where it has no samples.
+    """
+    text, _ = decode_text(path.read_bytes(), path)
+    samples, bad = _samples(text)
+    notes = (f"{bad} lines are no JSON objects and are left out",) if bad else ()
+    found = TopicColumns()
+    for number, sample in enumerate(samples):
+        found.add(float(number), sample)
+    columns = found.columns() if len(samples) >= _FEWEST else {}
+    if not columns:
+        raise InputError(
+            f"{path}: needed is a JSON object with numbers for each sample, one a line or in one "
+            "array, or one object of columns"
+        )
+    names = dict.fromkeys(k for s in samples for k, v in s.items() if isinstance(v, str))
+    texts = {name: [str(s.get(name, "")) for s in samples] for name in names}
+    return [Recording("", path, columns, texts, notes=notes)]
+
+
+def _samples(text: str) -> tuple[list[dict[str, Any]], int]:
+    """The objects of a log, and how many lines are none."""
+    try:
+        whole = json.loads(text)
+    except (ValueError, RecursionError):
+        whole = None
+    if isinstance(whole, dict):
+        whole = _rows_of_columns(whole)
+    if whole is not None:
+        rows = [row for row in whole if isinstance(row, dict)] if isinstance(whole, list) else []
+        return rows, 0
+    rows, bad = [], 0
+    for line in text.splitlines():
+        if not line.strip():
+            continue
+        try:
+            row = json.loads(line)
+        except (ValueError, RecursionError):
+            row = None
+        if isinstance(row, dict):
+            rows.append(row)
+        else:
+            bad += 1
+    return rows, bad
+
+
+def _rows_of_columns(columns: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows of the lists of an object that have the length of the longest."""
+    lists = {name: cells for name, cells in columns.items() if isinstance(cells, list)}
+    count = max((len(cells) for cells in lists.values()), default=0)
+    lists = {name: cells for name, cells in lists.items() if len(cells) == count}
+    return [{name: cells[i] for name, cells in lists.items()} for i in range(count)]
