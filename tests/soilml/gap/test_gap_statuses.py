@@ -1,0 +1,252 @@
+"""The status of a report, from searches that are made up: each rule and its limit."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.posterior import (
+    MAX_CHANCE_CLASS,
+    MAX_CHANCE_NAME,
+    REJECTION_THRESHOLD,
+    Posterior,
+    explanations,
+    not_rejected,
+)
+from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.verdict import decision
+from soilml.gap.verdict.decision import (
+    DECISIVE_GAIN,
+    IMPLAUSIBLE_FAULT,
+    LARGE_REMAINDER,
+    MAX_SIZE_DEVIATION,
+    NOT_DECISIVE,
+    SUSPECT_MARGIN,
+    cause_set,
+    decide,
+    is_left_open,
+    reasons,
+    unclaimed_effects,
+    with_refused_outside,
+)
+from soilml.numerics.prior import Prior
+
+PROBLEM = SimpleNamespace(readings=SimpleNamespace(channels=("torque", "drawbar_pull")))
+REJECTED, KEPT = SimpleNamespace(p_value=1e-9), SimpleNamespace(p_value=0.5)
+
+
+def size(effect, is_shape=False):
+    return EffectCoordinate(
+        "n1", "1", -99.0, 99.0, Prior(0.0, 1.0), effect=effect, is_shape=is_shape
+    )
+
+
+def marginal(value, amplitude=(0.0, 0.0), coordinates=(), x=()):
+    precision = np.ones(len(x))
+    fit = SimpleNamespace(coordinates=list(coordinates), x=np.asarray(x), precision=precision)
+    amplitude = np.asarray(amplitude, dtype=float)
+    return MarginalFit(fit, Evidence(value, amplitude, np.zeros(len(x)), amplitude))
+
+
+def candidate(names, objective, amplitude=(0.0, 0.0), **fit):
+    """A candidate whose objective, the penalty of its effects included, is that given."""
+    names = tuple(names.split("+")) if names else ()
+    own = marginal(objective - EFFECT_PENALTY * len(names), amplitude, **fit)
+    return CandidateFit(names, own, own)
+
+
+def searched(*candidates, accepted=1, adequate=True, gap=True, weights=None):
+    """A search with these candidates, of which the first ones with effects are accepted."""
+    with_effects = [c for c in candidates if c.names]
+    weights = weights or {c.names: -0.5 * c.objective for c in candidates}
+    return SearchResult(
+        soil=None,
+        soil_test=REJECTED if gap else KEPT,
+        accepted=tuple(with_effects[:accepted]),
+        candidates=candidates,
+        final_test=KEPT if adequate else REJECTED,
+        predicted_gain={},
+        posterior=Posterior(weights),
+    )
+
+
+NONE = candidate("", 100.0, amplitude=(0.5, 0.0))
+DIG, PLOUGH = candidate("dig", 20.0), candidate("plough", 22.0)
+
+
+def status(result, obstacles=(), disagreements=()):
+    return decide(PROBLEM, result, obstacles, disagreements).status
+
+
+@pytest.fixture
+def law(monkeypatch):
+    """Whether the law of an effect matters."""
+    found = SimpleNamespace(matters=True)
+    monkeypatch.setattr(decision, "law_matters", lambda problem, best: found.matters)
+    return found
+
+
+def test_without_a_gap_what_disagrees_decides():
+    quiet = searched(NONE, DIG, gap=False)
+    assert status(quiet) == "no-gap"
+    assert status(quiet, ["one load only"]) == "no-gap"
+    assert status(quiet, disagreements=["runs differ"]) == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("none", "effects", "left_open"),
+    [
+        (candidate("", 20.0), [candidate("dig", 20.0)], True),  # the effect is no better
+        (candidate("", 20.1), [candidate("dig", 20.0)], False),
+        (candidate("", 10.0, amplitude=(0.0, 0.1)), [candidate("dig", 20.0)], False),
+        (candidate("", 20.0), [], True),
+    ],
+)
+def test_a_rejected_soil_without_anything_better_is_left_open(none, effects, left_open):
+    result = searched(none, *effects)
+    assert is_left_open(result) == left_open
+    assert (status(result) == "undecided") == left_open
+    assert not is_left_open(searched(none, *effects, gap=False))
+
+
+def test_one_explanation_is_named_and_several_are_a_class():
+    assert status(searched(NONE, DIG)) == "named"
+    assert status(searched(NONE, DIG, PLOUGH, accepted=2)) == "class"
+    assert status(searched(NONE, DIG, adequate=False)) == "partly-named"
+    # a class says nothing of what is left
+    assert status(searched(NONE, DIG, PLOUGH, accepted=2, adequate=False)) == "class"
+
+
+def test_runs_that_cannot_tell_have_suspects_or_nothing():
+    assert SUSPECT_MARGIN != 0.0
+    for above, found in ((-0.01, "suspected"), (0.01, "not-testable")):
+        none = candidate("", 50.0, amplitude=(0.5, 0.0))
+        effect = candidate("dig", 50.0 + SUSPECT_MARGIN + above)
+        assert status(searched(none, effect), ["one load only"]) == found
+
+
+def test_where_the_soil_alone_is_not_rejected_effects_are_suspects_if_they_are_likelier():
+    likelier = candidate("", 20.5, amplitude=(0.5, 0.0))
+    for none, found in ((likelier, "suspected"), (candidate("", 19.5, (0.5, 0.0)), "unknown")):
+        result = searched(none, DIG, accepted=0)
+        assert status(result) == found
+        beside = searched(none, DIG)
+        beside = SearchResult(**{**vars(beside), "accepted": (DIG, none)})
+        assert status(beside) == found
+
+
+def test_a_fault_of_an_implausible_size_is_not_claimed():
+    for x, found in ((0.99, "named"), (1.01, "unknown")):
+        far = candidate("dig", 20.0, coordinates=[size("dig")], x=[-x * MAX_SIZE_DEVIATION])
+        made = decide(PROBLEM, searched(NONE, far), (), ())
+        assert made.status == found
+        assert made.reason == ("" if found == "named" else IMPLAUSIBLE_FAULT)
+
+
+@pytest.mark.parametrize(
+    ("names", "limit"),
+    [("dig", "MAX_SHAPE_DEVIATION"), ("dig+plough", "MAX_SHAPE_DEVIATION_SEVERAL")],
+)
+def test_a_law_far_from_the_catalogues_is_suspected(names, limit):
+    most = getattr(decision, limit)
+    for share, found in ((0.99, "named"), (1.01, "suspected")):
+        x = np.sqrt(share * most)
+        own = candidate(names, 20.0, coordinates=[size("dig", is_shape=True)], x=[x])
+        made = decide(PROBLEM, searched(NONE, own), (), ())
+        assert (made.status, made.shown) == (found, own)
+        assert ("the law of" in made.reason) == (found == "suspected")
+
+
+def test_a_large_remainder_beside_little_evidence_is_suspected():
+    def found(amplitude, gain):
+        best = candidate("dig", 20.0, amplitude=(0.1, amplitude))
+        none = candidate("", 20.0 + gain, amplitude=(5.0, 5.0))
+        return decide(PROBLEM, searched(none, best), (), ())
+
+    for amplitude, gain, expected in (
+        (LARGE_REMAINDER, DECISIVE_GAIN - 0.1, "suspected"),
+        (LARGE_REMAINDER - 0.01, DECISIVE_GAIN - 0.1, "named"),
+        (LARGE_REMAINDER, DECISIVE_GAIN, "named"),
+    ):
+        made = found(amplitude, gain)
+        assert made.status == expected
+        assert ("drawbar pull" in made.reason) == (expected == "suspected")
+
+
+def test_another_law_is_stated_where_it_matters(law):
+    one, other = marginal(15.0), marginal(20.0)
+    free = CandidateFit(("dig",), other, one)
+    assert status(searched(NONE, free)) == "form-open"
+    law.matters = False
+    assert status(searched(NONE, free)) == "named"
+    law.matters = True
+    assert status(searched(NONE, CandidateFit(("dig",), one, one))) == "named"
+    assert status(searched(NONE, free, adequate=False)) == "partly-named"
+
+
+def test_what_is_shown_is_the_suspect_that_is_listed_first():
+    """An effect that was not fitted in full is passed over; other sets count towards theirs."""
+    weights = {(): -5.0, ("dig",): -1.0, ("plough",): -2.0, ("unfitted",): -0.5}
+    result = searched(NONE, PLOUGH, DIG, accepted=0, weights=weights)
+    made = decide(PROBLEM, result, (), ())
+    assert (made.status, made.shown) == ("suspected", DIG)
+    assert unclaimed_effects(made, result) == ("dig",)
+    assert cause_set(made, result) == (("dig",), ("plough",))
+    named = decide(PROBLEM, searched(NONE, DIG), (), ())
+    assert unclaimed_effects(named, searched(NONE, DIG)) == ()
+    assert cause_set(named, searched(NONE, DIG)) == (("dig",),)
+    quiet = searched(NONE, PLOUGH, DIG, gap=False)
+    assert unclaimed_effects(decide(PROBLEM, quiet, (), ()), quiet) == ("plough",)
+
+
+def test_reasons_by_status():
+    suspected = decide(PROBLEM, searched(NONE, DIG, accepted=0), (), ())
+    assert reasons(suspected, [], []) == ()
+    assert reasons(suspected, ["one load only"], []) == ("one load only",)
+    assert reasons(suspected, [], ["a and b", "c and d"]) == (
+        NOT_DECISIVE,
+        "rows driven alike disagree: a and b",
+    )
+    assert reasons(suspected, ["one load only"], ["a and b"])[0] == "one load only"
+    undecided = decide(PROBLEM, searched(NONE, gap=False), (), ["a and b"])
+    assert reasons(undecided, ["one load only"], ["a and b"]) == ("a and b",)
+    testless = decide(PROBLEM, searched(candidate("", 1.0, (1.0, 0.0)), DIG), ["one load"], ())
+    assert reasons(testless, ["one load"], ["a and b"]) == ("one load",)
+    assert reasons(decide(PROBLEM, searched(NONE, DIG), (), ()), [], []) == ()
+
+
+def test_rejection_is_against_the_best_and_parts_stand_for_their_sets():
+    near = candidate("plough", 20.0 + REJECTION_THRESHOLD)
+    far = candidate("slope", 20.01 + REJECTION_THRESHOLD)
+    pair = candidate("dig+slope", 15.0)
+    assert not_rejected([NONE, DIG, near, far]) == (DIG, near)
+    assert not_rejected([NONE, pair, DIG]) == (DIG,)
+    assert not_rejected([NONE]) == ()
+
+
+@pytest.mark.parametrize(
+    ("others", "limit"), [((), MAX_CHANCE_NAME), ((PLOUGH,), MAX_CHANCE_CLASS)]
+)
+def test_the_soil_alone_is_an_explanation_unless_it_is_improbable(others, limit):
+    for share, expected in ((0.99, False), (1.01, True)):
+        chance = share * limit
+        found = Posterior({(): np.log(chance), ("dig",): np.log(1.0 - chance)})
+        kept = explanations([NONE, DIG, *others], found)
+        assert any(not c.names for c in kept) == expected
+        if expected:  # it is a part of every set
+            assert kept == (NONE,)
+
+
+def test_refused_explanations_lend_their_parts_that_are_accepted():
+    """What is refused of a pair is its supplement, where one of its effects is accepted alone."""
+    far = [size("plough")], [2.0 * MAX_SIZE_DEVIATION]
+    pair = candidate("dig+plough", 18.0, coordinates=far[0], x=far[1])
+    alone = candidate("plough", 21.0, coordinates=far[0], x=far[1])
+    result = searched(NONE, DIG, pair, alone)
+    found = with_refused_outside(result).posterior.refused
+    assert found == {("dig", "plough"): frozenset({"dig"}), ("plough",): frozenset()}
+    assert with_refused_outside(searched(NONE, DIG)).posterior.refused == {}

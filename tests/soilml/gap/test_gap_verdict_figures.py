@@ -1,0 +1,294 @@
+"""Figures of a verdict and checks of its data on numbers that are worked out by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from soilml import Table
+from soilml.errors import InputError
+from soilml.gap.data import checks
+from soilml.gap.data.checks import CheckedData, Severity, without_duplicate_rows
+from soilml.gap.data.holdout import split_holdout
+from soilml.gap.design.run_costs import LISTED, check_costs, rank_by_cost
+from soilml.gap.design.run_options import (
+    HIGHEST_SLIP,
+    ROWS_PER_RUN,
+    _middle_load,
+    _usual,
+    _whole,
+    drivable_slips,
+)
+from soilml.gap.report_parts import NextRun
+from soilml.gap.verdict import remaining_discrepancy as remaining
+from soilml.gap.verdict.law_difference import NEGLIGIBLE_FRACTION, law_matters
+
+CHANNELS = ("torque", "sinkage")
+
+
+def made(columns):
+    """A table of lists."""
+    return Table({name: np.asarray(values) for name, values in columns.items()})
+
+
+def stub(**values):
+    return SimpleNamespace(**values)
+
+
+def readings(torque, sinkage=(), slip=None, load=None):
+    channel = np.asarray([0] * len(torque) + [1] * len(sinkage))
+    values = np.asarray([*torque, *sinkage], dtype=float)
+    slip = np.linspace(0.1, 0.5, values.size) if slip is None else np.asarray(slip)
+    load = np.full(values.size, 60.0) if load is None else np.asarray(load)
+    return stub(channels=CHANNELS, channel=channel, reading=values, slip=slip, load=load)
+
+
+@pytest.mark.parametrize(
+    ("free", "std", "matters"),
+    [
+        # the torques span 0 to 4 N m, of which 2 % are 0.08 N m
+        ([0.081] * 4, 0.01, True),
+        ([0.079] * 4, 0.01, False),
+        ([0.16, 0.0, 0.0, 0.0], 0.01, False),  # 0.08 rms
+        ([0.17, 0.0, 0.0, 0.0], 0.01, True),
+        # the standard error of a mean of four readings is half their standard deviation
+        ([0.11] * 4, 0.2, True),
+        ([0.11] * 4, 0.23, False),
+    ],
+)
+def test_a_law_matters_above_the_error_of_a_mean_and_two_per_cent_of_the_range(free, std, matters):
+    assert NEGLIGIBLE_FRACTION == 0.02
+    problem = stub(readings=readings([1.0, 2.0, 3.0, 4.0]), covariance=stub(std=np.full(4, std)))
+    law = stub(fit=stub(prediction=np.zeros(4)))
+    own = stub(fit=stub(prediction=np.asarray(free)))
+    assert law_matters(problem, stub(catalogue_law=law, free_law=own)) == matters
+
+
+def test_the_range_of_a_channel_contains_zero_and_each_channel_counts():
+    def matters(difference, values):
+        given = readings([10.0, 10.5], values)
+        problem = stub(readings=given, covariance=stub(std=np.full(4, 1e-6)))
+        law = stub(fit=stub(prediction=np.zeros(4)))
+        own = stub(fit=stub(prediction=np.asarray([0.0, 0.0, *difference])))
+        return law_matters(problem, stub(catalogue_law=law, free_law=own))
+
+    assert not matters([0.19, 0.19], [9.0, 10.0])  # from 0 to 10
+    assert matters([0.21, 0.21], [9.0, 10.0])
+    assert not matters([0.39, 0.39], [-10.0, 10.0])
+    assert matters([0.41, 0.41], [-10.0, 10.0])
+    assert not matters([0.19, 0.19], [-10.0, -9.0])
+
+
+def discrepancy(columns, amplitude, std, channel):
+    """A problem whose discrepancy has these columns of the process, under white noise."""
+    columns, std = np.asarray(columns, dtype=float), np.asarray(std, dtype=float)
+
+    def whiten(size):
+        covariance = np.diag(std**2) + columns @ np.diag(size[channel] ** 2) @ columns.T
+        return np.linalg.inv(np.linalg.cholesky(covariance))
+
+    process = stub(columns=columns, channel=channel, usual=np.asarray([0.1, 0.002]))
+    marginal = stub(
+        evidence=stub(amplitude=np.asarray(amplitude), expected_amplitude=np.asarray(amplitude)),
+        fit=stub(prediction=np.zeros(len(std))),
+    )
+    return process, whiten, marginal
+
+
+def test_the_remaining_discrepancy_is_the_mean_of_the_process_given_the_residuals():
+    """One constant a channel: shrunk by T^2 n / (T^2 n + s^2) from the mean of n residuals."""
+    columns = [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]
+    process, whiten, after = discrepancy(columns, [2.0, 3.0], [1.0] * 4, np.asarray([0, 1]))
+    given = readings([4.0, 8.0], [-1.0, -3.0], slip=[0.1, 0.2, 0.3, 0.4], load=[60, 60, 80, 80])
+    problem = stub(
+        readings=stub(**vars(given), __len__=None),
+        discrepancy=stub(process=process, whiten=whiten),
+        covariance=stub(std=np.asarray([0.5, 0.5, 2.0, 2.0])),
+        declared_amplitude=np.zeros(2),
+    )
+    found = remaining.posterior_discrepancy(problem, after)
+    torque, sinkage = 6.0 * 8.0 / 9.0, -2.0 * 18.0 / 19.0
+    np.testing.assert_allclose(found, [torque, torque, sinkage, sinkage])
+    _, _, weak = discrepancy(columns, [0.0, 1.0], [1.0] * 4, np.asarray([0, 1]))
+    both = remaining.remaining_discrepancy(problem, weak, after)
+    assert list(both) == ["torque_Nm", "sinkage_m"]
+    one = both["torque_Nm"]
+    assert (one.unit, one.before_value) == ("N m", 0.0)
+    assert one.after_value == pytest.approx(torque)
+    assert one.after_sigma == pytest.approx(torque / 0.5)
+    assert both["sinkage_m"].before_value == pytest.approx(2.0 * 2.0 / 3.0)
+    assert both["sinkage_m"].before_sigma == pytest.approx(2.0 / 3.0)
+    assert one.description == "measured above the model by up to 5.3 N m, at slip 0.10 under 60 N"
+    assert both["sinkage_m"].description.startswith("measured below the model by up to 1.9 m")
+
+
+def test_where_the_discrepancy_is_largest():
+    slip, load = np.asarray([0.1, 0.25]), np.asarray([60.0, 123.4])
+    said = remaining._largest(np.asarray([0.5, -2.0]), slip, load, "N")
+    assert said == "measured below the model by up to 2.0 N, at slip 0.25 under 123 N"
+    assert remaining._largest(np.zeros(2), slip, load, "N") == ""
+
+
+def test_amplitudes_of_the_updated_model_are_those_of_intervals():
+    process, whiten, marginal = discrepancy(
+        np.zeros((4, 2)), [2.0, 0.1 / remaining.INTERVAL_FACTOR], [1.0] * 4, np.asarray([0, 1])
+    )
+    problem = stub(readings=readings([1.0]), discrepancy=stub(process=process, whiten=whiten))
+    found = remaining.discrepancy_amplitudes(problem, marginal)
+    assert found == {"torque_Nm": pytest.approx(0.1 * 2.0 * remaining.INTERVAL_FACTOR)}
+
+
+def severities(check, **values):
+    data = CheckedData(**{"readings": None, "rows": 10, "duplicate_rows": 0, "parameters": 3} |
+                       values)  # fmt: skip
+    return [severity for severity, _ in check(data)]
+
+
+def test_duplicates_are_an_error_from_a_fifth_of_the_table_on():
+    def found(rows, duplicates):
+        return severities(checks._check_duplicate_rows, rows=rows, duplicate_rows=duplicates)
+
+    assert found(10, 0) == []
+    assert found(8, 2) == [Severity.NOTE]
+    assert found(79, 21) == [Severity.ERROR]
+
+
+@pytest.mark.parametrize(("count", "expected"), [(10, [Severity.ERROR]), (11, [])])
+def test_readings_for_three_parameters(count, expected):
+    class Several:
+        channels = CHANNELS
+
+        def __len__(self):
+            return count
+
+    assert severities(checks._check_count, readings=Several()) == expected
+
+
+@pytest.mark.parametrize(
+    ("values", "std", "expected"),
+    [
+        ([1.0, 2.0, 3.0, 4.0], 4e-6, [Severity.ERROR]),
+        ([1.0, 2.0, 3.0, 4.0], 4.1e-6, []),
+        ([1.0, 2.0, 3.0, 4.0], np.nan, [Severity.ERROR]),
+        ([1.0, 1.0, 1.0, 1.0], 0.1, [Severity.ERROR]),
+        ([1.0, 1.0, 1.0], 0.1, []),  # few rows may agree
+    ],
+)
+def test_noise_and_life_of_a_channel(values, std, expected):
+    given = readings(values)
+    given = stub(**vars(given) | {"std": np.full(len(values), std), "channels": ("torque",)})
+    assert severities(checks._check_channels, readings=given) == expected
+
+
+def test_the_first_of_equal_rows_stays():
+    table = made({"slip": [0.1, 0.2, 0.1, 0.1], "torque_Nm": [1.0, 2.0, 1.0, 3.0]})
+    kept, count = without_duplicate_rows(table)
+    assert (kept["slip"].tolist(), kept["torque_Nm"].tolist(), count) == (
+        [0.1, 0.2, 0.1],
+        [1.0, 2.0, 3.0],
+        1,
+    )
+    assert without_duplicate_rows(kept)[0] is kept
+
+
+def test_repeats_give_the_noise_by_their_degrees_of_freedom():
+    """Two groups of four: deviations of 1 and 2 about their means, six degrees of freedom."""
+    values = [9.0, 11.0, 9.0, 11.0, 18.0, 22.0, 18.0, 22.0]
+    given = stub(
+        channels=("torque",), channel=np.zeros(8, dtype=int), reading=np.asarray(values),
+        std=np.full(8, np.nan), driven_alike=np.repeat([3, 7], 4),
+    )  # fmt: skip
+    noise, notes = checks.estimate_repeat_noise(given)
+    assert noise == {"torque": pytest.approx(np.sqrt(20.0 / 6.0))}
+    assert notes == [
+        "noise of torque_Nm is not declared: 1.83 was estimated from repeated rows"
+    ]  # fmt: skip
+    few = stub(**vars(given) | {"driven_alike": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
+    assert checks.estimate_repeat_noise(few) == ({}, [])
+    equal = stub(**vars(given) | {"reading": np.repeat([9.0, 18.0], 4)})
+    noise, notes = checks.estimate_repeat_noise(equal)
+    assert noise == {} and "its repeated rows are equal" in notes[0]
+    known = stub(**vars(given) | {"std": np.ones(8)})
+    assert checks.estimate_repeat_noise(known) == ({}, [])
+
+
+def test_a_quarter_of_the_runs_is_held_out():
+    table = made({"run": list("aabbccddeeffgghh"), "slip": np.arange(16.0)})
+    split = split_holdout(table, "run", seed=1)
+    held = set(split.held_out["run"])
+    assert len(held) == 2 and held | set(split.analysed["run"]) == set("abcdefgh")
+    assert not held & set(split.analysed["run"])
+    assert split.name == "held_out_runs"
+    assert split.description == f"runs {', '.join(sorted(held))}, held out"
+    few = made({"run": list("aabbccdd"), "slip": np.arange(8.0)})
+    assert len(set(split_holdout(few, "run", seed=0).held_out["run"])) == 1
+    with pytest.raises(InputError, match="needs four runs or more; the table has 3"):
+        split_holdout(made({"run": list("abc"), "slip": np.arange(3.0)}), "run", seed=0)
+
+
+def test_rows_with_a_value_are_held_out():
+    table = made({"load_N": [40.0, 80.0, 40.0], "slip": [0.1, 0.1, 0.1]})
+    split = split_holdout(table, "load_N=40", seed=0)
+    assert split.held_out["load_N"].tolist() == [40.0, 40.0]
+    assert (split.name, split.description) == ("held_out_region", "load_N=40, held out")
+    assert split_holdout(table, None, seed=0).held_out is None
+    with pytest.raises(InputError, match="no row remains"):
+        split_holdout(table, "slip=0.1", seed=0)
+    with pytest.raises(InputError, match="needed is run, or COLUMN=VALUE"):
+        split_holdout(table, "runs", seed=0)
+
+
+def test_runs_by_what_they_tell_per_cost():
+    runs = [NextRun(kind, kind, float(d), None) for d, kind in
+            ((6, "heavier"), (5, "braking"), (4, "reverse"))]  # fmt: skip
+    assert [run.kind for run in rank_by_cost(runs, {})] == ["heavier", "braking", "reverse"]
+    ranked = rank_by_cost(runs, {"heavier": 3.0, "reverse": 0.5})
+    assert [(run.kind, run.cost) for run in ranked] == [
+        ("reverse", 0.5),
+        ("braking", 1.0),
+        ("heavier", 3.0),
+    ]
+    assert len(rank_by_cost(runs * 4, {})) == LISTED
+    assert check_costs({"second-pass": 2, "heavier": 0.1}) == {"second pass": 2.0, "heavier": 0.1}
+    for cost in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="needed is a number above zero"):
+            check_costs({"heavier": cost})
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (0.05, 0.6, [0.05, 0.15, 0.2, 0.3, 0.35, 0.45, 0.5, 0.6]),
+        (0.1, 0.2, [0.1, 0.11, 0.13, 0.14, 0.16, 0.17, 0.19, 0.2]),
+        (0.78, 0.95, [0.78, 0.79, 0.8]),
+        (-0.95, -0.78, [-0.8, -0.79, -0.78]),
+    ],
+)
+def test_slips_in_steps_that_a_rig_can_set(low, high, expected):
+    found = drivable_slips(low, high)
+    assert found.tolist() == expected
+    assert found.size <= ROWS_PER_RUN and np.abs(found).max() <= HIGHEST_SLIP
+
+
+@pytest.mark.parametrize(
+    ("load", "expected"), [(123.4, 123.0), (10.4, 10.0), (9.87, 9.9), (0.1234, 0.12), (99.6, 100.0)]
+)
+def test_loads_in_whole_newton_or_two_digits(load, expected):
+    assert _whole(load) == expected
+
+
+def test_the_middle_load_is_the_level_nearest_the_mean_logarithm():
+    levels = stub(index=np.asarray([0, 0, 0, 1, 2]), count=3)
+    given = stub(load=np.asarray([20.0, 20.4, 20.8, 60.0, 180.0]), load_levels=levels)
+    # the mean logarithm is that of 37.6 N: nearer to 60 than to 20.4, as ratios
+    assert _middle_load(given) == 60.0
+    heavy = stub(load=np.asarray([20.0, 20.4, 20.8, 100.0, 180.0]), load_levels=levels)
+    assert _middle_load(heavy) == 20.0
+
+
+def test_covariates_as_most_rows_were_driven():
+    at = stub(speed=np.asarray([-0.1, 0.1, 0.1234]), pass_number=np.asarray([3.0, 1.0, 2.0]),
+              slip_angle=None)  # fmt: skip
+    assert _usual(stub(at=at)) == {"speed": 0.1, "pass_number": 1.0}
+    slow = stub(speed=np.asarray([0.01234]), pass_number=None, slip_angle=np.asarray([0.2, 0.1]))
+    assert _usual(stub(at=slow)) == {"speed": 0.012, "slip_angle": 0.15}
