@@ -24,6 +24,8 @@ OPERATORS = {
     ast.Is: ("is", "is not"),
     ast.IsNot: ("is not", "is"),
 }
+#: Arguments that check what holds anyway, and change no result: no mutants of them.
+CHECKS = ("strict", "frozen", "slots")
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def mutants(path: str, source: bytes) -> Iterator[Mutant]:
             yield *span(node), repr(value)
 
     def visit(node: ast.AST, scope: int) -> Iterator[Mutant]:
+        if isinstance(node, ast.keyword) and node.arg in CHECKS:
+            return
         for begin, end, text in changes(node):
             yield Mutant(path, begin, end, text, scope)
         inner = scope
