@@ -60,6 +60,7 @@ def test_the_wheel_holds_the_packages_and_their_data(wheel):
         "datagen/recipes/wheel.toml",
         "training/specs/fused.toml",
         "soilml/py.typed",
+        "soilml/__init__.pyi",
         "soilml/released/any_wheel.onnx",
     ):
         assert needed in names

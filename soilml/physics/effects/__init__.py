@@ -8,7 +8,7 @@ listings and searches follow, is the order of the lines below.
 # ruff: isort: skip_file
 # ruff: noqa: E501
 # fmt: off
-from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.effects.base import Effect as Effect, EffectCard as EffectCard
 from soilml.physics.effects.soil.slip_sinkage import SlipSinkage as SlipSinkage
 from soilml.physics.effects.running_gear.grousers import Grousers as Grousers
 from soilml.physics.effects.running_gear.track_grousers import TrackGrousers as TrackGrousers
@@ -44,5 +44,3 @@ _CATALOGUE = {
 }
 #: Effect by the name that `[[effect]] name` takes in a model file.
 EFFECTS: dict[str, type[Effect]] = {effect.name: effect for effect in _CATALOGUE.values()}
-
-__all__ = ["EFFECTS", "Effect", "EffectCard", *sorted(_CATALOGUE)]
