@@ -69,7 +69,7 @@ from soilml.gap.verdict.updated_case import updated_case
 from soilml.identification.compatibility import check_wheel_size
 from soilml.identification.data.rover_rows import with_rover_columns
 from soilml.identification.free_parameters import FreeParameter
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.unsolvable import solvable
 
@@ -77,7 +77,7 @@ from soilml.unsolvable import solvable
 @solvable("the gap analysis")
 def gap(
     case: Case,
-    table: Table,
+    table: Rows,
     *,
     free: Sequence[str] | None = None,
     holdout: str | None = None,
@@ -97,7 +97,7 @@ def gap(
     ----------
     case : Case
         Model, soil, priors and measurement noise.
-    table : Table
+    table : Table, data frame or mapping of columns
         Rows with `run`, `slip`, `load_N` and measured channels.
     free : sequence of str, optional
         Soil parameters to fit; by default those with a prior.
@@ -153,7 +153,7 @@ def gap(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
-    table = with_rover_columns(case, table)
+    table = with_rover_columns(case, as_table(table))
     check_wheel_size(case, table)
     check_size(table)
     usable = table.answered

@@ -24,7 +24,7 @@ from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.identification.shared_errors.sizes import included_bias, usual_errors
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.unsolvable import solvable
 
@@ -47,7 +47,7 @@ MOST_ROWS = 100_000
 @solvable("the identification")
 def identify(
     case: Case,
-    table: Table,
+    table: Rows,
     free: Sequence[str] | None = None,
     method: str = "nonlinear",
     *,
@@ -107,6 +107,7 @@ def identify(
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
     0.489 +- 0.006 rad
     """
+    table = as_table(table)
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     if method in CLOSED_FORM and case.gears:

@@ -110,7 +110,7 @@ def read_table(
     if isinstance(path, ArrowStream):
         file = Path("data frame")
         columns = arrow_columns(path)
-        kept = _known_columns(file, list(columns), ignore_extra)
+        kept = known_columns(file, list(columns), ignore_extra)
         table = Table({name: plain_column(file, name, columns[name]) for name in kept}, str(file))
         return check_table(table, file, need, filled, limits)
     file = Path(path)
@@ -152,14 +152,15 @@ def _read_csv(
 ) -> Table:
     hint = f"{', '.join(RUNS)}, ..."
     columns, lines = read_csv(
-        file, lambda header: _known_columns(file, header, ignore_extra), hint, progress
+        file, lambda header: known_columns(file, header, ignore_extra), hint, progress
     )
     return Table(columns, str(file), lines)
 
 
-def _known_columns(
+def known_columns(
     file: Path, header: list[str], ignore_extra: bool, own: Sequence[str] = ()
 ) -> list[str]:
+    """Columns of a header that are read; raises `TableError` for one that is not known."""
     kept: list[str] = []
     strange = [name for name in header if name not in own and name not in COLUMNS]
     if len(strange) == len(header) > 2 and not ignore_extra:
@@ -243,7 +244,7 @@ def _instead(name: str, table: Table) -> str:
 
 def _read_parquet(file: Path, ignore_extra: bool) -> Table:
     found, metadata = read_parquet(file)
-    kept = _known_columns(file, list(found), ignore_extra, own_columns(metadata))
+    kept = known_columns(file, list(found), ignore_extra, own_columns(metadata))
     columns = {name: plain_column(file, name, found[name]) for name in kept}
     rows = len(next(iter(found.values()))) if found else 0
     return Table(columns, str(file), np.arange(1, rows + 1), metadata)

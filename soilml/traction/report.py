@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.identification.data.operating_points import operating_points
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
@@ -73,7 +73,7 @@ class PullReport:
 
 def pull_report(
     case: Case,
-    table: Table,
+    table: Rows,
     *,
     free: Sequence[str] | None = None,
     loads: Sequence[float] | None = None,
@@ -115,6 +115,7 @@ def pull_report(
     FitError, TableError
         As `identify` with the posterior method.
     """
+    table = as_table(table)
     soil = measured_soil(case, table, free, estimator, as_usual)
     draws, unknown, warnings = soil.draws, soil.unknown, list(soil.warnings)
     excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]

@@ -26,7 +26,7 @@ from soilml.gap.fitting.coordinates import SoilCoordinate, linearise, soil_coord
 from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.identification.free_parameters import select_free
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
 from soilml.unsolvable import solvable
@@ -101,7 +101,7 @@ class Audit:
 @solvable("the audit")
 def audit(
     case: Case,
-    design: Table,
+    design: Rows,
     *,
     free: Sequence[str] | None = None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
@@ -116,7 +116,7 @@ def audit(
     ----------
     case : Case
         Channels are those whose noise is declared here or in the design.
-    design : Table
+    design : Table, data frame or mapping of columns
         Rows with `run`, `slip` and `load_N`.
     free : sequence of str, optional
         Soil parameters that would be fitted; by default those with a prior.
@@ -153,6 +153,7 @@ def audit(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
+    design = as_table(design)
     if not design.answered.any():
         raise InputError(f"{design.source}: no row has the status ok")
     readings = planned_readings(case, design.rows(design.answered))

@@ -19,14 +19,14 @@ from soilml.identification.bevameter.soil_section import (
     shear_section,
     within_bounds,
 )
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.numerics.prior import Prior
 from soilml.numerics.rounding import significant
 from soilml.physics.soils.soil_tests import SoilTest
 
 
 def bevameter(
-    plates: Table | None = None, shear: Table | None = None, case: Case | None = None
+    plates: Rows | None = None, shear: Rows | None = None, case: Case | None = None
 ) -> BevameterResult:
     """Soil parameters from plate-sinkage tests, from shear tests, or from both.
 
@@ -75,13 +75,13 @@ def bevameter(
     plate_fit = shear_fit = None
     tests: list[SoilTest | None] = []
     if plates is not None:
-        plate_fit = fit_pressure_sinkage(read_plate_tests(plates))
+        plate_fit = fit_pressure_sinkage(read_plate_tests(as_table(plates)))
         values, priors, notes = plate_section(plate_fit, case)
         soil, prior = soil | values, prior | priors
         remarks += [*plate_remarks(plate_fit), *notes]
         tests.append(pressure_test(plate_fit, case))
     if shear is not None:
-        shear_fit = fit_shear_strength(read_shear_tests(shear))
+        shear_fit = fit_shear_strength(read_shear_tests(as_table(shear)))
         values, priors, notes = shear_section(shear_fit, case)
         soil, prior = soil | values, prior | priors
         remarks += [*shear_remarks(shear_fit), *notes]

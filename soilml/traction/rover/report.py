@@ -13,7 +13,7 @@ from soilml.config.case import Case
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.identification.data.rover_rows import with_rover_columns
-from soilml.io.table import Table
+from soilml.io.rows import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.traction.by_load import slip_grid
@@ -65,7 +65,7 @@ class RoverReport:
 
 def rover_report(
     case: Case,
-    table: Table,
+    table: Rows,
     *,
     free: Sequence[str] | None = None,
     slopes: Floats | None = None,
@@ -107,7 +107,7 @@ def rover_report(
     if slopes is None:
         tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
         slopes = SLOPES[tipping >= SLOPES]
-    table = with_rover_columns(case, table)
+    table = with_rover_columns(case, as_table(table))
     soil = measured_soil(case, table, free, estimator, as_usual)
     table = table.rows(table.answered)
     measured = MeasuredRange.of(table["slip"], table["load_N"])

@@ -1,0 +1,91 @@
+"""Analyses take tables, data frames and mappings of columns, with one rule and one error."""
+
+import numpy as np
+import pytest
+
+from soilml import Case, Model, Operating, Table, Wheel, identify, soil
+from soilml.config.measurement_noise import Noise
+from soilml.errors import TableError
+from soilml.gap import audit, gap
+from soilml.identification.bevameter import bevameter
+from soilml.io.rows import as_table
+from soilml.numerics.prior import Prior
+from soilml.traction.report import pull_report
+
+SLIP, LOAD = np.tile([0.1, 0.2, 0.35, 0.5], 3), np.repeat([40.0, 60.0, 90.0], 4)
+CASE = Case(
+    Model(Wheel(radius=0.15, width=0.12)),
+    soil("wong1989/dry_sand"),
+    {"cohesion": Prior(0.0, 3000.0), "friction_angle": Prior(0.3, 0.8)},
+    {"torque_Nm": Noise(share=0.02)},
+)
+COLUMNS = {
+    "run": np.repeat(["a", "b", "c"], 4),
+    "slip": SLIP,
+    "load_N": LOAD,
+    "torque_Nm": CASE.model(CASE.soil, Operating(slip=SLIP, load=LOAD)).torque,
+}
+LISTS = {name: column.tolist() for name, column in COLUMNS.items()}
+
+
+class Frame:
+    """A data frame of a library that soilml does not know."""
+
+    def __init__(self, columns):
+        self.arrow = pytest.importorskip("pyarrow").table(columns)
+
+    def __arrow_c_stream__(self, requested_schema=None):
+        return self.arrow.__arrow_c_stream__(requested_schema)
+
+
+@pytest.mark.parametrize("made", [dict, Frame], ids=["mapping", "frame"])
+@pytest.mark.parametrize(
+    "answer",
+    [
+        lambda rows: identify(CASE, rows).values,
+        lambda rows: gap(CASE, rows).as_json()["gap"],
+        lambda rows: audit(CASE, rows, effects={}).as_json(),
+        lambda rows: pull_report(CASE, rows, slip_limit=0.3).by_load[0].posterior.pull,
+    ],
+    ids=["identify", "gap", "audit", "pull"],
+)
+def test_rows_of_any_kind_give_the_same_answer(made, answer):
+    np.testing.assert_equal(answer(made(LISTS)), answer(Table(COLUMNS)))
+
+
+def test_tests_of_a_soil_as_columns():
+    z = np.linspace(0.005, 0.04, 8)
+    plates = {"test": ["a"] * 8, "plate_radius_m": [0.05] * 8, "sinkage_m": z.tolist()}
+    plates["pressure_Pa"] = (1e6 * z).tolist()
+    arrays = Table({name: np.asarray(values) for name, values in plates.items()})
+    assert bevameter(plates).soil == bevameter(arrays).soil
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([[0.1, 60.0]], "rows are list; needed is a Table"),
+        (None, "rows are NoneType"),
+        ("runs.csv", "rows are str; needed is a Table, as read_table returns it"),
+        ({"slip": [0.1, 0.2], "load_N": [60.0]}, "differ in length: slip has 2, load_N has 1"),
+        ({"slip": [[0.1, 0.2]]}, r"column slip: has shape \(1, 2\)"),
+        ({"slip": ["much"]}, "column slip: needed are numbers"),
+        ({"slip": [{}]}, "column slip: needed are numbers"),
+        ({"slip": [0.1], "load": [60.0]}, "the unit is missing, name it load_N"),
+        ({"slip": [20.0], "load_N": [60.0]}, "a slip ratio, between -1 and 1"),
+        ({"slip": [0.1, np.nan], "load_N": [60.0, 60.0]}, "slip"),
+        ({}, "the table has a header but no row"),
+    ],
+)
+def test_other_rows_are_refused_in_one_line(rows, said):
+    with pytest.raises(TableError, match=said) as raised:
+        as_table(rows)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_table_stays_and_single_values_are_a_row():
+    table = Table(COLUMNS)
+    assert as_table(table) is table
+    assert as_table({"slip": 0.1, "load_N": 60, "run": "a"})["run"].tolist() == ["a"]
+    blank = as_table({"slip": [0.1, 0.2], "torque_Nm": [None, 2.0]})
+    np.testing.assert_array_equal(blank["torque_Nm"], [np.nan, 2.0])
