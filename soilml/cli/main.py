@@ -73,11 +73,17 @@ COMMANDS = {
 #: Options whose value may begin with a minus sign.
 _NEGATIVE_VALUES = ("--slip", "--load", "--slips")
 _WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
+_UNKNOWN_OPTION = re.compile(r"unrecognized arguments: (?:[^-].*? )?(--?[\w-]+)")
 _NEGATIVE = re.compile(r"-[\d.]")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Reports an error in one line, which names the help."""
+    """Reports an error in one line, which names the help.
+
+    `known` are the options of the command that was asked for.
+    """
+
+    known: Sequence[str] = ()
 
     def error(self, message: str) -> NoReturn:
         wrong = _WRONG_COMMAND.fullmatch(message)
@@ -85,6 +91,9 @@ class _Parser(argparse.ArgumentParser):
             names = re.findall(r"[\w-]+", wrong[2])
             near = did_you_mean(wrong[1], names)
             message = f"no command {wrong[1]!r}; {near}there are: {', '.join(names)}"
+        if unknown := _UNKNOWN_OPTION.search(message):
+            near = did_you_mean(unknown[1], self.known).removesuffix(" ")
+            message += f"; {near}" if near else ""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
@@ -115,6 +124,9 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             formatter_class=layout,
         )
         module.add(sub)
+        if command == name:
+            root.known = [option for option in sub._option_string_actions if len(option) > 2]
+            root.prog = sub.prog
         sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", _no_outputs))
     return root
 

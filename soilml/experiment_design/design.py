@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,32 @@ class Advice:
     def best_repetition(self, name: str | None = None) -> RatedRow | None:
         """The best repetition of a measured operating point; None without measured rows."""
         return best_row(self.repetitions, self.names, name) if self.repetitions else None
+
+    def plot(self, ax: Any = None, measured: Operating | None = None) -> NDArray[Any]:
+        """Draw a map for each parameter: its remaining fraction over slip and load (N) of a row.
+
+        The frame marks the best row, rings the measured ones. Points at which the wheel might not
+        be carried are blank. Channels are those of the first set.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib, one for each parameter; by default a new figure.
+        measured
+            Operating points of earlier rows.
+
+        Returns
+        -------
+        ndarray of Axes, shape (parameters,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.experiment_design.plot import plot_maps
+
+        return plot_maps(self, measured, ax)
 
 
 def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.experiment_design.design import Advice
 from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
+from soilml.report.figure_style import take_axes
 
 #: Most grid points that are labelled with their value, and most ticks of an axis.
 MOST_LABELS, TICKS = 80, 8
@@ -24,16 +27,23 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, measured: Operating 
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
+
+    figure = plot_maps(advice, measured, None)[0].figure
+    with atomic_output(path) as part:
+        figure.savefig(part, format="png", dpi=110)
+    pyplot.close(figure)
+
+
+def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[Any]:
+    """Draw the maps into axes (parameters,); see `Advice.plot`."""
     from matplotlib.patches import Rectangle
 
     choices = advice.with_channels(advice.channel_sets[0])
     slips = sorted({c.candidate.slip for c in choices})
     loads = sorted({c.candidate.load for c in choices})
     count = len(advice.names)
-    figure, axes = pyplot.subplots(
-        1, count, figsize=(3.3 * count + 1.2, 3.6), sharey=True, squeeze=False, layout="constrained"
-    )
-    for i, (name, panel) in enumerate(zip(advice.names, axes[0], strict=True)):
+    axes = take_axes(ax, 1, count, (3.3 * count + 1.2, 3.6))[0]
+    for i, (name, panel) in enumerate(zip(advice.names, axes, strict=True)):
         fraction = np.full((len(loads), len(slips)), np.nan)
         for c in choices:
             cell = loads.index(c.candidate.load), slips.index(c.candidate.slip)
@@ -57,9 +67,10 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, measured: Operating 
         panel.set_xticks(across, [f"{slips[k]:.3g}" for k in across])
         panel.set_yticks(up, [f"{loads[k]:.3g}" for k in up])
         panel.set_title(f"{name.replace('_', ' ')}: now {advice.current_fraction[i]:.0%}")
-    axes[0, 0].set_ylabel("load of the next row, N")
-    figure.supxlabel("slip of the next row (frame: best, rings: measured)", fontsize=10)
-    figure.colorbar(image, ax=axes[0], label="expected remaining fraction of the prior width")
-    with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=110)
-    pyplot.close(figure)
+        panel.set_xlabel("slip of the next row")
+    middle = axes[count // 2]
+    middle.set_xlabel("slip of the next row (frame: best, rings: measured)", fontsize=9)
+    axes[0].set_ylabel("load of the next row, N")
+    label = "expected remaining fraction of the prior width"
+    axes[0].figure.colorbar(image, ax=list(axes), label=label)
+    return np.asarray(axes)

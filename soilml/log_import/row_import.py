@@ -19,7 +19,7 @@ from soilml.log_import.mapping.channel import Channel
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.result import ImportedLog
-from soilml.log_import.row_table import rows_as_table, unusable
+from soilml.log_import.row_table import rows_as_table, unusable, without_torque
 from soilml.log_import.window_rows import AVERAGED, WindowRow, plain_constants, quantities_of
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
@@ -74,7 +74,8 @@ def import_rows(
         constants_of(wheel, log_map.vehicle),
     )
     radius = wheel.radius.value if wheel.radius else None
-    remarks = [*left[:5], *_without_errors(table), *table_hints(table.columns, radius)]
+    remarks = [*left[:5], *without_torque(table), *_without_errors(table)]
+    remarks += table_hints(table.columns, radius)
     return ImportedLog(
         table, bias, tuple(parts), (), tuple(dict.fromkeys(remarks)), tuple(wrong),
         radius or float("nan"), tuple(str(log[0].file) for log in logs), log_map.source,

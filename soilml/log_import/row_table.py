@@ -34,6 +34,16 @@ def unusable(row: WindowRow, dead: Mapping[str, str]) -> str:
     return ""
 
 
+def without_torque(table: Table) -> list[str]:
+    """A remark where no row has a torque, without which there is no estimate on board."""
+    if np.isfinite(table[column("torque")]).any():
+        return []
+    return [
+        "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
+        "identify a torque, a drawbar pull or a sinkage"
+    ]
+
+
 def rows_as_table(
     groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]], log_map: LogMap
 ) -> Table:

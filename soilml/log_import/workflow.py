@@ -26,7 +26,7 @@ from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Floats
 from soilml.log_import.result import ImportedLog, WheelSeries
 from soilml.log_import.row_import import import_rows
-from soilml.log_import.row_table import rows_as_table, unusable
+from soilml.log_import.row_table import rows_as_table, unusable, without_torque
 from soilml.log_import.window_rows import (
     WindowRow,
     add_stated_errors,
@@ -112,6 +112,7 @@ def import_log(
         parts += contributions
     radius = found.wheels[0].radius
     remarks = [text for analysis in analyses for text in analysis.remarks()]
+    remarks += without_torque(table)
     remarks += table_hints(table.columns, radius.value if radius else None)
     return ImportedLog(
         table,

@@ -16,6 +16,7 @@ from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
 from soilml.onboard.session import Session, create_session
+from soilml.onboard.set_contract import INTERFACE
 from soilml.onboard.set_posterior import SetPosterior
 
 #: Version of the file format: names of inputs and outputs, keys of the metadata.
@@ -91,6 +92,12 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         raise ModelFileError(
             f"{file} has format {metadata['soilml_format']}; this version of soilml reads format "
             f"{FORMAT}"
+        )
+    interface = metadata.get("soilml_interface", "1")
+    if not (interface.isdecimal() and int(interface) <= int(INTERFACE)):
+        raise ModelFileError(
+            f"{file} has interface {interface}; this version of soilml reads up to {INTERFACE}: "
+            "update soilml"
         )
     if metadata.get("soilml_kind") == ONE_STEP:
         raise ModelFileError(

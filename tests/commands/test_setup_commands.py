@@ -109,6 +109,13 @@ def test_doctor_names_a_damaged_file(capsys, monkeypatch, tmp_path):
         (["effects", "slip_sinkage"], "did you mean 'slip-sinkage'? there are:"),
         (["soils", "wong1989/drysand"], "did you mean 'wong1989/dry_sand'? `soilml soils` lists"),
         (["estimate", "weel"], "did you mean 'wheel'? there are:"),
+        (
+            ["import", "log.csv", "--inti"],
+            "soilml import: unrecognized arguments: --inti; did you mean '--init'? "
+            "(see soilml import --help)",
+        ),
+        (["identify", "a", "b", "c", "--metod=newton"], "did you mean '--method'?"),
+        (["effects", "--zzz"], "unrecognized arguments: --zzz (see soilml effects --help)"),
     ],
 )
 def test_a_misspelt_name_is_answered_with_the_nearest(capsys, words, said):

@@ -68,6 +68,27 @@ class Audit:
     untestable: dict[str, str]
     added_runs: tuple[AddedRun, ...]
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw what is left of each effect beside the soil, and what separates it, in sigma.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib; by default those of a new figure.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        InputError
+            For several axes.
+        """
+        from soilml.gap.design.audit_figure import plot_audit
+
+        return plot_audit(self, ax)
+
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml audit --out` writes."""
         return {

@@ -6,11 +6,13 @@ import os
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.result import BevameterResult
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.io.atomic_files import atomic_output
+from soilml.report.figure_style import take_axes
 
 #: Tests that a legend lists.
 LISTED = 6
@@ -26,19 +28,23 @@ def save_picture(path: str | os.PathLike[str], result: BevameterResult) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
+    figure = plot_tests(result, None)[0].figure
+    with atomic_output(path) as part:
+        figure.savefig(part, format="png", dpi=110)
+    pyplot.close(figure)
+
+
+def plot_tests(result: BevameterResult, ax: Any) -> NDArray[Any]:
+    """Draw the tests into axes (panels,); see `BevameterResult.plot`."""
     count = (result.plates is not None) + 2 * (result.shear is not None)
-    figure, axes = pyplot.subplots(
-        1, count, figsize=(4.6 * count, 3.9), squeeze=False, layout="constrained"
-    )
-    panels = list(axes[0])
+    axes = take_axes(ax, 1, count, (4.6 * count, 3.9))[0]
+    panels = list(axes)
     if result.plates is not None:
         _draw_plates(panels.pop(0), result.plates)
     if result.shear is not None:
         _draw_curves(panels[0], result.shear)
         _draw_strengths(panels[1], result.shear)
-    with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=110)
-    pyplot.close(figure)
+    return np.asarray(axes)
 
 
 def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:

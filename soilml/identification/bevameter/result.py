@@ -6,6 +6,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from numpy.typing import NDArray
+
 from soilml.identification.bevameter.estimate import SpreadEstimate
 from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.shear_strength import ShearFit
@@ -46,6 +48,30 @@ class BevameterResult:
         for fit in (self.plates, self.shear):
             found |= fit.estimates() if fit is not None else {}
         return found
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw pressure against sinkage, shear curves, and strengths with their line.
+
+        Dots are measured, thin lines fitted to each test, thick lines the law of the result.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib: one for plate tests and two for shear tests; by default a new
+            figure.
+
+        Returns
+        -------
+        ndarray of Axes, shape (panels,)
+
+        Raises
+        ------
+        InputError
+            For another number of axes.
+        """
+        from soilml.identification.bevameter.plot import plot_tests
+
+        return plot_tests(self, ax)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml bevameter --json` writes."""

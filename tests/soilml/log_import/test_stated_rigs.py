@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from foreign_rigs import law
-from stated_rigs import WRITERS
+from foreign_rigs import drive, law, table
+from stated_rigs import WRITERS, a_lever
 
 from soilml.log_import import import_log, init_map
 from soilml.log_import.channels.slopes import slope_of
@@ -92,3 +92,26 @@ def test_codes_of_missing_readings(values, left, tmp_path):
     found = without_codes(Recording("", tmp_path, {"a": np.asarray(values)}))
     assert int(np.isfinite(found.columns["a"]).sum()) == left
     assert bool(found.notes) == (left < len(values))
+
+
+def test_a_map_without_torque_is_remarked_on(tmp_path):
+    logs, edits, _ = a_lever(np.random.default_rng(7), tmp_path)
+    text = init_map(logs).replace(*edits[0])
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    found = import_log(logs, tmp_path / "map.toml")
+    assert any("no row has a torque: give the map a [torque]" in text for text in found.remarks)
+    for old, new in edits[1:]:
+        text = text.replace(old, new)
+    (tmp_path / "map.toml").write_text(text, encoding="utf-8")
+    found = import_log(logs, tmp_path / "map.toml")
+    assert not any("no row has a torque" in text for text in found.remarks)
+
+
+def test_the_zero_of_a_height_is_asked_for(tmp_path):
+    d = drive(np.random.default_rng(7), (0.1, 0.3), [50] * 2)
+    header = "t (s),omega (rad/s),v (m/s),torque (Nm),Fz (N),{} (mm)"
+    for name, asked in (("wheel_height", True), ("sinkage", False)):
+        rows = table((d.t, d.omega, d.v, d.torque, d.load, 3 - 1000 * d.sinkage))
+        (tmp_path / "log.csv").write_text("\n".join([header.format(name), *rows]))
+        text = init_map([tmp_path / "log.csv"])
+        assert ("CHANGE: a height is a sinkage where its zero" in text) == asked

@@ -10,6 +10,7 @@ from soilml.errors import ModelFileError
 from soilml.onboard import Estimator
 from soilml.onboard.model_file import metadata_checksum, serialise_metadata
 from soilml.onboard.session import refers_to_files
+from soilml.onboard.set_contract import INTERFACE
 
 
 def signed_again(model):
@@ -80,3 +81,19 @@ def test_tensors_are_found_wherever_the_format_has_them():
 def test_what_is_no_model_is_an_error(content):
     with pytest.raises(ValueError):
         refers_to_files(content)
+
+
+@pytest.mark.parametrize(
+    ("interface", "refused"), [("1", False), ("4", False), ("5", True), ("4b", True)]
+)
+def test_a_file_of_a_later_interface_is_refused(small_model, tmp_path, interface, refused):
+    model = onnx.load(small_model)
+    (entry,) = (e for e in model.metadata_props if e.key == "soilml_interface")
+    assert entry.value == INTERFACE == "4"
+    entry.value = interface
+    (tmp_path / "m.onnx").write_bytes(signed_again(model))
+    if refused:
+        with pytest.raises(ModelFileError, match=f"has interface {interface}; this version of"):
+            Estimator.load(tmp_path / "m.onnx")
+    else:
+        assert Estimator.load(tmp_path / "m.onnx").metadata["soilml_interface"] == interface

@@ -8,7 +8,9 @@ import pytest
 from conftest import MODEL
 
 from soilml import Estimator, Table, identify, read_case
+from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
+from soilml.experiment_design.candidate_rows import CandidateRow
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.results import GapReport
 from soilml.traction.report import pull_report
@@ -72,6 +74,43 @@ def comparison(case):
     return Comparison([score, replace(score, rows=6)], ["cohesion", "friction_angle"])
 
 
+def audited(case):
+    from soilml.gap import audit
+    from soilml.physics.effects import EFFECTS
+
+    slip, load = np.tile([0.1, 0.3, 0.5], 3), np.repeat([40.0, 60.0, 90.0], 3)
+    noisy = replace(case, noise={"torque_Nm": Noise(share=0.02)})
+    names = ("slip-sinkage", "torque-gain")
+    design = {"run": np.repeat(["a", "b", "c"], 3), "slip": slip, "load_N": load}
+    return audit(noisy, design, effects={name: EFFECTS[name] for name in names})
+
+
+def advised(case):
+    from soilml.experiment_design.design import Advice, RatedRow
+
+    rows = [
+        RatedRow(CandidateRow(slip, load, ("torque",)), np.asarray([0.9, slip, 0.5]))
+        for slip in (0.1, 0.3)
+        for load in (40.0, 60.0)
+    ]
+    names = ("cohesion", "friction_angle", "shear_modulus")
+    return Advice(names, np.ones(3), tuple(rows), (), tuple(rows[:1]), 0)
+
+
+def of_plates_and_shear(case):
+    from soilml.identification.bevameter import bevameter
+
+    z, j = np.linspace(0.005, 0.04, 8), np.linspace(0.002, 0.1, 8)
+    plates = {"test": ["p"] * 8, "plate_radius_m": [0.05] * 8, "sinkage_m": z}
+    shear = {
+        "test": np.repeat(["a", "b"], 8),
+        "normal_stress_Pa": np.repeat([4e3, 8e3], 8),
+        "shear_displacement_m": np.tile(j, 2),
+        "shear_stress_Pa": np.concatenate([s * -np.expm1(-j / 0.02) for s in (3e3, 5e3)]),
+    }
+    return bevameter(plates | {"pressure_Pa": 1e6 * z}, shear)
+
+
 @pytest.mark.parametrize(
     ("make", "shape", "said"),
     [
@@ -82,6 +121,9 @@ def comparison(case):
         (rover, (2, 2), "steepest slope, degrees"),
         (imported, (1,), "torque / (load × radius)"),
         (comparison, (2, 2), "friction angle"),
+        (audited, (), "that tells it from its nearest rival"),
+        (advised, (3,), "shear modulus: now 100%"),
+        (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],
 )
 def test_results_draw_themselves(make, shape, said, case):

@@ -23,7 +23,7 @@ def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsy
     assert main(["compare", str(small_model), "--sets", "1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
-    rows = list(csv.DictReader((out / "benchmark.csv").open()))
+    rows = list(csv.DictReader((out / "benchmark.csv").read_text().splitlines()))
     assert {r["method"] for r in rows} == {
         LIMIT_LABEL,
         POSTERIOR_LABEL,

@@ -75,7 +75,7 @@ def test_the_command_writes_table_picture_and_page(test_data, small_model, capsy
     command += [str(small_model), "--out", str(out), "--analytic-sets", "4"]
     assert main(command) == 0
     assert "single readings" in capsys.readouterr().out
-    rows = list(csv.DictReader((out / "compare.csv").open()))
+    rows = list(csv.DictReader((out / "compare.csv").read_text().splitlines()))
     assert {r["parameter"] for r in rows} == {
         "cohesion_Pa",
         "friction_angle_rad",

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, resting
+from soilml.log_import.guesses.columns.column_words import words_of
 from soilml.log_import.guesses.drafts.draft import Draft
 from soilml.log_import.guesses.drafts.draft_inputs import moving
 
@@ -17,6 +18,9 @@ _FAR, _SUNK = 0.08, 0.01
 #: Share of the radius that no wheel sinks in at rest; fall of a reading, and reading at rest, m,
 #: that are more than noise.
 _MOST_AT_REST, _FALLS, _STANDS = 0.3, 0.002, 0.002
+#: Words of places, whose zero may be anywhere.
+_HEIGHTS = {"height", "position", "pos", "laser", "distance", "level", "elevation", "hoehe", "höhe"}
+_HEIGHTS |= {"abstand", "weg", "altura", "hauteur", "altezza", "lvdt"}
 #: Roles that read zero while a wheel rests.
 ZERO_AT_REST = ("torque", "motor_current", "drawbar_pull")
 
@@ -55,7 +59,13 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
     far = min(_FAR, _MOST_AT_REST * radius) if radius > 0.0 else _FAR
     falls = abs(level) < abs(rest) - _FALLS
     if abs(rest) < far and abs(level) < _FAR and not falls:
-        if abs(rest) > _STANDS and (rest < 0.0) == turned:
+        height = draft.column is not None and _HEIGHTS & {*words_of(draft.column.name)}
+        if height and not abs(rest) > _STANDS:
+            draft.comments["column"] = (
+                "CHANGE: a height is a sinkage where its zero is the undisturbed surface; else add "
+                'tare = "rest" and bias = 0.01'
+            )
+        elif abs(rest) > _STANDS and (rest < 0.0) == turned:
             draft.comments["column"] = (
                 f"it reads {1e3 * abs(rest):.3g} mm before the wheel starts; where that is "
                 'the zero of the sensor, and no sinkage, add tare = "rest" and bias = 0.01'
