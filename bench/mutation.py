@@ -127,8 +127,8 @@ def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
         if (not mutant.scope and "/test_declarations_" in name)
         or any(path == mutant.path and mutant.scope in (line, 0) for path, line in called)
     }
-    if not near:
-        return "survived"
+    # no test calls what runs when the module is imported: all tests of the room may see it
+    near = near or {name: seconds for name, (seconds, _) in tests.items()}
     file, source = tree / mutant.path, (tree / mutant.path).read_bytes()
     file.write_bytes(mutant.of(source))
     for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
