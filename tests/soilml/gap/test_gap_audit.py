@@ -1,5 +1,7 @@
 """What a design can identify: figures by hand, and the audit of a small design."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gap_sets import case_of, driven
@@ -117,3 +119,15 @@ def test_an_audit_needs_noise():
     silent = case_of().__class__(**{**case.__dict__, "noise": {}})
     with pytest.raises(InputError, match="noise"):
         audit(silent, driven(case, loads=(40.0,), slips=3, noise=0.0))
+
+
+def test_the_unknown_parameters_are_those_with_a_prior_else_those_of_shear():
+    case, none = case_of(), replace(case_of(), prior={})
+    design, few = driven(case), {name: EFFECTS[name] for name in ("torque-gain", "bulldozing")}
+
+    def found(case, free=None):
+        return audit(case, design, free=free, effects=few).as_json()["effects"]
+
+    one = replace(case, prior={"cohesion": case.prior["cohesion"]})
+    assert found(one) == found(case, ["cohesion"]) != found(case)
+    assert found(none) != found(one)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.gap.statistics.score_test import score_test
+from soilml.gap.statistics.score_test import ScoreTest, score_test
 from soilml.numerics.subspaces import project_out
 
 
@@ -94,3 +94,10 @@ def test_the_same_seed_gives_the_same_level():
 def test_without_columns_the_p_value_is_one():
     none = score_test(np.ones(10), np.zeros((10, 0)), np.zeros((10, 0)), np.zeros(0), 5.0, 0)
     assert none.family_wise_p == 1.0
+
+
+def test_a_p_value_counts_the_score_itself_among_the_draws():
+    test = ScoreTest(np.zeros(0), np.asarray([1.0, 2.0, 3.0, 4.0]), np.zeros(0), np.zeros(0))
+    assert test.p_value(2.5) == pytest.approx(3.0 / 5.0)
+    assert test.p_value(4.0) == pytest.approx(2.0 / 5.0)
+    assert test.p_value(4.1) == pytest.approx(1.0 / 5.0)

@@ -33,6 +33,7 @@ from soilml.gap.verdict.decision import (
     unclaimed_effects,
     with_refused_outside,
 )
+from soilml.gap.verdict.report_entries import candidate_summaries
 from soilml.numerics.prior import Prior
 
 PROBLEM = SimpleNamespace(readings=SimpleNamespace(channels=("torque", "drawbar_pull")))
@@ -250,3 +251,28 @@ def test_refused_explanations_lend_their_parts_that_are_accepted():
     found = with_refused_outside(result).posterior.refused
     assert found == {("dig", "plough"): frozenset({"dig"}), ("plough",): frozenset()}
     assert with_refused_outside(searched(NONE, DIG)).posterior.refused == {}
+
+
+def test_candidates_are_summarised_against_the_soil_alone_and_the_best():
+    slow = candidate("slope", 21.0)
+    slow.catalogue_law.fit.converged = False
+    for one in (DIG, PLOUGH):
+        one.catalogue_law.fit.converged = True
+    far, pair = candidate("rate", 60.0), candidate("dig+plough", 19.0)
+    far.catalogue_law.fit.converged = pair.catalogue_law.fit.converged = True
+    result = searched(NONE, DIG, PLOUGH, slow, far, pair)
+    object.__setattr__(result, "predicted_gain", {"dig": 70.0})
+    found = candidate_summaries(SimpleNamespace(result=result), claimed=True)
+    rows = [(c.names, c.predicted_gain, c.achieved_gain, c.excess, c.verdict) for c in found[:4]]
+    assert rows == [
+        (("dig",), 70.0, 80.0, 1.0, "explains the data"),
+        (("plough",), 0.0, 78.0, 3.0, "more effects than needed"),
+        (("slope",), 0.0, 79.0, 2.0, "fit did not converge: no evidence"),
+        (("rate",), 0.0, 40.0, 41.0, "rejected against the best"),
+    ]
+    assert found[4].excess == 0.0 and np.isnan(found[4].predicted_gain)
+    unclaimed = candidate_summaries(SimpleNamespace(result=result), claimed=False)
+    assert [c.verdict for c in unclaimed[:2]] == [
+        "fits best, not claimed",
+        "not rejected, not claimed",
+    ]

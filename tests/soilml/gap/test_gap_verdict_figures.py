@@ -260,6 +260,7 @@ def test_runs_by_what_they_tell_per_cost():
     [
         (0.05, 0.6, [0.05, 0.15, 0.2, 0.3, 0.35, 0.45, 0.5, 0.6]),
         (0.1, 0.2, [0.1, 0.11, 0.13, 0.14, 0.16, 0.17, 0.19, 0.2]),
+        (0.1, 0.4, [0.1, 0.14, 0.19, 0.23, 0.27, 0.31, 0.36, 0.4]),  # seven in steps of 0.05
         (0.78, 0.95, [0.78, 0.79, 0.8]),
         (-0.95, -0.78, [-0.8, -0.79, -0.78]),
     ],
@@ -271,7 +272,7 @@ def test_slips_in_steps_that_a_rig_can_set(low, high, expected):
 
 
 @pytest.mark.parametrize(
-    ("load", "expected"), [(123.4, 123.0), (10.4, 10.0), (9.87, 9.9), (0.1234, 0.12), (99.6, 100.0)]
+    ("load", "expected"), [(124.2, 124.0), (10.4, 10.0), (9.87, 9.9), (0.1234, 0.12), (99.6, 100.0)]
 )
 def test_loads_in_whole_newton_or_two_digits(load, expected):
     assert _whole(load) == expected
