@@ -11,6 +11,8 @@ from soilml.log_import.guesses.stated_constants import number_in_names
 from soilml.log_import.guesses.toml_value import toml_value
 from soilml.log_import.mapping.channel import ROLES
 
+#: Words of a place in degrees.
+_GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}
 #: Words of a torque, also in the name of the force that measures it on a lever.
 _OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
 
@@ -152,8 +154,13 @@ def absent_lines(
             "# [motor_current]",
         ]
     if role == "ground_speed" and not ({"position", "slip"} & found.roles() or others):
+        degrees = [c.address for c in columns if _GLOBE & {*words_of(c.name)}]
         return [
             "",
+            *(
+                f"# {name}: degrees on the globe are no place; add columns in m, north and east"
+                for name in degrees
+            ),
             "# NEEDED: no column is the travel. One of these:",
             "# [ground_speed]",
             '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',

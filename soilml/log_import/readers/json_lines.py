@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from soilml.errors import InputError
 from soilml.log_import.readers.message_fields import TopicColumns
 from soilml.log_import.readers.text_encoding import decode_text
@@ -32,9 +34,13 @@ def read_json_log(path: Path) -> list[Recording]:
             f"{path}: needed is a JSON object with numbers for each sample, one a line or in one "
             "array, or one object of columns"
         )
+    samples = [samples[i] for i in found.order()]
     names = dict.fromkeys(k for s in samples for k, v in s.items() if isinstance(v, str))
     texts = {name: [str(s.get(name, "")) for s in samples] for name in names}
-    return [Recording("", path, columns, texts, notes=notes)]
+    times = found.times()  # numbers of lines, where no header has a stamp
+    stamped = not np.array_equal(times, np.arange(len(samples)))
+    clock = times if stamped else None
+    return [Recording("", path, columns, texts, clock=clock, notes=notes)]
 
 
 def _samples(text: str) -> tuple[list[dict[str, Any]], int]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.log_import.recording import Floats
 
@@ -42,9 +43,13 @@ class TopicColumns:
 
     def columns(self) -> dict[str, Floats]:
         """The columns as arrays in order of time; those without a number are left out."""
-        order = np.argsort(self._unordered_times(), kind="stable")
+        order = self.order()
         arrays = {name: np.asarray(cells)[order] for name, cells in self._cells.items()}
         return {name: values for name, values in arrays.items() if np.isfinite(values).any()}
+
+    def order(self) -> NDArray[np.intp]:
+        """Positions of the messages in order of time."""
+        return np.argsort(self._unordered_times(), kind="stable")
 
     def times(self) -> Floats:
         """Time of the samples in order, s; messages may be received out of order."""

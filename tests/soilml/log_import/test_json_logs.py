@@ -42,3 +42,18 @@ def test_lines_that_are_cut_off_are_counted(tmp_path):
     (found,) = read_log(tmp_path / "a.jsonl")
     assert len(found) == 5
     assert found.notes == ("1 lines are no JSON objects and are left out",)
+
+
+def test_stamps_of_headers_are_the_clock(tmp_path):
+    """Messages come out of order; texts stay beside their numbers."""
+    lines = [
+        {"header": {"stamp": {"sec": 10 + s, "nanosec": 500000000}}, "v": s, "state": str(s)}
+        for s in (0, 2, 1, 3)
+    ]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, lines)))
+    (found,) = read_log(tmp_path / "a.jsonl")
+    np.testing.assert_allclose(found.clock, 10.5 + np.arange(4))
+    np.testing.assert_array_equal(found.columns["v"], np.arange(4.0))
+    assert found.texts["state"] == ["0", "1", "2", "3"]
+    (tmp_path / "b.jsonl").write_text("\n".join(map(json.dumps, ROWS)))
+    assert read_log(tmp_path / "b.jsonl")[0].clock is None

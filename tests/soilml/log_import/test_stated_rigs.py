@@ -115,3 +115,13 @@ def test_the_zero_of_a_height_is_asked_for(tmp_path):
         (tmp_path / "log.csv").write_text("\n".join([header.format(name), *rows]))
         text = init_map([tmp_path / "log.csv"])
         assert ("CHANGE: a height is a sinkage where its zero" in text) == asked
+
+
+def test_degrees_on_the_globe_are_named_as_no_place(tmp_path):
+    d = drive(np.random.default_rng(7), (0.1, 0.3), [50] * 2)
+    columns = (d.t, d.omega, d.torque, d.load, 48 + d.t / 1e6, 11 + 0 * d.t)
+    header = "t (s),omega (rad/s),torque (Nm),Fz (N),latitude,longitude"
+    (tmp_path / "log.csv").write_text("\n".join([header, *table(columns, digits=8)]))
+    text = init_map([tmp_path / "log.csv"])
+    assert "# latitude: degrees on the globe are no place; add columns in m" in text
+    assert "# NEEDED: no column is the travel" in text

@@ -64,7 +64,7 @@ def draft_of(
         said = stated.get(f"rated_{rated}")
         draft.put(
             "scale",
-            f"{float(said[0].split()[0]) / 100:g} {' '.join(said[0].split()[1:])}"
+            f"{float(said[0].split()[0]) / 100:g} {' '.join(said[0].split()[1:]) or one}"
             if said
             else f"0.01 {one}",
             f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
