@@ -48,13 +48,21 @@ def in_si(settings: Settings, key: str, value: Any, unit: str) -> float:
     """A number, or a text with a unit, in the SI unit `unit`; `InputError` for another value."""
     if not isinstance(value, str):
         return float(value)
+    return text_in_si(value, unit, f"{settings.where}: {key}")
+
+
+def text_in_si(text: str, unit: str, what: str) -> float:
+    """The value of a text with a unit, in the SI unit `unit`.
+
+    Raises `InputError`, beginning with `what` it is of, for another text.
+    """
     known = UNITS.get(unit, {})
-    match = _VALUE.fullmatch(value)
+    match = _VALUE.fullmatch(text)
     if match is not None and match[2] in known:
         with suppress(ValueError):
             return float(match[1]) * known[match[2]]
     units = f", or a text with one of the units {', '.join(known)}" if known else ""
-    raise InputError(f"{settings.where}: {key} is {value!r}; needed is {_number(unit)}{units}")
+    raise InputError(f"{what} is {text!r}; needed is {_number(unit)}{units}")
 
 
 def _number(unit: str) -> str:

@@ -124,3 +124,16 @@ def test_a_misspelt_name_is_answered_with_the_nearest(capsys, words, said):
     except SystemExit as stop:
         assert stop.code == 2
     assert said in capsys.readouterr().err
+
+
+def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "a.toml", "--radius", "150 mm", "--width", "12 cm", "--mass", "8 kg"]) == 0
+    assert main(["init", "b.toml", "--radius", "0.15", "--width", "0.12", "--mass", "8"]) == 0
+    assert (tmp_path / "a.toml").read_text() == (tmp_path / "b.toml").read_text()
+    assert main(["init", "c.toml", "--radius", "15 inch", "--width", "0.1"]) == 2
+    said = capsys.readouterr().err
+    assert (
+        "--radius is '15 inch'; needed is a number in m, or a text with one of the units m" in said
+    )
+    assert not (tmp_path / "c.toml").exists()

@@ -23,8 +23,8 @@ corrected. An existing file is not replaced.
 def add(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("out", metavar="MODEL.toml", help="the file to write")
-    parser.add_argument("--radius", type=float, metavar="M", help="wheel radius in m")
-    parser.add_argument("--width", type=float, metavar="M", help="wheel width in m")
+    parser.add_argument("--radius", metavar="M", help="wheel radius in m, or such as '15 cm'")
+    parser.add_argument("--width", metavar="M", help="wheel width in m, or such as '120 mm'")
     parser.add_argument(
         "--soil",
         metavar="PAPER/SOIL",
@@ -35,7 +35,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="NOISE",
         help="standard deviation of torque: '2 %%', 0.05 (N m) or '2 %% + 0.05' (default: 2 %%)",
     )
-    parser.add_argument("--mass", type=float, metavar="KG", help="mass of a rover in kg")
+    parser.add_argument("--mass", metavar="KG", help="mass of a rover in kg")
     parser.add_argument("--wheels", type=int, metavar="N", help="its number of wheels (default: 4)")
 
 

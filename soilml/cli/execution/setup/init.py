@@ -8,8 +8,10 @@ import tempfile
 from pathlib import Path
 
 from soilml.config.case import read_case
+from soilml.config.units import text_in_si
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
+from soilml.io.number_text import read_number
 from soilml.physics.soils import soil_catalogue
 
 #: The question for each option that is asked for, and the default answer.
@@ -34,22 +36,27 @@ def run(args: argparse.Namespace) -> int:
     for key in ("radius", "width"):
         if given[key] is None:
             raise InputError(f"--{key} is missing; needed is the {QUESTIONS[key][0]}")
-    text = _text(given, args.mass, args.wheels)
+    sizes = {key: _size(key, str(given[key])) for key in ("radius", "width")}
+    mass = None if args.mass is None else _size("mass", args.mass)
+    text = _text(given | sizes, mass, args.wheels)
     _check(text)
     save_text(file, text)
     print(f"{file} written. Next: soilml identify {file} RUNS.csv")
     return 0
 
 
-def _ask(key: str) -> str | float | None:
+def _ask(key: str) -> str | None:
     question, default = QUESTIONS[key]
     answer = input(f"{question}{f' [{default}]' if default else ''}: ").strip() or default
-    if key in ("radius", "width"):
-        try:
-            return float(answer)
-        except ValueError:
-            raise InputError(f"{answer!r} is not a number; needed is the {question}") from None
     return answer or None
+
+
+def _size(key: str, text: str) -> float:
+    """A size in SI units, from a number or a text with a unit."""
+    try:
+        return read_number(text)
+    except ValueError:
+        return round(text_in_si(text, "kg" if key == "mass" else "m", f"--{key}"), 12)
 
 
 def _check(text: str) -> None:
