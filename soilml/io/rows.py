@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from soilml.errors import TableError
 from soilml.io.parquet import ArrowStream
 from soilml.io.read_table import FILLED, check_table, known_columns, read_table
-from soilml.io.table import TEXT, Column, Table
+from soilml.io.table import TEXT, Column, Table, fault_of_text
 
 #: What the analyses take as rows.
 Rows = Table | ArrowStream | Mapping[str, ArrayLike]
@@ -56,13 +57,30 @@ def as_table(rows: Rows) -> Table:
 
 def _column(name: str, values: ArrayLike) -> Column:
     """A column (rows,) of text or of numbers; a single value is a column of one row."""
-    kind, needed = (np.str_, "text") if name in TEXT else (np.float64, "numbers")
     try:
-        column = np.atleast_1d(np.asarray(values, dtype=kind))
-    except (TypeError, ValueError):
-        raise TableError(f"rows, column {name}: needed are {needed}") from None
-    if column.ndim != 1:
-        raise TableError(
-            f"rows, column {name}: has shape {column.shape}; needed is one value a row"
-        )
-    return column
+        given = np.atleast_1d(np.asarray(values))
+    except ValueError:  # lists of different lengths
+        raise TableError(f"rows, column {name}: needed is one value a row") from None
+    if given.ndim != 1:
+        raise TableError(f"rows, column {name}: has shape {given.shape}; needed is one value a row")
+    if name in TEXT:
+        return _text(name, given)
+    if given.dtype.kind in "iuf":
+        return given.astype(np.float64)
+    cells = given.tolist()
+    if given.dtype.kind != "O" or not all(c is None or _is_number(c) for c in cells):
+        raise TableError(f"rows, column {name}: needed are numbers, and None where one is missing")
+    return np.asarray([np.nan if c is None else c for c in cells], dtype=np.float64)
+
+
+def _is_number(cell: object) -> bool:
+    return isinstance(cell, int | float | np.number) and not isinstance(cell, bool)
+
+
+def _text(name: str, given: NDArray[Any]) -> Column:
+    """A column of text, "" where blank, as a file would have it."""
+    names = ["" if c is None else str(c).strip() for c in given.tolist()]
+    for i, cell in enumerate(names):
+        if fault := fault_of_text(cell):
+            raise TableError(f"rows, row {i + 1}, column {name}: {fault}")
+    return np.asarray(names, dtype=np.str_)

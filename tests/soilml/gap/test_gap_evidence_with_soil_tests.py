@@ -87,7 +87,7 @@ def test_odds_of_an_effect_are_those_of_its_likelihood_tempered():
     np.testing.assert_allclose(np.exp(log) / np.exp(log).sum(), shares, rtol=1e-9)
 
 
-def test_a_size_of_either_sign_has_both(tested):
+def test_a_size_of_either_sign_has_both():
     size, log = _size_posterior(np.asarray([1.0]), np.asarray([0.5]), 0, np.inf)
     assert size.tolist() == [*-SIZES, *SIZES]
     k = int(np.argmin(np.abs(SIZES - 1.0)))

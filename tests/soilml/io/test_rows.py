@@ -71,6 +71,12 @@ def test_tests_of_a_soil_as_columns():
         ({"slip": [[0.1, 0.2]]}, r"column slip: has shape \(1, 2\)"),
         ({"slip": ["much"]}, "column slip: needed are numbers"),
         ({"slip": [{}]}, "column slip: needed are numbers"),
+        ({"slip": ["0.1"]}, "column slip: needed are numbers"),
+        ({"slip": ["1_0e-2", 0.1]}, "column slip: needed are numbers"),
+        ({"slip": [True]}, "column slip: needed are numbers"),
+        ({"slip": [[0.1], [0.1, 0.2]]}, "column slip: needed is one value a row"),
+        ({"run": [None, "a"], "slip": [0.1, 0.2]}, "run"),
+        ({"run": ["a\x1b[31m"], "slip": [0.1]}, "control characters"),
         ({"slip": [0.1], "load": [60.0]}, "the unit is missing, name it load_N"),
         ({"slip": [20.0], "load_N": [60.0]}, "a slip ratio, between -1 and 1"),
         ({"slip": [0.1, np.nan], "load_N": [60.0, 60.0]}, "slip"),
@@ -87,5 +93,5 @@ def test_a_table_stays_and_single_values_are_a_row():
     table = Table(COLUMNS)
     assert as_table(table) is table
     assert as_table({"slip": 0.1, "load_N": 60, "run": "a"})["run"].tolist() == ["a"]
-    blank = as_table({"slip": [0.1, 0.2], "torque_Nm": [None, 2.0]})
+    blank = as_table({"slip": [0.1, 0.2], "torque_Nm": [None, np.float32(2.0)]})
     np.testing.assert_array_equal(blank["torque_Nm"], [np.nan, 2.0])

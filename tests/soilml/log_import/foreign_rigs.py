@@ -91,6 +91,11 @@ def table(columns, separator=",", **style):
             for row in zip(*columns, strict=True)]  # fmt: skip
 
 
+def nearest_stage(stages, slip, load):
+    """The true stage (slip, load) that a row of an import is of."""
+    return min(stages, key=lambda s: abs(s[0] - slip) / 0.05 + abs(s[1] / load - 1) * 8)
+
+
 def runs_below_each_other(rng, folder):
     """TSV with a byte order mark: three runs, each with its header; the carriage stalls twice."""
     lines, stages = [], []

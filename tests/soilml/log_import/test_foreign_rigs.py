@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from foreign_rigs import RADIUS_EDIT, WRITERS, drive, law, table
+from foreign_rigs import RADIUS_EDIT, WRITERS, drive, law, nearest_stage, table
 
 from soilml.log_import import import_log, init_map
 from soilml.log_import.guesses.columns.column_words import words_of
@@ -29,12 +29,7 @@ def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
     zero = 2.0 if writer.__name__ == "pounds_and_a_lifted_end" else 0.0
     met = set()
     for i in range(len(rows)):
-        slip, load = min(
-            stages,
-            key=lambda s: (
-                abs(s[0] - rows["slip"][i]) / 0.05 + abs(s[1] / rows["load_N"][i] - 1) * 8
-            ),
-        )
+        slip, load = nearest_stage(stages, rows["slip"][i], rows["load_N"][i])
         met.add((slip, load))
         torque, pull, sinkage = law(slip, load)
         assert rows["slip"][i] == pytest.approx(slip, abs=0.012)

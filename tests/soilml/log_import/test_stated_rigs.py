@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from foreign_rigs import drive, law, table
+from foreign_rigs import drive, law, nearest_stage, table
 from stated_rigs import WRITERS, a_lever
 
 from soilml.log_import import import_log, init_map
@@ -23,12 +23,7 @@ def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
     rows = import_log(logs, tmp_path / "map.toml").table
     met = set()
     for i in range(len(rows)):
-        slip, load = min(
-            stages,
-            key=lambda s: (
-                abs(s[0] - rows["slip"][i]) / 0.05 + abs(s[1] / rows["load_N"][i] - 1) * 8
-            ),
-        )
+        slip, load = nearest_stage(stages, rows["slip"][i], rows["load_N"][i])
         met.add((slip, load))
         torque, pull, sinkage = law(slip, load)
         assert rows["slip"][i] == pytest.approx(slip, abs=0.012)
