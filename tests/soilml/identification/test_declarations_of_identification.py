@@ -9,6 +9,7 @@ from pkgutil import walk_packages
 
 import numpy as np
 import pytest
+from stated_constants import differences
 
 import soilml.identification
 from soilml.identification.data import levels
@@ -128,3 +129,7 @@ def test_a_range_without_gaps_is_divided_into_equal_widths():
     narrow = pairs * np.asarray([[0.1], [1.0]])
     assert len(levels._divide_range(narrow, rule)) == 1
     assert len(levels._divide_range(pairs[:, :1], rule)) == 1
+
+
+def test_constants_are_those_of_the_page():
+    assert differences("soilml/identification") == [], "renew: python docs/site/constant_listing.py"

@@ -1,0 +1,294 @@
+"""Decisions of the search, one by one: what is selected, fitted again, extended and rejected."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from soilml.gap.search import selection, stepwise
+from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.statistics.evidence import Evidence
+
+
+def fit_of(objective=0.0, x=None):
+    """What the decisions see of a fit."""
+    start = x or {}
+    return SimpleNamespace(
+        objective=objective, fitted=lambda: None, start_values=lambda: dict(start)
+    )
+
+
+def made(*names, objective=0.0, amplitude=(0.0, 0.0), noise_only=None, x=None):
+    """A candidate with this objective and discrepancy."""
+    known = np.asarray(amplitude, dtype=float)
+    evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
+    marginal = MarginalFit(fit_of(objective, x), evidence)
+    return CandidateFit(names, marginal, marginal, noise_only)
+
+
+@pytest.fixture
+def screens(monkeypatch):
+    """Gains by a law of one's own, beside the discrepancy and alone, and under noise alone."""
+    given = {"none": {}, "soil": {}, "noise": {}}
+
+    def own_law(problem, none, fit, signatures):
+        return given["none" if fit is none.fit else "soil"]
+
+    monkeypatch.setattr(selection, "free_law_gains", own_law)
+    monkeypatch.setattr(selection, "noise_only_gains", lambda problem, soil, s: given["noise"])
+    return given
+
+
+def selected(gains, amplitude=(0.0, 0.0), starts=None):
+    none = made(amplitude=amplitude)
+    return selection.effects_to_fit(None, none, fit_of(), [], gains, starts or {})
+
+
+def test_effects_within_12_of_the_largest_gain_are_fitted_at_least_four_at_most_nine(screens):
+    gains = {"a": 50.0, "b": 49.0, "c": 45.0, "d": 39.0, "e": 38.5, "f": 37.5, "g": 1.0}
+    assert selected(gains) == list("abcde")
+    assert selected({"a": 50.0, "b": 1.0, "c": 4.0, "d": 3.0, "e": 2.0}) == list("acde")
+    many = {name: 50.0 - i for i, name in enumerate("abcdefghijkl")}
+    assert selected(many) == list("abcdefghi")
+    assert selected({"b": 3.0, "a": 7.0}) == ["a", "b"]
+
+
+def test_six_more_are_those_that_explain_most_by_their_own_law(screens):
+    gains = {"a": 50.0} | dict.fromkeys("bcd", 2.0) | dict.fromkeys("ABCDEFGHPQRSTUVW", 0.0)
+    screens["none"] = {name: 20.0 - i for i, name in enumerate("ABCDEFGH")}
+    screens["soil"] = {name: 20.0 - i for i, name in enumerate("PQRSTUVW")} | {"unknown": 99.0}
+    assert selected(gains) == [*"abcd", *"ABCDEF", *"PQRST"]
+
+
+@pytest.mark.parametrize("largest, hidden", [(2.4, False), (2.5, True)])
+def test_beside_a_large_discrepancy_those_that_explain_most_under_noise_too(
+    screens, largest, hidden
+):
+    gains = dict.fromkeys("abcd", 50.0) | dict.fromkeys("ABCDEFGH", 0.0)
+    screens["noise"] = {name: 20.0 - i for i, name in enumerate("ABCDEFGH")}
+    found = selected(gains, amplitude=(0.1, largest))
+    assert found == [*"abcd", *("ABCDEF" if hidden else "")]
+
+
+def test_single_effects_within_15_of_the_best_of_an_earlier_search_are_fitted_again(screens):
+    gains = dict.fromkeys("abcd", 50.0) | dict.fromkeys("xyz", -90.0)
+    earlier = [
+        made("x", "y", objective=-30.0),
+        made("x", objective=-15.5),
+        made("y", objective=-14.5),
+        made("gone", objective=-20.0),
+    ]
+    assert selected(gains, starts={c.names: c for c in earlier}) == [*"abcd", "x"]
+
+
+@pytest.fixture
+def fitting(monkeypatch):
+    """Requests that were made, what they give, what shapes promise, and what is shaped."""
+    seen = SimpleNamespace(requests=[], results={}, promise={}, shaped=[])
+
+    def fit_candidates(problem, requests):
+        seen.requests = requests
+        return [seen.results[r.names] for r in requests if r.names in seen.results]
+
+    def fit_shapes(problem, candidates):
+        seen.shaped = [c.names for c in candidates]
+        return [replace(c, noise_only="shaped") for c in candidates]
+
+    monkeypatch.setattr(stepwise, "fit_candidates", fit_candidates)
+    monkeypatch.setattr(stepwise, "fit_shapes", fit_shapes)
+    monkeypatch.setattr(
+        stepwise, "predicted_shape_gain", lambda problem, c: seen.promise.get(c.names, 0.0)
+    )
+    return seen
+
+
+def level(none, sets, starts=None, soil=None):
+    return stepwise._fit_level(None, soil or fit_of(100.0), none, sets, starts or {})
+
+
+def test_shapes_are_fitted_where_they_could_bring_a_set_to_the_best(fitting):
+    none = made(objective=20.0)
+    values = {"best": 0.0, "near": 14.9, "far": 15.1, "promises": 59.0, "too-little": 61.0}
+    fitting.results = {(n,): made(n, objective=v) for n, v in values.items()}
+    fitting.results["by-noise",] = made("by-noise", objective=70.0, noise_only=fit_of(79.0))
+    fitting.results["not-by-noise",] = made("not-by-noise", objective=70.0, noise_only=fit_of(81.0))
+    fitting.promise = {("promises",): 20.0, ("too-little",): 20.0}
+    found = level(none, dict.fromkeys(fitting.results, none))
+    assert fitting.shaped == [("best",), ("near",), ("promises",), ("by-noise",)]
+    assert [c.names for c in found] == list(fitting.results)  # in their order, shaped or not
+    assert [c.names for c in found if c.noise_only == "shaped"] == fitting.shaped
+
+
+def test_the_soil_alone_is_one_of_those_that_shapes_must_reach(fitting):
+    fitting.results = {("a",): made("a", objective=16.0), ("b",): made("b", objective=14.0)}
+    level(made(objective=0.0), dict.fromkeys(fitting.results, made()))
+    assert fitting.shaped == [("b",)]
+
+
+def test_where_the_model_refuses_all_sets_nothing_is_shaped(fitting):
+    assert level(made(), {("a",): made()}) == []
+    assert fitting.shaped == []
+
+
+def test_a_set_starts_from_what_it_extends_or_from_an_earlier_search(fitting):
+    base = made("a", amplitude=(2.0, 0.1), x={"soil": 0.2})
+    none = made(amplitude=(1.0, 0.5), x={"soil": 0.9})
+    earlier = made("a", "c", amplitude=(0.3, 0.0), x={"soil": 0.4})
+    level(none, {("a", "b"): base, ("a", "c"): base}, {("a", "c"): earlier})
+    first, second = fitting.requests
+    assert first.names == ("a", "b") and first.start == {"soil": 0.2}
+    assert first.amplitude.tolist() == [1.0, 0.1] and first.noise_start is None
+    assert second.start == {"soil": 0.4} and second.amplitude.tolist() == [0.3, 0.0]
+
+
+@pytest.mark.parametrize("largest", [2.4, 2.5])
+def test_single_effects_beside_a_large_discrepancy_are_fitted_under_noise_first(fitting, largest):
+    none = made(amplitude=(0.0, largest))
+    soil = fit_of(0.0, {"cohesion": 1.0, "shear_modulus": 0.25})
+    earlier = made("b", noise_only=fit_of(x={"cohesion": 0.7}))
+    level(none, {("a",): none, ("b",): none}, {("b",): earlier}, soil)
+    # nearer to the middle of the priors, since the soil alone is often at a bound
+    inward = {"cohesion": pytest.approx(0.9), "shear_modulus": pytest.approx(0.3)}
+    expected = [inward, {"cohesion": 0.7}] if largest >= 2.5 else [None, None]
+    assert [r.noise_start for r in fitting.requests] == expected
+    level(none, {("a", "b"): made("a", amplitude=(0.0, largest))}, {}, soil)
+    assert [r.noise_start for r in fitting.requests] == [None]
+
+
+@pytest.fixture
+def extending(monkeypatch):
+    """Gains by one more effect, by the names of the set."""
+    gains = {}
+    monkeypatch.setattr(stepwise, "effect_signatures", lambda *_: ((), ()))
+    monkeypatch.setattr(
+        stepwise, "predicted_gains", lambda problem, c, objective, s: gains.get(c.names, {})
+    )
+    return gains
+
+
+def extensions(level, fitted=(), lowest=0.0):
+    problem = SimpleNamespace(
+        readings=None, effects_not_in=lambda fit: {}, discrepancy=None, covariance=None
+    )
+    found = stepwise._extensions(problem, level, dict.fromkeys(fitted), lowest)
+    return {names: base.names for names, base in found.items()}
+
+
+def test_the_best_three_sets_within_15_are_extended_by_the_best_three_effects(extending):
+    values = {"a": 1.0, "b": 2.0, "c": 3.0, "d": 4.0}
+    sets = [made(n, objective=v) for n, v in reversed(values.items())]
+    for name in values:
+        extending[(name,)] = {"p": 1.0, "q": 9.0, "r": 5.0, "s": 0.5, "t": -3.0}
+    found = extensions(sets)
+    assert list(found) == [(n, e) for n in "abc" for e in ("q", "r", "p")]
+    assert all(base == names[:1] for names, base in found.items())
+    far = [made("a", objective=14.9), made("b", objective=15.1)]
+    assert set(extensions(far).values()) == {("a",)}
+
+
+def test_only_effects_with_enough_gain_extend_and_no_set_twice(extending):
+    extending[("m",)] = {"a": -1.9, "b": -2.1, "z": 3.0}
+    extending[("z",)] = {"m": 8.0, "y": 7.0}
+    sets = [made("m", objective=0.0), made("z", objective=1.0)]
+    # (m, z) extends the better of its parts, and (y, z) was fitted
+    assert extensions(sets, fitted=[("y", "z")]) == {("m", "z"): ("m",), ("a", "m"): ("m",)}
+
+
+@pytest.mark.parametrize(
+    "amplitude, p_value, complete",
+    [((0.0, 0.0), 0.21, True), ((0.0, 0.0), 0.19, False), ((0.0, 0.1), 0.9, False)],
+)
+def test_a_set_is_complete_where_noise_explains_the_rest(monkeypatch, amplitude, p_value, complete):
+    test = SimpleNamespace(p_value=p_value)
+    monkeypatch.setattr(stepwise, "_test_residuals", lambda *_: test)
+    assert stepwise._is_complete(None, made("a", amplitude=amplitude), 0) == complete
+
+
+@pytest.fixture
+def searched(monkeypatch):
+    """A search of which each level of sets has a best objective; the levels that were fitted."""
+    seen = SimpleNamespace(levels=[], objective={0: 100.0}, complete=None, p_value=0.001, done=[])
+
+    def fit_level(problem, soil, none, sets, starts):
+        seen.levels.append(sorted(sets))
+        size = len(next(iter(sets), ()))
+        return [made(*n, objective=seen.objective[size]) for n in sets if size in seen.objective]
+
+    def grown(problem, level, fitted, lowest):
+        return {(*c.names, "abc"[len(c.names)]): c for c in level}
+
+    for name, value in {
+        "effect_signatures": lambda *_: ((), ("lacking",)),
+        "residual_test": lambda *_: SimpleNamespace(p_value=seen.p_value),
+        "_soil_alone": lambda *_: made(objective=seen.objective[0]),
+        "predicted_with_and_without": lambda *_: {"a": 5.0},
+        "effects_to_fit": lambda *_: ["a"],
+        "_fit_level": fit_level,
+        "_extensions": grown,
+        "_is_complete": lambda problem, best, seed: best.names == seen.complete,
+        "_test_residuals": lambda *_: SimpleNamespace(p_value=seen.p_value),
+    }.items():
+        monkeypatch.setattr(stepwise, name, value)
+    problem = SimpleNamespace(readings=None, effects={})
+
+    def run():
+        seen.levels, seen.done = [], []
+        return stepwise.search(problem, fit_of(), 0, None, seen.done.append)
+
+    return seen, run
+
+
+def test_sets_of_up_to_three_effects_are_tried_while_each_is_better(searched):
+    seen, run = searched
+    seen.objective = {0: 100.0, 1: 50.0, 2: 40.0, 3: 30.0}
+    found = run()
+    assert seen.levels == [[("a",)], [("a", "b")], [("a", "b", "c")]]
+    assert seen.done == [0.25, 0.5, 0.75]
+    assert [c.objective for c in found.candidates] == [30.0, 40.0, 50.0, 100.0]
+    assert found.none.names == () and found.likeliest.names == ("a", "b", "c")
+    assert found.untestable == ("lacking",) and found.predicted_gain == {"a": 5.0}
+
+
+@pytest.mark.parametrize("second, levels", [(49.5, 2), (48.5, 3)])
+def test_larger_sets_are_tried_where_the_last_step_lowered_the_objective_by_one(
+    searched, second, levels
+):
+    seen, run = searched
+    seen.objective = {0: 100.0, 1: 50.0, 2: second, 3: 40.0}
+    run()
+    assert len(seen.levels) == levels
+
+
+def test_the_search_ends_with_a_complete_set_or_one_that_the_model_refuses(searched):
+    seen, run = searched
+    seen.objective = {0: 100.0, 1: 50.0, 2: 40.0, 3: 30.0}
+    seen.complete = ("a",)
+    run()
+    assert len(seen.levels) == 1
+    seen.complete, seen.objective = None, {0: 100.0, 1: 50.0}
+    run()
+    assert len(seen.levels) == 2
+    # the soil alone is never complete: a gap was found
+    seen.complete, seen.objective = (), {0: 10.0, 1: 50.0, 2: 5.0, 3: 3.0}
+    run()
+    assert len(seen.levels) == 3
+
+
+@pytest.mark.parametrize("p_value, gap", [(0.029, True), (0.031, False)])
+def test_a_gap_is_searched_where_the_soil_alone_is_rejected_at_3_per_cent(searched, p_value, gap):
+    seen, run = searched
+    seen.p_value, seen.objective = p_value, {0: 100.0, 1: 50.0}
+    found = run()
+    assert found.has_gap == bool(found.candidates) == gap
+    assert found.untestable == ("lacking",) and (seen.done == []) == (not gap)
+    if not gap:
+        assert found.none is found.likeliest is None and found.accepted == ()
+
+
+@pytest.mark.parametrize("p_value, adequate", [(0.0009, False), (0.0011, True)])
+def test_an_explanation_leaves_a_remainder_from_one_in_a_thousand(searched, p_value, adequate):
+    seen, run = searched
+    seen.p_value, seen.objective = p_value, {0: 100.0, 1: 50.0}
+    assert run().adequate == adequate
