@@ -1,0 +1,168 @@
+"""Entries of a report from analyses that are made up: notes, suspects, what is shown."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.gap.search.candidate_fits import (
+    EFFECT_PENALTY,
+    CandidateFit,
+)
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.posterior import Posterior
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES
+from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.verdict import report_entries
+from soilml.gap.verdict.report_entries import (
+    _bound_notes,
+    analysis_notes,
+    competing_explanations,
+    soil_beside_discrepancy,
+    soil_marginal,
+    suspects,
+    variance_component_entries,
+)
+from soilml.numerics.prior import Prior
+
+
+def made(*names, objective=0.0, amplitude=(0.0, 0.0)):
+    """A candidate with this objective and discrepancy."""
+    known = np.asarray(amplitude, dtype=float)
+    evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
+    marginal = MarginalFit(SimpleNamespace(objective=objective, x=np.zeros(2)), evidence)
+    return CandidateFit(names, marginal, marginal)
+
+
+def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(), **components):
+    """An analysis with these candidates, of readings of two channels."""
+    found = {
+        "noise_scale": np.ones(2),
+        "friction_angle_std": 0.0,
+        "bearing_std": 0.0,
+        "autocorrelation": 0.0,
+    }
+    soil = SimpleNamespace(objective=50.0, x=np.zeros(2), case=None, values=dict)
+    evidence = lambda fit, start=None: ("evidence of", fit, start)  # noqa: E731
+    problem = SimpleNamespace(
+        readings=SimpleNamespace(channels=("torque", "sinkage"), runs=runs),
+        covariance=SimpleNamespace(components=SimpleNamespace(**(found | components))),
+        discrepancy=SimpleNamespace(evidence=evidence),
+    )
+    result = SimpleNamespace(
+        soil=soil,
+        candidates=candidates,
+        accepted=accepted,
+        none=next((c for c in candidates if not c.names), None),
+        posterior=Posterior(weights or {}),
+        has_gap=False,
+    )
+    return SimpleNamespace(problem=problem, result=result, outliers=outliers)
+
+
+def test_the_soil_beside_a_discrepancy_stays_where_noise_put_it_under_the_largest():
+    usual = made(amplitude=(AMPLITUDES[-2], 0.15))
+    assert soil_beside_discrepancy(analysed(usual)) is usual.best
+    largest = made(amplitude=(AMPLITUDES[-1], 0.15))
+    given = analysed(largest)
+    found = soil_beside_discrepancy(given)
+    assert found.fit is given.result.soil
+    assert found.evidence[:2] == ("evidence of", given.result.soil)
+    assert found.evidence[2] is largest.amplitude
+    nothing = analysed()
+    assert soil_beside_discrepancy(nothing).evidence == ("evidence of", nothing.result.soil, None)
+    without = analysed(made())
+    found = soil_beside_discrepancy(without)
+    assert found.fit is without.result.soil and found.evidence.value == 50.0
+    assert not found.evidence.amplitude.any() and found.evidence.expected_amplitude.size == 2
+    assert soil_marginal(without).evidence.step.size == 2
+
+
+def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_runner_up():
+    none, a, b, c, d = made(), made("a"), made("b"), made("c"), made("d")
+    pair = made("a", "e")
+    assert competing_explanations(analysed(none, a, b, accepted=(a, b, none))) == [a, b]
+    # a set that contains the accepted one is no rival of it
+    assert competing_explanations(analysed(pair, a, none, b, c, accepted=(a,))) == [a, b]
+    assert competing_explanations(analysed(pair, a, none, b, d)) == [pair, a, b]
+    assert competing_explanations(analysed(none)) == []
+
+
+def test_suspects_are_the_likeliest_eight_under_stated_conditions():
+    weights = {(f"e{i}",): -1.0 - i for i in range(12)} | {(): -3.0}
+    found = suspects(analysed(weights=weights), [])
+    assert [s.effects[0] for s in found] == [f"e{i}" for i in range(8)]
+    assert found[0].log_odds > found[1].log_odds
+    assert found[0].given == (
+        "if no other cause than those of the catalogue has a similar signature"
+    )
+    (one, *_) = suspects(analysed(weights=weights, runs=("a",)), ["only one load was driven"])
+    assert ", and if the bed was the same for all rows, and if the soil parameters" in one.given
+
+
+def notes(given):
+    fit = SimpleNamespace(coordinates=[], x=np.zeros(0))
+    return analysis_notes(given, fit, fit, ["run a and run b"])
+
+
+def test_notes_on_outliers_noise_runs_and_memory(monkeypatch):
+    monkeypatch.setattr(report_entries, "overstated_noise_notes", lambda readings: [])
+    assert notes(analysed(runs=("a",))) == ["rows driven alike disagree: run a and run b"]
+    several = notes(
+        analysed(
+            outliers=[f"o{i}" for i in range(7)],
+            noise_scale=np.asarray([1.25, 1.26]),
+            autocorrelation=0.5,
+            runs=tuple("abcdef"),
+        )
+    )
+    assert several == [
+        "7 readings are outliers and were excluded: o0, o1, o2, o3, o4, o5",
+        "the noise of sinkage_m is 1.3 times as large as declared",
+        "rows driven alike disagree: run a and run b",
+        "the noise of neighbouring samples of a run is correlated (0.5), which reduces their "
+        "weight",
+    ]
+    (one, _, few) = notes(
+        analysed(outliers=["o"], runs=tuple("abcde"), friction_angle_std=0.01, bearing_std=0.04)
+    )
+    assert one == "1 reading is an outlier and was excluded: o"
+    assert few.startswith("run-to-run variation of the soil cannot be estimated from fewer than 6")
+    assert "0.57 deg of friction angle and 4% of bearing strength are assumed" in few
+
+
+def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
+    monkeypatch.setattr(report_entries, "overstated_noise_notes", lambda readings: [])
+    monkeypatch.setattr(
+        report_entries, "disagreeing_soil_tests", lambda case, values: ["plate 3 sigma off"]
+    )
+    given = analysed(runs=("a",))
+    assert not any("plate" in note for note in notes(given))
+    given.result.has_gap = True
+    assert any("plate 3 sigma off; part of the gap" in note for note in notes(given))
+
+
+def test_estimates_at_a_bound():
+    soil = SoilCoordinate("cohesion", "Pa", 0.0, 1.0, Prior(0.0, 1000.0))
+    size = EffectCoordinate("n1", "1", 0.0, 4.0, Prior(0.0, 1.0), effect="slip-sinkage")
+    at = [f"{soil.path} is at a bound of its prior"]
+    assert _bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5]) == 2 * at
+    assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []
+    assert _bound_notes([size, size], [3.9961, 0.0]) == [f"{size.path} is at its upper bound"]
+    assert _bound_notes([size], [3.9959]) == []
+
+
+def test_variance_components_by_the_names_of_columns():
+    given = analysed(
+        noise_scale=np.asarray([1.0, 1.5]),
+        friction_angle_std=0.01,
+        bearing_std=0.02,
+        autocorrelation=0.3,
+    )
+    assert variance_component_entries(given) == {
+        "noise_scale_torque_Nm": 1.0,
+        "noise_scale_sinkage_m": 1.5,
+        "friction_angle_from_run_to_run_rad": 0.01,
+        "bearing_from_run_to_run": 0.02,
+        "memory_of_samples": 0.3,
+    }

@@ -1,0 +1,83 @@
+"""Gains by other laws of an effect, and the choice between fits, evaluated by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from gap_sets import candidate, case_of, driven, fit_problem
+
+from soilml.gap.search.candidate_fits import (
+    _better,
+    predicted_shape_gain,
+    shape_directions,
+)
+from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.search.predicted_gains import free_law_gains
+from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.statistics.signatures import Signature
+from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+
+
+@pytest.fixture(scope="module")
+def dug():
+    case = case_of()
+    problem = fit_problem(case, driven(case, [SlipSinkage(n1=0.3)], seed=2))
+    return problem, candidate(problem, ["slip-sinkage"], {})
+
+
+def test_directions_of_other_laws_are_of_second_order_in_slip_and_load(dug):
+    problem, found = dug
+    s, w = np.log(problem.readings.slip + 0.03), np.log(problem.readings.load)
+    s, w = s - s.mean(), w - w.mean()
+    known_s, known_w = problem.readings.log_slip_and_load
+    assert s == pytest.approx(known_s - known_s.mean())
+    assert w == pytest.approx(known_w - known_w.mean())
+    signature = found.fit.derivatives[:, 3]
+    directions = shape_directions(problem, found.fit)
+    for (direction,), term in zip([d.T for d in directions], (s * s, s * w, w * w), strict=True):
+        assert direction == pytest.approx(signature * term)
+    certain = candidate(problem, ["torque-gain"], {})  # its law has no shape
+    assert shape_directions(problem, certain.fit) == []
+
+
+def test_the_gain_by_shapes_is_what_columns_beside_the_fit_explain(dug):
+    problem, found = dug
+    amplitude = found.catalogue_law.evidence.amplitude
+    whiten, fit = problem.discrepancy.whiten(amplitude), found.fit
+    signature = fit.derivatives[:, 3]
+    slip, logs = problem.readings.slip, problem.readings.log_slip_and_load
+    columns = whiten @ np.column_stack([signature * t for t in (slip, *logs)])
+    residual = fit.residual
+    alone = residual - fit.jacobian @ np.linalg.lstsq(fit.jacobian, residual)[0]
+    both = np.column_stack([fit.jacobian, columns])
+    left = residual - both @ np.linalg.lstsq(both, residual)[0]
+    gain = np.sum(alone**2) - np.sum(left**2)
+    assert gain > 0.1
+    assert predicted_shape_gain(problem, found) == pytest.approx(gain, rel=1e-5)
+
+
+def test_an_effect_of_a_small_size_in_its_direction_gains_by_its_own_law(dug):
+    problem, _ = dug
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    none = candidate(problem, [], {})
+    rng = np.random.default_rng(1)
+    column = rng.standard_normal(len(problem.readings)) * problem.readings.std
+    exact = replace(soil, reading=soil.prediction + 0.2 * column)
+    signatures = [
+        Signature(name, "soil", sign * column, side)
+        for name, sign, side in (("up", 1, 1), ("down", 1, -1), ("any", 1, 0), ("turned", -1, 1))
+    ]
+    gains = free_law_gains(problem, none, exact, signatures)
+    assert gains["up"] == gains["any"] > 0.5
+    assert gains["down"] == gains["turned"] == 0.0
+
+
+def test_of_two_fits_the_one_of_larger_evidence_is_kept():
+    none = np.zeros(1)
+    first, second = (
+        MarginalFit(SimpleNamespace(), Evidence(value, none, none, none)) for value in (1.0, 2.0)
+    )
+    assert _better(first, second) is _better(second, first) is first
+    assert _better(None, second) is _better(second, None) is second
+    assert _better(None, None) is None
