@@ -21,7 +21,7 @@ AVERAGE = ("average_truth", "average_mean", "average_std")
 KEYS = (*WHOLE, *SINGLE, *AVERAGE, "repeat_std", "repeat_coverage_factor")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class HeldOutErrors:
     """Estimates of held-out rows beside their true values, and errors of repeated readings.
 
@@ -87,7 +87,7 @@ class HeldOutErrors:
         found: dict[str, Any] = {}
         for key in KEYS:
             values = getattr(self, key)
-            rounded = [float(f"{v:.4g}") for v in values.reshape(-1)]
+            rounded = [float(f"{v:.4g}") for v in values.ravel()]
             exact = values.dtype.kind == "i"
             found[key] = values.tolist() if exact else np.reshape(rounded, values.shape).tolist()
         return found

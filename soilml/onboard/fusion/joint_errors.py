@@ -166,7 +166,7 @@ def are_comparable(files: Sequence[HeldOutErrors | None]) -> bool:
 def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     """The rule from true values (n,) and estimates (m, n)."""
     z = (truth - mean) / std
-    moments = z @ z.T / len(truth)
+    moments = z @ z.T
     size = np.sqrt(np.diag(moments))
     centre, none = float(truth.mean()), np.zeros(0)
     plain = JointErrors(

@@ -12,6 +12,8 @@ from soilml.onboard.fusion.joint_errors import (
     DISAGREEMENT,
     LEAST_AVERAGES,
     JointErrors,
+    _disagreement,
+    _reach,
     joint_errors,
 )
 from soilml.onboard.fusion.narrower_prior import _without_prior, within_box
@@ -133,3 +135,32 @@ def test_gain_and_ends_of_the_interval_are_those_of_the_held_out_rows():
     assert rule.gain == pytest.approx(away @ (truth - truth.mean()) / (away @ away))
     assert np.all((rule.low < -1.2) & (rule.low > -2.4))  # normal errors: near 1.645
     assert np.all((rule.high > 1.2) & (rule.high < 2.4))
+
+
+def test_an_interval_is_widened_until_it_holds_nine_tenths():
+    """Errors of -1, -0.9 ... 1 below and above 0.5, in an interval from -1 to 1.5 around it."""
+    truth = 0.5 + np.linspace(-1.0, 1.0, 21)
+    mean, std = np.full(21, 0.5), np.full(21, 0.4)
+    # ends where the mean is half way between the middles: -1.5 and 2.5 standard deviations
+    reached = np.sort([*(np.linspace(0.1, 1.0, 10) / 0.6), *(np.linspace(0.0, 1.0, 11) / 1.0)])
+    expected = np.quantile(reached, 0.9, method="weibull")
+    plain = replace(RULE, repeats=1.0)
+    assert _reach(plain, truth, mean, std) == pytest.approx(expected)
+
+
+def test_disagreement_is_in_standard_deviations_of_the_difference():
+    mean, std = np.asarray([[0.5], [0.9], [0.4]]), np.asarray([[0.1], [0.2], [0.1]])
+    correlation = np.asarray([[1.0, 0.8, 0.0], [0.8, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    pairs = [
+        0.4 / np.sqrt(0.01 + 0.04 - 2.0 * 0.8 * 0.02),
+        0.1 / np.sqrt(0.02),
+        0.5 / np.sqrt(0.05),
+    ]
+    assert _disagreement(mean, std, correlation) == pytest.approx([max(pairs)])
+    assert _disagreement(mean[:1], std[:1], correlation) == pytest.approx([0.0])
+
+
+def test_the_same_file_is_equal_to_itself_alone():
+    first, second = Sensors().files()
+    assert first == Sensors().files()[0]
+    assert first != second and first != "first" and len({first, second, first}) == 2
