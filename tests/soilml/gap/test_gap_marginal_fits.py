@@ -1,0 +1,135 @@
+"""Fits beside a discrepancy: when they are repeated, and amplitudes over their probability."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.gap.search import marginal_fits
+from soilml.gap.search.marginal_fits import fit_marginal
+from soilml.gap.statistics.amplitude_prior import AMPLITUDES
+from soilml.gap.statistics.evidence import (
+    SMALLEST_SIZE,
+    Evidence,
+    _expected_amplitude,
+    _prior,
+    _size_prior,
+)
+from soilml.numerics.prior import Prior
+
+
+@dataclass(frozen=True)
+class Started:
+    """A fit to be made, known by its name."""
+
+    name: str
+    start: dict = field(default_factory=dict)
+    whiten: object = None
+
+
+@pytest.fixture
+def fitting(monkeypatch):
+    """Fits give, each time, the next value and amplitude that are listed under their name."""
+    listed, asked = {}, []
+
+    def fit_many(problem, started):
+        asked.append([(s.name, s.start, s.whiten) for s in started])
+        return [
+            listed[s.name]
+            if isinstance(listed[s.name], InputError)
+            else SimpleNamespace(
+                name=s.name, start_values=lambda name=s.name: {"from": name, "round": len(asked)}
+            )
+            for s in started
+        ]
+
+    def evidence(fit, amplitude):
+        value, found = listed[fit.name].pop(0)
+        return Evidence(value, np.asarray([found]), np.zeros(0), np.asarray([found]))
+
+    monkeypatch.setattr(marginal_fits, "fit_many", fit_many)
+    discrepancy = SimpleNamespace(evidence=evidence, whiten=lambda amplitude: float(amplitude[0]))
+    return SimpleNamespace(discrepancy=discrepancy), listed, asked
+
+
+def names(asked):
+    return [[name for name, _, _ in fits] for fits in asked]
+
+
+def test_a_fit_is_repeated_from_its_optimum_until_its_amplitude_stays(fitting):
+    problem, listed, asked = fitting
+    listed |= {"steady": [(5.0, 0.2)], "moves": [(9.0, 1.0), (7.0, 2.5), (6.5, 2.4)]}
+    requests = [(Started(name), np.zeros(1)) for name in listed]
+    steady, moves = fit_marginal(problem, requests)
+    assert names(asked) == [["steady", "moves"], ["moves"], ["moves"]]
+    assert [whiten for _, _, whiten in (fits[-1] for fits in asked)] == [0.0, 1.0, 2.5]
+    assert asked[2][0][1] == {"from": "moves", "round": 2}
+    assert (steady.evidence.value, moves.evidence.value) == (5.0, 6.5)
+    assert steady.first is steady.fit  # the fit under the amplitudes that were started with
+    assert moves.first.start_values() and moves.first is not moves.fit
+
+
+def test_a_fit_is_made_three_times_at_most(fitting):
+    problem, listed, asked = fitting
+    listed["restless"] = [(9.0, 1.0), (8.0, 3.0), (7.0, 9.0), (6.0, 25.0)]
+    (found,) = fit_marginal(problem, [(Started("restless"), np.zeros(1))])
+    assert len(asked) == 3 and found.evidence.value == 7.0
+
+
+@pytest.mark.parametrize("above, again", [(39.9, True), (40.1, False)])
+def test_a_fit_far_above_the_best_is_not_repeated(fitting, above, again):
+    problem, listed, asked = fitting
+    listed |= {"best": [(5.0, 0.0)], "poor": [(5.0 + above, 1.0), (5.0, 1.0)]}
+    fit_marginal(problem, [(Started(name), np.zeros(1)) for name in listed])
+    assert names(asked)[1:] == ([["poor"]] if again else [])
+    asked.clear()
+    listed["poor"] = [(5.0 + above, 1.0), (5.0, 1.0)]
+    fit_marginal(problem, [(Started("poor"), np.zeros(1))], lowest=5.0)
+    assert len(asked) == 1 + again
+
+
+def test_fits_that_the_model_refuses_or_that_have_no_equilibrium_are_none(fitting):
+    problem, listed, _ = fitting
+    listed |= {"refused": InputError("no"), "unsolved": [(np.nan, 1.0)], "good": [(1.0, 0.0)]}
+    found = fit_marginal(problem, [(Started(name), np.zeros(1)) for name in listed])
+    assert found[0] is None and found[1] is None and found[2].evidence.value == 1.0
+
+
+def test_amplitudes_are_root_mean_squares_over_their_tempered_probability():
+    """Half of the difference of -2 ln p counts, and of each channel with the other at its best."""
+    values = {0: (AMPLITUDES - 1.0) ** 2, 1: 3.0 * (AMPLITUDES - 0.4) ** 2}
+    problem = SimpleNamespace(along=lambda amplitude, i: values[i])
+    found = _expected_amplitude(problem, np.asarray([1.0, 0.4]))
+    for i, value in values.items():
+        weight = np.exp(-0.25 * value)
+        assert found[i] ** 2 == pytest.approx(np.average(AMPLITUDES**2, weights=weight))
+
+
+def size(lower, std=np.inf):
+    return EffectCoordinate("n1", "1", lower, 9.0, Prior(0.0, 1.0), effect="dig", std=std)
+
+
+def test_priors_of_coordinates_as_precision_slope_and_value():
+    """Of a uniform prior, the variance 1/12; of a Gaussian one, -2 ln p less ln 2 pi."""
+    assert _prior(SoilCoordinate("c", "Pa", 0.0, 1.0, Prior(0.0, 1.0)), 0.3) == (12.0, 0.0, 0.0)
+    precision, pull, value = _prior(size(-9.0, std=0.5), 0.7)
+    assert (precision, pull) == (pytest.approx(4.0), pytest.approx(4.0 * 0.7))
+    assert value == pytest.approx((0.7 / 0.5) ** 2 + 2.0 * np.log(0.5))
+    for x in (0.2, 7.0):
+        assert _prior(size(0.0), x) == _size_prior(x, two_sided=False)
+        assert _prior(size(-9.0), x) == _size_prior(x, two_sided=True)
+
+
+@pytest.mark.parametrize("x, power", [(0.3, 1.0), (-0.3, 1.0), (5.0, 1.0), (7.0, 3.0)])
+def test_the_density_of_a_size_falls_with_its_first_and_beyond_usual_ones_third_power(x, power):
+    precision, slope, value = _size_prior(x, two_sided=True)
+    shifted = abs(x) + SMALLEST_SIZE
+    assert precision == pytest.approx(power / shifted**2)
+    assert slope == pytest.approx(power * np.sign(x) / shifted)
+    density = 1.0 / (2.0 * shifted * np.log(1.0 + 5.0 / 0.01))
+    if abs(x) > 5.0:
+        density *= (5.01 / shifted) ** 2
+    assert value == pytest.approx(-2.0 * np.log(density) - np.log(2.0 * np.pi))
