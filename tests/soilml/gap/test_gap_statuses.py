@@ -178,6 +178,18 @@ def test_a_large_remainder_beside_little_evidence_is_suspected():
         assert ("drawbar pull" in made.reason) == (expected == "suspected")
 
 
+def test_beside_a_large_remainder_the_first_suspect_is_shown_and_why_not_the_best():
+    best = candidate("dig", 20.0, amplitude=(LARGE_REMAINDER, 0.1))
+    none = candidate("", 20.0 + DECISIVE_GAIN - 1.0, amplitude=(5.0, 5.0))
+    words = "beside dig, at least four times the usual error of a model is left in the torque"
+    made = decide(PROBLEM, searched(none, best, PLOUGH), (), ())
+    assert (made.shown, made.reason) == (best, words)
+    weights = {(): -9.0, ("dig",): -2.0, ("plough",): -1.0}
+    made = decide(PROBLEM, searched(none, best, PLOUGH, weights=weights), (), ())
+    assert made.status == "suspected" and made.shown is PLOUGH
+    assert made.reason == f"{words}, and the evidence for plough is not decisive"
+
+
 def test_another_law_is_stated_where_it_matters(law):
     one, other = marginal(15.0), marginal(20.0)
     free = CandidateFit(("dig",), other, one)

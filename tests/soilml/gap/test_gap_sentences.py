@@ -1,0 +1,155 @@
+"""The verdict in words and what it does not support, by status."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from gap_sets import case_of
+
+from soilml.config.model_discrepancy import Discrepancy
+from soilml.gap.messages import _odds, unsupported_conclusions, verdict_sentence
+from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy, Suspect
+from soilml.gap.results import GapReport
+
+FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}
+LEFT = {
+    "sinkage_m": RemainingDiscrepancy("m", 0.004, 0.0021, 4.0, 0.3, ""),
+    "drawbar_pull_N": RemainingDiscrepancy("N", 4.0, 2.5, 4.0, 1.26, ""),
+    "torque_Nm": RemainingDiscrepancy("N m", 4.0, 2.5, 4.0, 0.29, ""),
+}
+REMAINDER = (
+    "A smooth discrepancy is left, root mean square: sinkage 2.1 mm (0.30 sigma), drawbar pull "
+    "2.5 N (1.3 sigma)."
+)
+
+
+def report(status, **parts):
+    parts = {"gap": FIGURES, "p_gap": 0.123} | parts
+    return GapReport(status, "", parts.pop("model", case_of()), **parts)
+
+
+def effect(name):
+    return SimpleNamespace(name=name)
+
+
+def said(status, present=(), **parts):
+    return verdict_sentence(report(status, **parts), present)
+
+
+def test_agreement_is_within_the_noise_and_what_was_declared():
+    expected = "agree within the noise: mean squared residual 8.8, p = 0.12."
+    assert said("no-gap").endswith(expected)
+    declared = replace(case_of(), discrepancy={"torque_Nm": Discrepancy(share=0.02)})
+    assert "within the noise and the declared discrepancy:" in said("no-gap", model=declared)
+
+
+def test_without_a_cause_the_reasons_are_told():
+    reasons = ("one load only", "runs differ")
+    assert said("undecided", reasons=reasons).endswith("inconsistent: one load only; runs differ.")
+    assert said("not-testable", reasons=reasons).endswith("its cause: one load only; runs differ.")
+    unknown = said("unknown", reasons=reasons, best_unclaimed=("a", "b"), discrepancy=LEFT)
+    assert unknown == (
+        "There is a gap, and no cause is named: a + b fits best, but one load only; runs differ. "
+        + REMAINDER
+    )
+    plain = said("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
+    assert plain.endswith("discrepancy of unknown cause does.")
+
+
+def test_suspects_have_their_odds_and_the_first_three_are_listed():
+    odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
+    suspects = tuple(Suspect((name,), value, "") for name, value in odds.items())
+    sentence = said("suspected", suspects=suspects)
+    assert sentence == (
+        "There is a gap, and its cause is not named: the evidence is not decisive beside the "
+        "model's usual error. Suspects, the likeliest first, with their odds within the "
+        "catalogue: a (odds 20 to 1); b (even odds); c (odds 1 to 2.7). With a, mean squared "
+        "residual 8.80 -> 1.10 (noise alone gives 1)."
+    )
+    other = said("suspected", suspects=suspects, best_unclaimed=("c", "d"), reasons=("why",))
+    assert "not named: why. " in other and "With c + d, mean" in other
+
+
+@pytest.mark.parametrize(
+    "log_odds, words",
+    [
+        (0.09, "even odds"),
+        (-0.09, "even odds"),
+        (0.11, "odds 1.1 to 1"),
+        (-0.11, "odds 1 to 1.1"),
+        (9.2, "odds 9897 to 1"),
+        (9.3, "odds more than 10000 to 1"),
+        (-9.3, "odds 1 to more than 10000"),
+    ],
+)
+def test_odds_in_words(log_odds, words):
+    assert _odds(log_odds).replace("\N{NO-BREAK SPACE}", "") == words
+
+
+def test_explanations_by_what_is_claimed():
+    effects = (effect("dig"), effect("plough"))
+    known = "dig (the model has it at another size) + plough"
+    reduced = "mean squared residual 8.80 -> 1.10 (noise alone gives 1)"
+    parts = {"effects": effects, "discrepancy": LEFT}
+    assert said("named", ["dig"], **parts) == (
+        f"The gap is explained by {known}: {reduced}. No other effect of the catalogue explains it."
+    )
+    assert said("partly-named", ["dig"], **parts) == (
+        f"The evidence supports {known}: {reduced}. {REMAINDER}"
+    )
+    assert said("form-open", **parts) == (
+        "The gap is explained by dig + plough, with a law that differs from the catalogue's: "
+        f"{reduced}."
+    )
+    classes = said("class", cause_set=(("dig",), ("plough", "rate")), **parts)
+    assert "the likeliest first: dig, or plough + rate. With the first, " + reduced in classes
+    assert classes.endswith(f"cannot distinguish them. {REMAINDER}")
+
+
+def concluded(status, obstacles=(), fixed=(), **parts):
+    return unsupported_conclusions(report(status, **parts), obstacles, fixed)
+
+
+SMALLER = "that a smaller gap proves a cause: wrong effects reduce the gap too"
+
+
+def test_an_all_clear_is_no_proof():
+    complete = "that the model is complete: these runs merely show no disagreement"
+    assert concluded("no-gap", fixed=("kphi",)) == [complete]
+    assert concluded("undecided", ["one load"]) == ["the cause of the gap: one load", complete]
+
+
+@pytest.mark.parametrize(
+    "status, words",
+    [
+        ("named", ["no cause outside the catalogue"]),
+        ("form-open", ["no cause outside the catalogue", "the law of the effect"]),
+        ("partly-named", ["no cause outside the catalogue", "cause of the remaining discrepancy"]),
+        ("class", ["which of the effects is present"]),
+        ("unknown", ["any cause: model.toml contains the refitted soil and no new effect"]),
+        ("suspected", ["model_suspected.toml contains the first suspect"]),
+        ("not-testable", []),
+    ],
+)
+def test_what_each_status_does_not_support(status, words):
+    found = concluded(status, fixed=("n", "kphi"))
+    assert len(found) == len(words) + 2
+    for text, word in zip(found, words, strict=False):
+        assert word in text
+    assert found[-2].startswith("that n, kphi in the model file are correct")
+    assert found[-1] == SMALLER
+
+
+@pytest.mark.parametrize(
+    "before, after, told",
+    [(1.6, 0.81, True), (1.6, 0.79, False), (1.4, 1.4, False), (9.0, 4.4, False), (9.0, 4.6, True)],
+)
+def test_extrapolation_is_not_supported_where_the_gap_is_hardly_reduced(before, after, told):
+    region = GapReduction(before, after, {}, 24, "load_N >= 140")
+    found = concluded("named", gap=FIGURES | {"held_out_region": region})
+    assert any("on load_N >= 140 the gap is hardly reduced" in text for text in found) == told
+
+
+def test_effects_that_cannot_be_tested_are_listed_by_name():
+    found = concluded("named", untestable={"slope": "needs tilt", "rate": "needs speeds"})
+    assert found[-2:] == ["rate: needs speeds", "slope: needs tilt"]
