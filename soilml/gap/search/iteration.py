@@ -92,7 +92,7 @@ def analyse(
         signatures = result.final_test.signatures
         problem, found = _reestimate_covariance(problem, best, readings, signatures)
         excluded += [f"{name} at {place(row)}" for name, row in found]
-        if len(excluded) > MAX_OUTLIER_FRACTION * (len(readings) + len(excluded)):
+        if len(excluded) > MAX_OUTLIER_FRACTION * (len(problem.readings) + len(excluded)):
             error = f"{len(excluded)} readings are outliers: check the sensors first"
             return Analysis(problem, _no_result(soil), (), error)
         converged = not found and _have_converged(last, problem.covariance.components)

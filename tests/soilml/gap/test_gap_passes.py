@@ -1,0 +1,187 @@
+"""Passes of the analysis: covariance, outliers and search in turn, and when they end."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.gap.data.free_soil import free_soil_parameters
+from soilml.gap.fitting.coordinates import SoilCoordinate
+from soilml.gap.fitting.least_squares import GapFit
+from soilml.gap.search import iteration
+from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.statistics.reml_covariance import VarianceComponents
+from soilml.numerics.prior import Prior
+
+CASE = case_of()
+READINGS = fit_problem(CASE, driven(CASE)).readings
+
+
+@pytest.fixture
+def passes(monkeypatch):
+    """Passes whose outliers, components and accepted fits are listed; what they were given."""
+    given = SimpleNamespace(outliers=[], components=[], accepted=[], seen=[], starts=[])
+
+    def reestimate(problem, fit, readings, signatures):
+        i = len(given.seen)
+        given.seen.append((fit, len(readings), tuple(signatures)))
+        found = given.outliers[i] if i < len(given.outliers) else []
+        scale = given.components[i] if i < len(given.components) else 1.0
+        components = replace(problem.covariance.components, noise_scale=np.full(3, scale))
+        kept = readings.subset(np.arange(len(readings)) >= len(found))
+        covariance = iteration._declared_covariance(kept)
+        covariance = replace(covariance, components=components)
+        return replace(problem, readings=kept, covariance=covariance), found
+
+    def search(problem, soil, seed, starts, progress):
+        progress(0.5)
+        given.starts.append(sorted(starts))
+        names = given.accepted[len(given.starts) - 1]
+        explained = SimpleNamespace(names=names, fit=("fit of", names))
+        accepted = () if names is None else (explained,)
+        result = iteration._no_result(soil)
+        signature = SimpleNamespace(column=np.zeros(len(problem.readings)))
+        test = replace(result.final_test, signatures=(signature,))
+        return replace(result, accepted=accepted, candidates=accepted, final_test=test)
+
+    monkeypatch.setattr(iteration, "_reestimate_covariance", reestimate)
+    monkeypatch.setattr(iteration, "search", search)
+
+    def run(case=CASE, readings=READINGS):
+        shares = []
+        free = free_soil_parameters(case, None)
+        place = "row {}".format
+        found = iteration.analyse(case, free, readings, {}, {}, 0, place, shares.append)
+        return found, shares
+
+    return given, run
+
+
+def test_a_second_pass_uses_the_residuals_of_the_best_explanation(passes):
+    given, run = passes
+    given.components, given.accepted = [1.0, 1.3], [("a",), ("b",)]
+    found, shares = run()
+    assert [fit for fit, _, _ in given.seen][1] == ("fit of", ("a",))
+    assert isinstance(given.seen[0][0], GapFit) and given.seen[0][2] == ()
+    assert len(given.seen[1][2]) == 1  # the signatures of the last test of residuals
+    assert given.starts == [[], [("a",)]]
+    assert found.result.accepted[0].names == ("b",) and found.error == ""
+    assert shares == [0.25, 0.75]
+
+
+def test_no_second_search_where_the_covariance_has_converged(passes):
+    given, run = passes
+    given.components, given.accepted = [1.0, 1.1], [("a",), ("b",)]
+    found, _ = run()
+    assert len(given.seen) == 2 and len(given.starts) == 1
+    assert found.result.accepted[0].names == ("a",)
+    assert found.problem.covariance.components.noise_scale.tolist() == [1.1] * 3
+
+
+def test_outliers_of_the_second_pass_call_for_another_search(passes):
+    given, run = passes
+    given.accepted = [("a",), ("b",)]
+    given.outliers = [[("torque_Nm", 4)], [("sinkage_m", 7)]]
+    found, _ = run()
+    assert found.outliers == ("torque_Nm at row 4", "sinkage_m at row 7")
+    assert len(given.starts) == 2 and len(found.problem.readings) == len(READINGS) - 2
+
+
+def test_without_a_gap_there_is_one_pass(passes):
+    given, run = passes
+    given.accepted = [None]
+    found, _ = run()
+    assert len(given.seen) == 1 and found.result.accepted == ()
+
+
+@pytest.mark.parametrize("count, too_many", [(9, False), (10, True)])
+def test_more_than_a_tenth_of_outliers_is_bad_data(passes, count, too_many):
+    given, run = passes
+    given.accepted = [None]
+    assert len(READINGS) == 96
+    given.outliers = [[("torque_Nm", i) for i in range(count)]]
+    found, _ = run()
+    said = f"{count} readings are outliers: check the sensors first"
+    assert found.error == (said if too_many else "")
+    assert (found.outliers == ()) == too_many
+
+
+def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
+    _, run = passes
+    heavy = replace(READINGS.at, load=np.where(np.arange(32) == 5, 9e6, READINGS.at.load))
+    found, _ = run(readings=replace(READINGS, at=heavy))
+    assert found.error == "the model cannot carry the load of row 5"
+    assert isinstance(found.result, SearchResult) and not found.result.has_gap
+
+
+def test_the_declared_noise_is_where_the_analysis_begins():
+    found = iteration._declared_covariance(READINGS)
+    assert np.diag(found.matrix) == pytest.approx(READINGS.std**2)
+    assert not (found.matrix - np.diag(np.diag(found.matrix))).any()
+    known = found.components
+    assert known.noise_scale.tolist() == [1.0] * 3 and known.degrees_of_freedom == 1.0
+    assert known.friction_angle_std == known.bearing_std == known.autocorrelation == 0.0
+    assert isinstance(known, VarianceComponents)
+
+
+def test_an_analysis_without_a_search_has_no_gap():
+    found = iteration._no_result(None)
+    assert found.soil_test.p_value >= 0.5 and not found.has_gap
+    assert found.none is None and found.likeliest is None
+
+
+def test_smoothed_residuals_are_those_of_generalised_least_squares():
+    problem = fit_problem(CASE, driven(CASE))
+    rng = np.random.default_rng(0)
+    space = rng.standard_normal((96, 5)) * problem.covariance.std[:, None]
+    residual = rng.standard_normal(96) * problem.covariance.std
+    inverse = np.linalg.inv(problem.covariance.matrix)
+    weights = np.linalg.solve(space.T @ inverse @ space, space.T @ inverse @ residual)
+    found = iteration._gls_prediction(problem.covariance, residual, space)
+    assert found == pytest.approx(space @ weights, rel=1e-6, abs=1e-12)
+    again = iteration._gls_prediction(problem.covariance, residual, np.tile(space, 2))
+    assert again == pytest.approx(found, rel=1e-6, abs=1e-12)  # nearly collinear columns
+
+
+def test_the_covariance_is_estimated_from_what_a_fit_leaves():
+    """Noise at a smoothed prediction, outliers left out, and signatures that fit the readings."""
+    case = case_of()
+    table = driven(case, seed=3)
+    table.columns["torque_Nm"][12] *= 1.1
+    problem = fit_problem(case, table)
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    small = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
+    found, excluded = iteration._reestimate_covariance(small, soil, problem.readings, ())
+    assert excluded == [("torque_Nm", 12)]
+    assert len(found.readings) == len(found.covariance.std) == 95
+    torque = found.readings.channel == 0
+    expected = np.delete(soil.prediction[problem.readings.channel == 0], 12)
+    assert found.readings.std[torque] == pytest.approx(0.01 * expected, rel=0.2)
+    assert np.all(found.covariance.components.noise_scale < 1.3)
+
+
+def test_a_fit_states_precision_and_covariance_of_its_parameters():
+    rng = np.random.default_rng(0)
+    jacobian = rng.standard_normal((9, 2))
+    angle = SoilCoordinate("friction_angle", "rad", 0.0, 1.0, Prior(0.4, 0.8))
+    other = replace(angle, name="cohesion", unit="Pa", prior=Prior(0.0, 2000.0), std=0.25)
+    fit = GapFit(
+        *(CASE, (angle, other), np.asarray([0.25, 0.5]), np.zeros(9), np.zeros(9), jacobian),
+        *(0.0, True, np.ones(9), jacobian),
+    )
+    assert fit.precision.tolist() == [0.0, 16.0]
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag([12.0, 16.0]))
+    assert fit.covariance == pytest.approx(covariance)
+    assert fit.values() == {"friction_angle": pytest.approx(0.5), "cohesion": 1000.0}
+    stds = np.sqrt(np.diag(covariance)) * [0.4, 2000.0]
+    assert fit.stds() == {
+        "friction_angle": pytest.approx(stds[0]),
+        "cohesion": pytest.approx(stds[1]),
+    }
+    assert fit.start_values() == {"friction_angle": 0.25, "cohesion": 0.5}
+    assert fit.fitted().soil.cohesion == 1000.0
+    white = fit.whitened_by(2.0 * np.eye(9))
+    assert white.residual == pytest.approx(np.full(9, 2.0))
+    assert white.jacobian == pytest.approx(2.0 * jacobian)
