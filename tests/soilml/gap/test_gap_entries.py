@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 
 from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.gap.report_parts import EstimatedValue
 from soilml.gap.search.candidate_fits import (
     EFFECT_PENALTY,
     CandidateFit,
 )
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import Posterior
+from soilml.gap.soil_test_agreement import soil_test_agreement
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.verdict import report_entries
@@ -24,6 +26,7 @@ from soilml.gap.verdict.report_entries import (
     variance_component_entries,
 )
 from soilml.numerics.prior import Prior
+from soilml.physics.soils.soil_tests import ShearStrength
 
 
 def made(*names, objective=0.0, amplitude=(0.0, 0.0)):
@@ -166,3 +169,20 @@ def test_variance_components_by_the_names_of_columns():
         "bearing_from_run_to_run": 0.02,
         "memory_of_samples": 0.3,
     }
+
+
+def test_a_test_of_the_soil_is_compared_with_the_soil_before_and_after():
+    """Strength of cohesion plus normal stress times the tangent of the friction angle."""
+    test = ShearStrength(normal_stress=8e3, strength=5e3, scatter=0.2)
+    case = replace(case_of(), soil_tests=(test,))
+
+    def soil(cohesion, angle):
+        values = {"cohesion": cohesion, "friction_angle": angle}
+        return {name: EstimatedValue(value, 0.0, "") for name, value in values.items()}
+
+    (found,) = soil_test_agreement(case, soil(500.0, 0.5), soil(900.0, 0.6))
+    before, after = 500.0 + 8e3 * np.tan(0.5), 900.0 + 8e3 * np.tan(0.6)
+    assert (found.before, found.after) == (pytest.approx(before), pytest.approx(after))
+    assert found.sigma_before == pytest.approx(np.log(before / 5e3) / 0.2)
+    assert found.sigma_after == pytest.approx(np.log(after / 5e3) / 0.2)
+    assert (found.measured, found.unit, found.label) == (5e3, "Pa", test.label())
