@@ -115,7 +115,7 @@ def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float]
 
 def _declared_covariance(readings: StackedReadings) -> Covariance:
     """The declared noise alone."""
-    components = VarianceComponents(np.ones(len(readings.channels)), 0.0, 0.0, 0.0, 1.0)
+    components = VarianceComponents(np.ones(len(readings.channels)), 0.0, 0.0, 0.0)
     return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
 
 
@@ -162,7 +162,6 @@ def _reestimate_covariance(
         RUN_EFFECT_UNITS["friction_angle"],
         RUN_EFFECT_UNITS["bearing"],
         0.0,
-        1.0,
     )
     several_runs = len(readings.runs) > 1
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)

@@ -61,7 +61,7 @@ class VarianceComponents:
     friction_angle_std: float  # rad, from run to run
     bearing_std: float  # relative, from run to run
     autocorrelation: float  # correlation of neighbouring samples of a run
-    degrees_of_freedom: float  # from which the noise was estimated
+    degrees_of_freedom: float = 1.0  # from which the noise was estimated, if it was
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,6 @@ def _coordinate_search(
         float(run_effects[0, 0] * RUN_EFFECT_UNITS["friction_angle"]),
         float(run_effects[0, 1] * RUN_EFFECT_UNITS["bearing"]),
         autocorrelation,
-        1.0,
     )
     return components, value
 

@@ -133,7 +133,6 @@ def usual_covariance(case: Case, readings: StackedReadings) -> Floats:
         RUN_EFFECT_UNITS["friction_angle"],
         RUN_EFFECT_UNITS["bearing"],
         0.0,
-        1.0,
     )
     return assemble_covariance(readings, run_effect_columns(case, readings), usual).matrix
 

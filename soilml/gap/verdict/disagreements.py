@@ -75,7 +75,6 @@ def repeats_that_disagree(problem: FitProblem, fit: GapFit) -> list[str]:
             RUN_EFFECT_UNITS["friction_angle"] * several,
             RUN_EFFECT_UNITS["bearing"] * several,
             autocorrelation,
-            found.degrees_of_freedom,
         )
         covariance = assemble_covariance(readings, columns, usual).matrix
         for comparison in repeat_disagreement(readings, covariance, fit.prediction):

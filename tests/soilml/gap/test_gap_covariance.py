@@ -199,3 +199,16 @@ def test_runs_of_one_sample_have_no_neighbours():
     readings = stack_readings(case, table)
     white, log_determinant = whiten_series(readings, np.eye(len(readings)), 0.9)
     assert np.array_equal(white, np.eye(len(readings))) and log_determinant == 0.0
+
+
+def test_bearing_varies_by_the_moduli_that_the_soil_has(rig):
+    """Without kc, or with one of 1, five per cent of bearing are five per cent of the moduli."""
+    readings, _, _ = rig
+    for kc in (0.0, 1.0):
+        case = case_of().with_values({"kc": kc})
+        found = run_effect_columns(case, readings)[:, 1]
+        kphi = 1.05 * float(case.soil.kphi)
+        more = case.with_values({"kc": 1.05 * kc, "kphi": kphi})
+        off = linearise(more, [], np.zeros(0), readings)[0]
+        off = off - linearise(case, [], np.zeros(0), readings)[0]
+        np.testing.assert_allclose(found, off, rtol=0.1, atol=0.05 * np.abs(off).max())

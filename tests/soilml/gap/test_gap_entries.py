@@ -1,8 +1,11 @@
 """Entries of a report from analyses that are made up: notes, suspects, what is shown."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
+from gap_sets import case_of
 
 from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.report_parts import EstimatedValue
