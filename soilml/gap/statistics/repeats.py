@@ -197,7 +197,7 @@ def _pair_sentence(readings: StackedReadings, i: int, j: int) -> str:
         f"{who} at slip {slip:.2f} under {load:.3g} N: {quantity.name.replace('_', ' ')} "
         f"{first:.3g} and {second:.3g}{unit}, which differ by "
     )
-    if low * high > 0.0 and low / high >= MIN_FRACTION_FOR_PERCENT:
+    if high != 0.0 and low / high >= MIN_FRACTION_FOR_PERCENT:
         return text + f"{high / low - 1.0:.0%}".replace("%", " %")
     return text + f"{abs(first - second):.2g}{unit}"
 

@@ -8,6 +8,7 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.statistics.repeats import (
+    _pair_sentence,
     overstated_noise,
     overstated_noise_notes,
     repeat_disagreement,
@@ -105,3 +106,26 @@ def test_the_channel_whose_repeats_disagree_most_comes_first():
     assert found[0].chi_square == pytest.approx(expected, rel=1e-6)
     assert found[0].scatter_ratio == pytest.approx(np.sqrt(expected / 8))
     assert found[0].worst_sigma == pytest.approx(90.0 / np.sqrt(2.0))
+
+
+@pytest.mark.parametrize(
+    "values, said",
+    [
+        ((2.0, 3.0), "torque 2 and 3 N m, which differ by 50 %"),
+        ((-3.0, -2.0), "torque -3 and -2 N m, which differ by 50 %"),
+        ((0.31, 3.0), "torque 0.31 and 3 N m, which differ by 868 %"),
+        ((0.29, 3.0), "torque 0.29 and 3 N m, which differ by 2.7 N m"),
+        ((-1.0, 3.0), "torque -1 and 3 N m, which differ by 4 N m"),
+        ((0.0, 3.0), "torque 0 and 3 N m, which differ by 3 N m"),
+        ((0.0, 0.0), "torque 0 and 0 N m, which differ by 0 N m"),
+    ],
+)
+def test_a_difference_is_in_per_cent_where_the_smaller_reading_is_a_tenth(values, said):
+    case = case_of()
+    readings = stack_readings(case, driven(case, loads=TWICE, noise=0.0))
+    reading = readings.reading.copy()
+    reading[[3, 11]] = values
+    sentence = _pair_sentence(replace(readings, reading=reading), 3, 11)
+    assert sentence.endswith(f"under 40 N: {said}")
+    own = _pair_sentence(replace(readings, reading=reading), 3, 3)
+    assert own.startswith("two rows of run run_0 at slip 0.29")
