@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import final
@@ -120,7 +119,7 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"sensors than {identity!r} of {path}: {begin}"
         )
     system, counts = (as_numbers("memory", part) for part in (memory.system, memory.counts))
-    finite = math.isfinite(system.sum() + counts.sum())
+    finite = bool(np.isfinite(system).all() and np.isfinite(counts).all())
     if system.shape[1:] != (columns,) or counts.shape != (3,) or not finite:
         raise InputError(
             f"this memory is damaged: its system has shape {system.shape}; needed are finite "

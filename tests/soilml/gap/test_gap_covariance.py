@@ -212,3 +212,17 @@ def test_bearing_varies_by_the_moduli_that_the_soil_has(rig):
         off = linearise(more, [], np.zeros(0), readings)[0]
         off = off - linearise(case, [], np.zeros(0), readings)[0]
         np.testing.assert_allclose(found, off, rtol=0.1, atol=0.05 * np.abs(off).max())
+
+
+@pytest.mark.parametrize("angle, bearing", [(2.0, 0.0), (0.0, 2.0)])
+def test_friction_angle_and_bearing_are_told_apart(rig, angle, bearing):
+    """Residuals of effects of plus and minus two units, which leave the span of noise alone."""
+    readings, columns, _ = rig
+    sign = np.where(readings.run[readings.row] % 2 == 0, 1.0, -1.0)
+    rng = np.random.default_rng(5)
+    residual = sign * (columns @ [angle, bearing]) + rng.standard_normal(len(sign)) * readings.std
+    space = np.zeros((len(sign), 0))
+    found = estimate_covariance(readings, columns, residual, space).components
+    stds = found.friction_angle_std / np.deg2rad(0.5), found.bearing_std / 0.05
+    assert stds[0 if angle else 1] in (1.2, 1.8, 3.0) and stds[1 if angle else 0] <= 0.5
+    assert found.degrees_of_freedom == len(sign)

@@ -134,6 +134,8 @@ def test_notes_on_outliers_noise_runs_and_memory(monkeypatch):
     )
     assert one == "1 reading is an outlier and was excluded: o"
     assert few.startswith("run-to-run variation of the soil cannot be estimated from fewer than 6")
+    for runs in ("ab", "abc"):
+        assert notes(analysed(runs=tuple(runs)))[-1].startswith("run-to-run variation")
     assert "0.57 deg of friction angle and 4% of bearing strength are assumed" in few
 
 

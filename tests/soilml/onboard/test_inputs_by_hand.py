@@ -1,0 +1,271 @@
+"""Inputs of the graph, pooling of runs and fusion of rows, evaluated by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml.errors import InputError
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
+from soilml.onboard.features import compute_features, flatten_readings
+from soilml.onboard.gaussian_pooling import (
+    PoolingCalibration,
+    PoolingRule,
+    RunConditions,
+    RunPattern,
+    pool_run,
+    pool_within_prior,
+)
+from soilml.onboard.multi_sensor import (
+    CONTRADICTION,
+    SAME_PRIOR,
+    _contradictory,
+    _fuse,
+    _mean_correlation,
+    fuse_estimates,
+)
+from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
+from soilml.onboard.set_posterior import SetPosterior, _broadcast, without_copies
+
+SETS = SetPosterior(
+    terms=4,
+    noise={"torque": (0.3, 0.04), "sinkage": (0.001, 0.0), "torque_bias": (0.0, 0.01)},
+    context_ranges={},
+    context_values={},
+    sets_only=True,
+)
+ROWS = {"slip": np.asarray([0.1, 0.2]), "torque": np.asarray([10.0, -5.0]), "load": 60.0}
+
+
+def test_the_entry_of_a_file_is_read_part_by_part():
+    entry = {
+        "terms": 20,
+        "noise": {"torque": [0.1, 0.02]},
+        "context": {"radius": [0.05, 0.3]},
+        "alone": True,
+    }
+    found = SetPosterior.of(entry)
+    assert found.noise == {"torque": (0.1, 0.02)} and found.terms == 20
+    assert found.context_ranges == {"radius": (0.05, 0.3)} and found.sets_only
+    assert found.columns == 21 and found.missing_context == ("radius",)
+    known = found.with_context({"radius": 0.3}, {"torque": (0.0, 0.05)})
+    assert known.missing_context == () and known.noise == {"torque": (0.0, 0.05)}
+    for radius in (0.049, 0.301):
+        with pytest.raises(InputError, match=r"the range of this file is 0.05 to 0.3"):
+            found.with_context({"radius": radius}, {})
+
+
+def test_standard_deviations_are_those_of_the_noise_model_or_as_measured():
+    rows = SETS.rows(ROWS)
+    assert rows["load"].tolist() == [60.0, 60.0]
+    assert rows["torque_std"] == pytest.approx([np.hypot(0.3, 0.4), np.hypot(0.3, 0.2)])
+    assert rows["torque_bias"] == pytest.approx([0.1, 0.05])
+    for name in ("sinkage", "drawbar_pull"):
+        assert rows[name].tolist() == [ABSENT_READING] * 2
+        assert rows[f"{name}_std"].tolist() == [ABSENT_STD] * 2
+    more = SETS.rows(ROWS | {"sinkage": [0.01, np.nan], "torque_std": 0.7, "drawbar_pull": 3.0})
+    assert more["sinkage"].tolist() == [0.01, ABSENT_READING]
+    assert more["sinkage_std"].tolist() == [0.001, ABSENT_STD]
+    assert more["torque_std"].tolist() == [0.7, 0.7]
+    # a pull without noise, in the file or given, has no weight
+    assert more["drawbar_pull_std"].tolist() == [ABSENT_STD] * 2
+
+
+@pytest.mark.parametrize("name, value, said", [
+    ("torque_std", 0.0, "it must be above zero"),
+    ("sinkage_std", -1.0, "it must be above zero"),
+    ("torque_bias", -1e-9, "it must be zero or more"),
+])  # fmt: skip
+def test_impossible_standard_deviations_are_refused(name, value, said):
+    with pytest.raises(InputError, match=said):
+        SETS.rows(ROWS | {name: value, "sinkage": 0.01})
+    assert SETS.rows(ROWS | {"torque_bias": 0.0})["torque_bias"].tolist() == [0.0, 0.0]
+
+
+def test_a_noise_is_two_numbers_of_zero_or_more():
+    for wrong in ((-0.1, 0.0), (0.0, np.inf), (0.1,), 0.1):
+        with pytest.raises(InputError, match=r"noise of torque is .*; needed are two numbers"):
+            SETS.with_context({}, {"torque": wrong})
+    with pytest.raises(InputError, match="noise of height"):
+        SETS.with_context({}, {"height": (0.0, 0.1)})
+    assert SETS.with_context({}, {"torque": (0.0, 0.0)}).noise["torque"] == (0.0, 0.0)
+
+
+def test_readings_take_the_shape_of_the_others():
+    assert _broadcast("sinkage", 0.01, (2, 2)).tolist() == [0.01] * 4
+    with pytest.raises(InputError, match=r"sinkage has shape \(3,\), the readings have \(2,\)"):
+        _broadcast("sinkage", [0.0, 0.0, 0.0], (2,))
+    with pytest.raises(InputError, match="sinkage is inf"):
+        _broadcast("sinkage", [0.0, np.inf], (2,))
+    slip, load = flatten_readings(["slip", "load"], {"slip": [[0.1], [0.2]], "load": [60.0, 70.0]})[
+        0
+    ]
+    assert slip.tolist() == [0.1, 0.1, 0.2, 0.2] and load.tolist() == [60.0, 70.0] * 2
+    with pytest.raises(InputError, match=r"given: slip \(3,\), load \(2,\)"):
+        flatten_readings(["slip", "load"], {"slip": [0.1] * 3, "load": [60.0] * 2})
+    found = compute_features(["slip", "torque/load"], {"slip": slip, "torque": load, "load": load})
+    assert found.tolist() == [[s, 1.0] for s in slip]
+
+
+@pytest.mark.parametrize("name, value", [
+    ("slip", 1.0), ("slip", -1.0), ("load", 0.0), ("torque", np.inf), ("load", np.nan),
+])  # fmt: skip
+def test_readings_out_of_their_range_are_refused(name, value):
+    for given in (value, [value]):
+        with pytest.raises(InputError, match=f"{name} is"):
+            flatten_readings([name], {name: given})
+
+
+def test_copies_of_rows_are_those_that_agree_in_every_reading():
+    rows = SETS.rows({"slip": [0.1, 0.1, 0.2, 0.1], "torque": [1.0, 2.0, 1.0, 1.0], "load": 60.0})
+    kept = without_copies(rows)
+    assert kept["slip"].tolist() == [0.1, 0.1, 0.2] and kept["torque"].tolist() == [1.0, 2.0, 1.0]
+    assert {len(values) for values in kept.values()} == {3}
+    other = without_copies(rows | {"sinkage": np.asarray([1.0, 1.0, 1.0, 2.0])})
+    assert len(other["slip"]) == 4
+
+
+PRIOR = PriorSummary(
+    np.asarray([1.0, 10.0]),
+    np.asarray([0.5, 4.0]),
+    np.asarray([0.0, 2.0]),
+    np.asarray([2.0, 18.0]),
+)
+
+
+def estimates(mean, std, in_range, prior=PRIOR):
+    mean, std = np.asarray(mean, dtype=float), np.asarray(std, dtype=float)
+    covariance = std[..., None] ** 2 * np.eye(2)
+    return Estimate.gaussian(
+        *(("a", "b"), ("1", "1"), prior, mean, covariance, std, np.asarray(in_range), np.ones(2))
+    )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_estimates_contradict_each_other_beyond_four_standard_deviations(sign):
+    std = np.full((2, 1, 2), 0.1)
+    for apart, contradict in ((0.99, False), (1.01, True)):
+        mean = np.zeros((2, 1, 2))
+        mean[1, 0, 1] = sign * apart * CONTRADICTION * np.hypot(0.1, 0.1)
+        covariance = std[..., None] ** 2 * np.eye(2)
+        used = np.ones((2, 1), dtype=bool)
+        assert _contradictory(mean, covariance, used).tolist() == [contradict]
+        used[0] = False
+        assert _contradictory(mean, covariance, used).tolist() == [False]
+
+
+def test_correlations_are_averaged_and_standard_deviations_fused():
+    covariance = np.asarray([[[[4.0, 1.0], [1.0, 1.0]]], [[[1.0, -0.1], [-0.1, 1.0]]]])
+    correlation = _mean_correlation(covariance)
+    assert correlation[0] == pytest.approx(np.asarray([[1.0, 0.2], [0.2, 1.0]]))
+    mean = np.asarray([[[1.0, 10.0]], [[2.0, 12.0]]])
+    fused_mean, fused = _fuse(mean, covariance, PRIOR, "inverse-variance")
+    std = np.asarray([np.sqrt(0.8), np.sqrt(0.5)])
+    assert fused_mean[0] == pytest.approx([(1.0 / 4.0 + 2.0) / 1.25, 11.0])
+    assert fused[0] == pytest.approx(correlation[0] * np.outer(std, std))
+
+
+def test_fused_rows_keep_shape_ends_and_reasons():
+    """One file alone in a row keeps its interval; none gives the prior; two are fused."""
+    first = estimates([[[1.0, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[True, False]])
+    second = estimates([[[1.2, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[False, False]])
+    found = fuse_estimates([first, second], "prior-once")
+    assert found.estimate.mean.shape == (1, 2, 2)
+    assert found.estimate.low[0, 0] == pytest.approx([0.9, 8.0])
+    assert found.estimate.high[0, 0] == pytest.approx([1.1, 10.0])
+    assert found.estimate.mean[0, 1] == pytest.approx(PRIOR.mean)
+    assert found.estimate.std[0, 1] == pytest.approx(PRIOR.std)
+    assert found.estimate.low[0, 1] == pytest.approx(PRIOR.mean - 1.6448536 * PRIOR.std)
+    assert found.used.tolist() == [[[True, False]], [[False, False]]]
+    assert found.estimate.reason.tolist() == [[Reason.ESTIMATED, Reason.OUT_OF_RANGE]]
+    apart = estimates([[[1.9, 9.0], [1.5, 9.0]]], [[[0.1, 1.0]] * 2], [[True, False]])
+    found = fuse_estimates([first, apart], "prior-once")
+    assert found.estimate.reason[0, 0] == Reason.CONTRADICTORY and not found.used.any()
+
+
+def test_priors_must_agree_to_a_hundredth_of_their_spread():
+    one = estimates([1.0, 9.0], [0.1, 1.0], True)
+    for share, refused in ((0.9, False), (1.1, True)):
+        prior = replace(PRIOR, mean=PRIOR.mean - share * SAME_PRIOR * PRIOR.std)
+        other = estimates([1.0, 9.0], [0.1, 1.0], True, prior)
+        if refused:
+            with pytest.raises(InputError, match="different priors of a, b: from 0, 2 to 2, 18"):
+                fuse_estimates([one, other])
+        else:
+            assert fuse_estimates([one, other]).estimate.in_range
+
+
+def test_an_estimate_of_no_rows_is_empty_and_its_errors_are_not_shown():
+    none = Estimate.from_prior(("a", "b"), ("1", "1"), PRIOR, (0,))
+    assert none.mean.shape == (0, 2) and none.covariance.shape == (0, 2, 2)
+    for shape in ((-1,), (1.5,)):
+        with pytest.raises(InputError, match="whole numbers of zero or more"):
+            Estimate.from_prior(("a", "b"), ("1", "1"), PRIOR, shape)
+    assert "errors" not in repr(none)
+
+
+CONDITIONS = RunConditions(("slip",), np.asarray([0.0]), np.asarray([0.5]), np.asarray([0.1]))
+
+
+def test_variation_is_a_cubic_of_the_ratio_of_standard_deviations():
+    slip, weights = np.asarray([0.1, 0.14, 0.18]), np.asarray([1.0, 0.5, 1.0])
+    mean = np.average(slip, weights=weights)
+    variance = np.sum(weights * (slip - mean) ** 2) / (2.5 - 1.0)
+    ratio = np.sqrt(variance) / 0.1
+    found = CONDITIONS.variation({"slip": slip}, weights)
+    assert found == pytest.approx([3.0 * ratio**2 - 2.0 * ratio**3]) and 0.05 < found[0] < 0.9
+    few = CONDITIONS.variation({"slip": slip[:2]}, np.asarray([0.6, 0.6]))
+    ratio = np.sqrt(1.2 * 0.02**2 / 0.5) / 0.1  # of at least half a degree of freedom
+    assert few == pytest.approx([3.0 * ratio**2 - 2.0 * ratio**3])
+
+
+def calibration(limit=9.0):
+    pattern = RunPattern(
+        varies=(False,),
+        rows=np.asarray([1.0, 4.0]),
+        information=np.asarray([1.0, 1.0]),
+        std_scale=np.full((2, 2), 1.2),
+        coverage_factor=np.full((2, 2), 1.5),
+    )
+    free = replace(pattern, varies=(True,))
+    limits = np.full(2, limit)
+    return PoolingCalibration(CONDITIONS, (pattern, free), np.asarray([1.7, 1.8]), limits)
+
+
+def test_a_run_is_pooled_unless_more_than_a_tenth_is_out_of_range():
+    slip = np.linspace(0.05, 0.45, 20)
+    mean, std = np.tile([1.2, 9.0], (20, 1)), np.tile([0.2, 2.0], (20, 1))
+    for out, pooled in ((2, True), (3, False)):
+        single = estimates(mean, std, np.arange(20) >= out)
+        found = pool_run(single, {"slip": slip}, calibration())
+        assert (found.rows_used, found.rows_set_aside) == (20 - out, out)
+        assert found.in_range == pooled
+        if not pooled:
+            assert found.mean == pytest.approx(PRIOR.mean) and found.reason == Reason.OUT_OF_RANGE
+    single = estimates(mean, std, np.arange(20) >= 2)
+    rows = {"slip": slip[2:]}
+    rule = calibration().rule(rows)
+    assert rule.std_scale == pytest.approx(np.full(2, 1.2))
+    expected = pool_within_prior(mean[2:], single.covariance[2:], PRIOR, rule)
+    found = pool_run(single, {"slip": slip}, calibration())
+    assert found.mean == pytest.approx(expected.mean)
+    half = 1.5 * np.sqrt(np.diag(expected.covariance))
+    assert found.low == pytest.approx(expected.mean - half)
+
+
+def test_a_run_of_one_row_has_its_own_coverage_and_inconsistent_rows_give_the_prior():
+    single = estimates([[1.0, 9.0]], [[0.1, 1.0]], [True])
+    found = pool_run(single, {"slip": np.asarray([0.2])}, calibration())
+    assert found.low == pytest.approx([1.0 - 1.7 * 0.1, 9.0 - 1.8])
+    apart = estimates([[0.2, 9.0], [1.8, 9.0]], [[0.1, 1.0]] * 2, [True, True])
+    slip = {"slip": np.asarray([0.1, 0.4])}
+    found = pool_run(apart, slip, calibration())
+    assert found.reason == Reason.INCONSISTENT and not found.in_range and found.rows_used == 2
+    assert pool_run(apart, slip, calibration(limit=1e6)).in_range
+
+
+def test_a_scaled_spread_is_at_most_that_of_the_prior():
+    covariance = np.asarray([np.diag([0.4**2, 1.0])])
+    rule = PoolingRule(np.ones(1), np.full(2, 1.5), np.ones(2))
+    found = pool_within_prior(np.asarray([[1.0, 9.0]]), covariance, PRIOR, rule)
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.5, 1.5], rel=2e-3)
