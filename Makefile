@@ -93,6 +93,8 @@ coverage: $(VENV)/.ready ## statements and branches that `make test` reaches, by
 	@$(BIN)/python bench/reached.py
 
 mutation: $(VENV)/.ready ## change the source at random places and see whether a test fails: make mutation MUTANTS=12
+	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
+	  --disable-pip-version-check --editable '.[mutation]'
 	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)
 
 test-oldest: ## quick tests with the oldest libraries that are allowed, twenty minutes on two cores

@@ -1,94 +1,84 @@
-"""Mutants of a source file: one operator, comparison, number or truth value changed."""
+"""Mutants of a source file by the operators of mutmut.
+
+An operator, comparison, number or truth value is changed, a value that is assigned or given as an
+argument becomes None, an argument, an augmented assignment or a case is left out, a condition is
+held. Texts are left as they are.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
-#: Each operator with its replacement.
-OPERATORS = {
-    ast.Add: ("+", "-"),
-    ast.Sub: ("-", "+"),
-    ast.Mult: ("*", "/"),
-    ast.Div: ("/", "*"),
-    ast.Pow: ("**", "*"),
-    ast.And: ("and", "or"),
-    ast.Or: ("or", "and"),
-    ast.Lt: ("<", "<="),
-    ast.LtE: ("<=", "<"),
-    ast.Gt: (">", ">="),
-    ast.GtE: (">=", ">"),
-    ast.Eq: ("==", "!="),
-    ast.NotEq: ("!=", "=="),
-    ast.Is: ("is", "is not"),
-    ast.IsNot: ("is not", "is"),
-}
+import libcst as cst
+from mutmut.mutation.file_mutation import Mutation, create_mutations
+
 #: Arguments that check what holds anyway, and change no result: no mutants of them.
 CHECKS = ("strict", "frozen", "slots")
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change of bytes `begin` to `end` of a file, in the function that begins in line `scope`."""
+    """A changed source, the first line that differs, and what kind of node was changed.
+
+    `scope` is the first line of the function that holds it, 0 outside of functions.
+    """
 
     path: str
-    begin: int
-    end: int
-    text: str
+    source: str
+    line: int
     scope: int
-
-    def of(self, source: bytes) -> bytes:
-        """The changed source."""
-        return source[: self.begin] + self.text.encode() + source[self.end :]
+    kind: str
 
 
-def mutants(path: str, source: bytes) -> Iterator[Mutant]:
-    """Every mutant of a file."""
-    starts = [0]
-    for line in source.splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
+class MutantsOfFile:
+    """All mutants of a file; each is written when it is asked for."""
 
-    def span(node: ast.expr) -> tuple[int, int]:
-        assert node.end_lineno is not None and node.end_col_offset is not None
-        begin = starts[node.lineno - 1] + node.col_offset
-        return begin, starts[node.end_lineno - 1] + node.end_col_offset
+    def __init__(self, path: str, source: str):
+        self.path, self.source = path, source
+        self.module, found, *_ = create_mutations(path, source)
+        self.mutations = [one for one in found if not _is_left_out(one)]
 
-    def replaced(operator: ast.AST, left: ast.expr, right: ast.expr) -> Iterator[tuple[int, ...]]:
-        old, new = OPERATORS.get(type(operator), ("", ""))
-        begin = source.find(old.encode(), span(left)[1], span(right)[0]) if old else -1
-        if begin >= 0:
-            yield begin, begin + len(old), new
+    def __len__(self) -> int:
+        """Number of mutants."""
+        return len(self.mutations)
 
-    def changes(node: ast.AST) -> Iterator[tuple[int, int, str]]:
-        if isinstance(node, ast.BinOp):
-            yield from replaced(node.op, node.left, node.right)
-        elif isinstance(node, ast.BoolOp):
-            for left, right in zip(node.values, node.values[1:], strict=False):
-                yield from replaced(node.op, left, right)
-        elif isinstance(node, ast.Compare):
-            sides = [node.left, *node.comparators]
-            for operator, left, right in zip(node.ops, sides, sides[1:], strict=False):
-                yield from replaced(operator, left, right)
-        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not | ast.USub):
-            yield span(node)[0], span(node.operand)[0], ""
-        elif isinstance(node, ast.Constant) and type(node.value) is bool:
-            yield *span(node), str(not node.value)
-        elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
-            value = node.value + 1 if type(node.value) is int else 1.5 * node.value or 1.0
-            yield *span(node), repr(value)
+    def __getitem__(self, number: int) -> Mutant:
+        """The mutant of a number from 0."""
+        mutation = self.mutations[number]
+        node = self.module.deep_replace(mutation.original_node, mutation.mutated_node)
+        assert isinstance(node, cst.Module)
+        old, new = self.source.splitlines(), node.code.splitlines()
+        pairs = zip(old, new, strict=False)
+        same = next((i for i, (a, b) in enumerate(pairs) if a != b), min(len(old), len(new)))
+        kind = type(mutation.original_node).__name__
+        return Mutant(self.path, node.code, same + 1, self._scope(same + 1), kind)
 
-    def visit(node: ast.AST, scope: int) -> Iterator[Mutant]:
-        if isinstance(node, ast.keyword) and node.arg in CHECKS:
-            return
-        for begin, end, text in changes(node):
-            yield Mutant(path, begin, end, text, scope)
-        inner = scope
-        if isinstance(node, ast.FunctionDef):
-            inner = min([node.lineno, *(part.lineno for part in node.decorator_list)])
-        for name, field in ast.iter_fields(node):
-            for child in field if isinstance(field, list) else [field]:
-                if isinstance(child, ast.AST) and name not in ("annotation", "returns"):
-                    yield from visit(child, inner if name == "body" else scope)
+    def _scope(self, line: int) -> int:
+        """First line of the innermost function that holds a line, with its decorators."""
+        held = [begin for begin, end in self._functions if begin <= line <= end]
+        return max(held, default=0)
 
-    yield from visit(ast.parse(source), 0)
+    @cached_property
+    def _functions(self) -> list[tuple[int, int]]:
+        """First and last line of every function."""
+        return [
+            (min([node.lineno, *(d.lineno for d in node.decorator_list)]), node.end_lineno or 0)
+            for node in ast.walk(ast.parse(self.source))
+            if isinstance(node, ast.FunctionDef)
+        ]
+
+
+def _is_left_out(mutation: Mutation) -> bool:
+    """Whether a mutation changes a text, or an argument that only checks."""
+    old, new = mutation.original_node, mutation.mutated_node
+    if isinstance(old, cst.BaseString):
+        return True
+    if not (isinstance(old, cst.Call) and isinstance(new, cst.Call)):
+        return False
+    return any(
+        arg.keyword is not None and arg.keyword.value in CHECKS
+        for arg in old.args
+        if not any(arg is kept for kept in new.args)
+    )

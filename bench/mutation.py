@@ -1,12 +1,12 @@
 """Seeded sample of mutants of the rooms where numbers are made: `make mutation MUTANTS=12`.
 
-A mutant is the source with one operator, comparison, number or truth value changed. It is tried in
-a copy of the tree, by those tests of its room that call the changed function, shortest first, up
-to a minute (a constant of a module: the tests that call any function of the file, and those of the
-room's `test_declarations_*`). It is killed where a test fails, and survives where none does;
-survivors are written with their difference into `build/mutants.txt`. A time-out counts as killed.
-Drawing is left out. Some mutants change no result, as those of a tolerance, and survive rightly:
-the share that is killed is a lower bound.
+A mutant is the source with one change by mutmut. It is tried in a copy of the tree, by those tests
+of its room that call the changed function, shortest first, up to a minute (a constant of a module:
+the tests that call any function of the file, and those of the room's `test_declarations_*`). It is
+killed where a test fails, and survives where none does; survivors are written with their difference
+into `build/mutants.txt`. A time-out counts as killed. Drawing is left out. Some mutants change no
+result, as `<=` for `<` between numbers that are never equal, and survive rightly: the share that
+is killed is a lower bound.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ import signal
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from mutants import Mutant, mutants
+from mutants import Mutant, MutantsOfFile
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).parents[1]
@@ -43,6 +44,8 @@ ROOMS = {
     "gap": ("soilml/gap", "tests/soilml/gap", "/html/|_figure"),
 }
 TESTS = "not network and not long and not browser"
+#: What mutants change, as the second table has it.
+SORTS = ("arguments", "assignments", "numbers", "operators, comparisons and conditions")
 #: Seconds of the tests that try one mutant.
 BUDGET = 60.0
 #: Libraries that every process of tests shares; soilml is not among them.
@@ -130,7 +133,7 @@ def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
     # no test calls what runs when the module is imported: all tests of the room may see it
     near = near or {name: seconds for name, (seconds, _) in tests.items()}
     file, source = tree / mutant.path, (tree / mutant.path).read_bytes()
-    file.write_bytes(mutant.of(source))
+    file.write_text(mutant.source)
     for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
         compiled.unlink()  # its time and size may be those of the mutant
     try:
@@ -148,9 +151,9 @@ def answer(tree: Path, mutant: Mutant, tests: dict[str, list[Any]]) -> str:
     return "timed out" if status is None else "killed" if status else "survived"
 
 
-def difference(mutant: Mutant, source: bytes) -> str:
+def difference(mutant: Mutant, source: str) -> str:
     """The mutant as a unified difference."""
-    old, new = (text.decode().splitlines() for text in (source, mutant.of(source)))
+    old, new = source.splitlines(), mutant.source.splitlines()
     return "\n".join(difflib.unified_diff(old, new, mutant.path, "", n=1, lineterm="")) + "\n\n"
 
 
@@ -163,20 +166,45 @@ def run(room: str, count: int, seed: int, tree: Path, out: Path, counts: Counter
     called = json.loads((tree / "mutation.json").read_text())
     files = [str(path.relative_to(tree)) for path in sorted((tree / folder).rglob("*.py"))]
     here = [name for name in files if not (other and re.search(other, name))]
-    every = [mutant for name in here for mutant in mutants(name, (tree / name).read_bytes())]
+    found = [MutantsOfFile(name, (tree / name).read_text()) for name in here]
+    every = [(own, number) for own in found for number in range(len(own))]
     counts[f"{room} all"] = len(every)
     sample = random.Random(f"{seed} {room}").sample(every, min(count, len(every)))
-    for i, mutant in enumerate(sample):
+    for i, (own, number) in enumerate(sample):
+        mutant = own[number]
         became = answer(tree, mutant, called)
         counts[f"{room} {became}"] += 1
-        source = (tree / mutant.path).read_bytes()
-        line = source[: mutant.begin].count(b"\n") + 1
-        old = source[mutant.begin : mutant.end].decode()
-        where = f"{mutant.path}:{line}: {old} -> {mutant.text or 'nothing'}"
+        counts[f"{_sort(mutant)} {became}"] += 1
+        where = f"{mutant.path}:{mutant.line}: {mutant.kind}"
         print(f"{room} {i + 1}/{len(sample)} {became}: {where}", file=sys.stderr, flush=True)
         if became == "survived":
             with out.open("a") as survivors:
-                survivors.write(difference(mutant, source))
+                survivors.write(difference(mutant, own.source))
+
+
+def _sort(mutant: Mutant) -> str:
+    """What a mutant changes, for the second table."""
+    if mutant.kind in ("Call", "Lambda"):
+        return "arguments"
+    if mutant.kind in ("Assign", "AnnAssign", "AugAssign"):
+        return "assignments"
+    if mutant.kind in ("Integer", "Float"):
+        return "numbers"
+    return "operators, comparisons and conditions"
+
+
+def _rows(title: str, names: Sequence[str], counts: Counter[str]) -> None:
+    """Print a table of what became of mutants, by room or by sort."""
+    print(
+        f"\n| {title} | mutants | tried | killed | timed out | survived | killed, 90 % interval |"
+    )
+    print("|---|---:|---:|---:|---:|---:|---:|")
+    for name in names:
+        killed, late, alive = (counts[f"{name} {x}"] for x in ("killed", "timed out", "survived"))
+        if tried := killed + late + alive:
+            low, high = binomtest(killed + late, tried).proportion_ci(0.9)
+            share, of = f"{100 * low:.0f} to {100 * high:.0f} %", counts[f"{name} all"] or ""
+            print(f"| {name} | {of} | {tried} | {killed} | {late} | {alive} | {share} |")
 
 
 def main() -> int:
@@ -208,15 +236,8 @@ def main() -> int:
                 run(room, args.mutants, args.seed, tree, out, counts)
         except KeyboardInterrupt:
             status = 130
-    print("| room | mutants | tried | killed | timed out | survived | killed, 90 % interval |")
-    print("|---|---:|---:|---:|---:|---:|---:|")
-    for room in rooms:
-        killed, late, alive = (counts[f"{room} {x}"] for x in ("killed", "timed out", "survived"))
-        if tried := killed + late + alive:
-            low, high = binomtest(killed + late, tried).proportion_ci(0.9)
-            share = f"{100 * low:.0f} to {100 * high:.0f} %"
-            of = counts[f"{room} all"]
-            print(f"| {room} | {of} | {tried} | {killed} | {late} | {alive} | {share} |")
+    _rows("room", rooms, counts)
+    _rows("what is changed", SORTS, counts)
     return status
 
 
