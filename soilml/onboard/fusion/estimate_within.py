@@ -24,7 +24,7 @@ def estimate_within(estimate: Estimate, box: Mapping[str, tuple[float, float]]) 
     middle, std = 0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0)
     prior = PriorSummary(middle, std, lower, upper)
     shape = np.shape(estimate.in_range)
-    given = Estimate.from_prior(estimate.names, estimate.units, prior, shape, estimate.errors)
+    given = Estimate.from_prior(estimate.names, estimate.units, prior, shape)
     ends = (estimate.prior.lower, estimate.prior.upper)
     arrays: dict[str, Any] = {k: np.array(getattr(estimate, k)) for k in Estimate.ARRAYS}
     for at in np.ndindex(shape):

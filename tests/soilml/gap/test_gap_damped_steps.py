@@ -31,6 +31,13 @@ def test_a_wide_positive_parameter_moves_by_ratios():
     assert far / wide.prior.at(np.asarray(0.01)) == pytest.approx(np.exp(MOST_LOG_STEP))
 
 
+def test_a_positive_parameter_below_one_moves_by_ratios_too():
+    small = coordinate(0.005, 0.04)
+    value = small.prior.at(np.asarray(0.2))
+    moved = small.prior.at(np.asarray(one_step(small, 0.2, 0.05)))
+    assert moved / value == pytest.approx(np.exp(0.05 * 0.035 / value))
+
+
 def test_other_parameters_move_by_differences():
     for other in (coordinate(0.0, 6e3), coordinate(0.3, 0.8), coordinate(1e5, 5e6, log=True)):
         assert one_step(other, 0.4, 0.25) == pytest.approx(0.65)

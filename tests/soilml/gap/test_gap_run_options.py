@@ -128,3 +128,17 @@ def test_rows_that_the_soil_does_not_carry_are_left_out(monkeypatch, rows, propo
 )
 def test_a_covariate_is_unvaried_where_it_is_unknown_or_one_number(value, unvaried):
     assert _unvaried(value if value is None else np.asarray(value)) == unvaried
+
+
+def test_with_several_gears_each_run_is_proposed_for_each():
+    readings = fit_problem(CASE, driven(CASE)).readings
+    several = replace(CASE, gears={"lugged": CASE.model, "smooth": CASE.model})
+    found = {(o.kind, str(o.at.gear[0])): o for o in run_options(readings, several, ())}
+    kinds = {kind for kind, _ in found}
+    assert len(found) == 2 * len(kinds) == 18
+    for (kind, gear), option in found.items():
+        assert option.text.endswith(f", with the gear {gear}")
+        if kind in ("reverse", "other speed", "second pass", "slip angle"):
+            assert set(option.plain.gear.tolist()) == {gear}
+        else:
+            assert option.plain is None

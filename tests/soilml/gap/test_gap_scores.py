@@ -101,3 +101,24 @@ def test_a_p_value_counts_the_score_itself_among_the_draws():
     assert test.p_value(2.5) == pytest.approx(3.0 / 5.0)
     assert test.p_value(4.0) == pytest.approx(2.0 / 5.0)
     assert test.p_value(4.1) == pytest.approx(1.0 / 5.0)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_scores_do_not_depend_on_the_unit_of_a_column(scale):
+    columns, space = family()
+    residual = np.random.default_rng(3).standard_normal(40)
+    signs = np.asarray([1.0, -1.0, *np.zeros(10)])
+    usual = score_test(residual, columns, space, signs, 30.0, 0)
+    found = score_test(residual, scale * columns, space, signs, 30.0, 0)
+    assert found.z == pytest.approx(usual.z) and found.absorbed == pytest.approx(usual.absorbed)
+    assert found.projected_norm == pytest.approx(scale * usual.projected_norm)
+    assert found.family_wise_p == usual.family_wise_p
+
+
+@pytest.mark.parametrize("left, testable", [(2e-4, True), (0.5e-4, False)])
+def test_a_column_of_which_a_ten_thousandth_is_left_can_be_tested(left, testable):
+    space = np.eye(6)[:, :1]
+    column = 1e3 * (np.eye(6)[:, 0] + left * np.eye(6)[:, 1])[:, None]
+    found = score_test(np.full(6, 2.0), column, space, np.zeros(1), 9.0, 0)
+    assert found.z == pytest.approx([2.0 if testable else 0.0])
+    assert found.projected_norm == pytest.approx([1e3 * left if testable else 0.0])

@@ -194,6 +194,7 @@ def test_another_law_is_stated_where_it_matters(law):
     one, other = marginal(15.0), marginal(20.0)
     free = CandidateFit(("dig",), other, one)
     assert status(searched(NONE, free)) == "form-open"
+    assert decide(PROBLEM, searched(NONE, free), (), ()).shown is free
     law.matters = False
     assert status(searched(NONE, free)) == "named"
     law.matters = True

@@ -164,3 +164,12 @@ def test_the_same_file_is_equal_to_itself_alone():
     first, second = Sensors().files()
     assert first == Sensors().files()[0]
     assert first != second and first != "first" and len({first, second, first}) == 2
+
+
+def test_whole_numbers_stay_whole_in_an_entry():
+    entry = Sensors().files()[0].entry()
+    for key in ("rows", "average_rows", "repeats"):
+        assert all(type(value) is int for value in entry[key])
+    assert entry["rows"][-1] == 1999
+    numbers = HeldOutErrors.of(entry | {"rows": [10**6 + i for i in range(2000)]}).entry()["rows"]
+    assert numbers[1] == 10**6 + 1  # not rounded to four digits

@@ -269,3 +269,27 @@ def test_a_scaled_spread_is_at_most_that_of_the_prior():
     rule = PoolingRule(np.ones(1), np.full(2, 1.5), np.ones(2))
     found = pool_within_prior(np.asarray([[1.0, 9.0]]), covariance, PRIOR, rule)
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.5, 1.5], rel=2e-3)
+
+
+def test_spreads_of_several_runs_are_scaled_each_by_its_own():
+    spread = np.asarray([[0.4, 1.0], [0.1, 3.0], [0.2, 2.0]])
+    covariance = (spread[..., None] ** 2 * np.eye(2))[:, None]
+    rule = PoolingRule(np.ones((3, 1)), np.full((3, 2), 1.5), np.ones((3, 2)))
+    found = pool_within_prior(np.tile([1.0, 9.0], (3, 1, 1)), covariance, PRIOR, rule)
+    std = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
+    assert std == pytest.approx(np.minimum(1.5 * spread, PRIOR.std), rel=5e-3)
+
+
+def test_a_fused_mean_stays_within_the_prior():
+    near = estimates([[1.97, 17.9], [0.03, 2.1]], [[0.1, 1.0]] * 2, [True, True])
+    found = fuse_estimates([near] * 4, "prior-once").estimate
+    assert found.mean == pytest.approx(np.asarray([PRIOR.upper, PRIOR.lower]))
+    assert found.high[0] == pytest.approx(PRIOR.upper)
+    assert found.low[1] == pytest.approx(PRIOR.lower)
+
+
+def test_an_estimate_draws_a_panel_for_each_quantity():
+    axes = estimates([[1.0, 9.0], [1.2, 9.5]], [[0.1, 1.0]] * 2, [True, True]).plot()
+    assert [ax.get_title(loc="left") or ax.get_xlabel() or ax.get_ylabel() for ax in axes]
+    words = [" ".join(t.get_text() for t in ax.findobj() if hasattr(t, "get_text")) for ax in axes]
+    assert len(axes) == 2 and "a" in words[0].split() and "b" in words[1].split()

@@ -9,6 +9,7 @@ from soilml.errors import InputError
 from soilml.onboard.memory import Memory, check_memory
 from soilml.onboard.tracking.row_window import RowWindow
 from soilml.onboard.tracking.tracker_memory import TrackerMemory
+from soilml.onboard.tracking.tracker_state import Event
 
 
 def test_a_memory_must_have_finite_numbers_of_its_file():
@@ -56,3 +57,24 @@ def test_increases_of_the_last_sixteen_rows_are_kept():
     assert (other.rows_since_change, other.rows_since_drift) == (5, -1)
     few = replace(asked, increases=(1.0,))
     assert few.of_another_soil(asked.window).increases == ()
+
+
+def test_the_numbers_of_events_are_fixed():
+    """They are written into logs of drives."""
+    names = ["ACCEPTED", "SET_ASIDE", "SOIL_CHANGED", "DRIFT", "STUCK", "REPEATED", "UNUSABLE"]
+    assert {event.name: int(event) for event in Event} == {n: i for i, n in enumerate(names)}
+
+
+def test_rows_in_question_are_remembered_with_their_flags():
+    start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
+    row = {"slip": np.asarray([0.1]), "load": np.asarray([60.0])}
+    memory = TrackerMemory(RowWindow.empty(start, 48))
+    question = memory.question.with_row(row, True).with_row(row, False)
+    repeated = memory.repeated.with_row(row)
+    arrays = replace(memory, question=question, repeated=repeated).as_arrays("file")
+    assert arrays["disagree"].dtype == np.bool_ and arrays["disagree"].tolist() == [True, False]
+    empty = memory.as_arrays("file")
+    assert empty["disagree"].dtype == np.bool_ and empty["disagree"].size == 0
+    assert empty["lengths"].dtype == empty["numbers"].dtype == np.int64
+    again = TrackerMemory.from_arrays(arrays, "file", start)
+    assert again.question.disagree == (True, False) and len(again.question.rows) == 2

@@ -98,9 +98,10 @@ def test_readings_that_contradict_it_are_flagged(rover):
 
 
 def test_the_prior_becomes_the_narrower_one(rover):
-    found = rover.prior_estimate(2).within(cohesion=(0.0, 600.0))
-    assert found.mean[:, 0] == pytest.approx(300.0)
+    found = rover.prior_estimate(2).within(cohesion=(200.0, 800.0))
+    assert found.mean[:, 0] == pytest.approx(500.0)
     assert found.std[:, 0] == pytest.approx(600.0 / np.sqrt(12.0))
+    assert found.prior.std[0] == pytest.approx(600.0 / np.sqrt(12.0))
     assert (found.reason == Reason.OUT_OF_RANGE).all()
 
 

@@ -275,3 +275,12 @@ def test_a_probe_with_other_estimates_is_refused(wheel_set_file, tmp_path, name)
 
     with pytest.raises(ModelFileError, match="fails its own probe"):
         Estimator.load(changed(wheel_set_file, tmp_path, tampered))
+
+
+def test_more_rows_than_one_call_takes_are_read_in_parts(estimator, wheel_posterior, monkeypatch):
+    rows, _ = simulated_run(wheel_posterior, 60)
+    whole = estimator.run(**rows)
+    monkeypatch.setattr("soilml.onboard.set_posterior.ROWS_PER_CALL", 16)
+    parts = estimator.run(**rows)
+    assert_similar(parts, whole)
+    assert (parts.mean != whole.mean).any() and parts.rows_used == 60  # not the same computation

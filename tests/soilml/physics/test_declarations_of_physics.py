@@ -16,9 +16,10 @@ from soilml import EFFECTS, Midstance, Operating, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics.coarse_search import SinkageEstimate
-from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.effects.base import KINDS, Effect, EffectCard
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.operating_point import COVARIATES
 
 #: Bounds and defaults that files of users rely on: one that becomes narrower refuses files that
 #: were valid, and another default changes what they mean.
@@ -92,9 +93,27 @@ def test_a_card_names_a_size_within_bounds_and_signs(name):
     for field, size in card.reference.items():
         assert parameters[field].lower <= size <= parameters[field].upper
     assert (card.calibration is None) == (card.kind not in ("rig", "sensor"))
+    assert card.kind in KINDS and all(len(t) > 5 for t in (card.text, card.source, card.isolate))
+    assert bool(card.varied_dimension) <= bool(card.varied)
+    assert set(card.needs) <= set(COVARIATES)
     if card.calibration is not None:
         # a fault that a checked setup still has is not larger than one that matters
         assert 0.0 < card.calibration <= abs(card.reference[card.size])
+
+
+def test_effects_of_running_gear_are_for_their_gear():
+    """What a card says of wheels and tracks is what `applies_to` says."""
+    wheel, track = Wheel(radius=0.1, width=0.1), Track(radius=0.1, width=0.08, base=0.6)
+    by_gear = {
+        "track-grousers": (False, True),
+        "grousers": (True, False),
+        "wheel-flexibility": (True, False),
+        "torque-gain": (True, True),
+    }
+    for name, expected in by_gear.items():
+        assert tuple(EFFECTS[name].applies_to(gear) for gear in (wheel, track)) == expected
+    varied = {name: e.about.varied_dimension for name, e in EFFECTS.items() if e.about.varied}
+    assert varied["small-wheel-stiffness"] == "radius"
 
 
 def test_an_effect_is_for_all_gears_unless_its_card_says_otherwise():

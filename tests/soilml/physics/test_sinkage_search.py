@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from soilml import EFFECTS, Model, Operating, Status, Track, Wheel, soil
+from soilml.errors import InputError
 from soilml.physics import coarse_search, secant_steps, sinkage_search
 from soilml.physics.forces import load_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
@@ -177,3 +178,13 @@ def test_the_catalogue_is_read_again_as_it_was():
     entry = again["comin2017/es-3"]
     assert entry.assumed == tuple(sorted(entry.assumed)) and entry.soil.cohesion == 0.0
     assert not set(entry.assumed) & set(entry.published)
+
+
+def test_operating_points_out_of_their_range_are_refused_when_they_are_used():
+    """Values made without a check, as by `dataclasses.replace` on arrays of a library."""
+    for wrong in ({"slip": np.asarray([0.2, 1.5])}, {"load": np.asarray([60.0, -1.0])}):
+        at = Operating(slip=np.asarray([0.2, 0.3]), load=np.asarray([60.0, 60.0]))
+        for name, value in wrong.items():
+            object.__setattr__(at, name, value)
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            Model(WHEEL)(SAND, at)
