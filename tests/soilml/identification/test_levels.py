@@ -101,3 +101,15 @@ def test_rows_of_a_range_are_alike_only_where_they_are_close():
     group = rows_driven_alike(Operating(slip=np.full(64, 0.3), load=load))
     widths = [np.ptp(np.log(load[group == i])) for i in range(group.max() + 1)]
     assert max(widths) <= 0.0501 and group.max() > 10
+
+
+def test_rows_of_different_gears_or_passes_are_no_repeats():
+    at = Operating(
+        slip=np.asarray([0.2, 0.2, 0.2, 0.2, 0.5]),
+        load=np.full(5, 60.0),
+        gear=np.asarray(["wide", "lugged", "wide", "wide", "wide"]),
+        pass_number=np.asarray([1.0, 1.0, 1.0, 2.0, 1.0]),
+    )
+    found = rows_driven_alike(at, np.arange(5))
+    assert found.dtype == np.int64
+    assert found[0] == found[2] and len(set(found.tolist())) == 4

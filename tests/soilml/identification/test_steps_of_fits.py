@@ -160,3 +160,22 @@ def test_rows_of_other_gears_passes_and_directions_are_never_one():
     assert joined.load.shape == joined.gear.shape == (9,) and joined.speed is None
     blocks = [b.tolist() for b in condensed_rows._blocks(50_002)]
     assert len(blocks) == 2 and blocks[1] == [50_000, 50_001] and blocks[0][0] == 0
+
+
+def test_methods_in_closed_form_say_what_rows_they_need(case):
+    data = rows_of(case)
+    (torque, _) = data.channels
+
+    def first(count, channels):
+        kept = tuple(replace(c, reading=c.reading[:count], std=c.std[:count]) for c in channels)
+        at = Operating(slip=SLIP[:count], load=LOAD[:count])
+        return replace(
+            data, at=at, slip_std=np.zeros(count), load_std=np.zeros(count), channels=kept
+        )
+
+    with pytest.raises(FitError, match="2 readings: the Newton-Raphson method needs three or more"):
+        newton.newton(case, first(2, [torque]), select_free(case, None))
+    try:
+        newton.newton(case, first(3, [torque]), select_free(case, None))
+    except FitError as error:  # three readings may not determine three unknowns
+        assert "needs three or more" not in str(error)
