@@ -39,11 +39,11 @@ CASES = (
     ("generate", "generate wheel o.parquet --rows 1000000 --workers 1", 0),
     ("estimate, rows", f"estimate {ROOT}/exported/wheel_lssvm.onnx runs.csv --out o.csv", 10**6),
     ("identify", "identify m.toml runs.csv --out o.json", 10**5),
-    ("identify, 20 000", "identify m.toml runs.csv --out o.json", 20000),
+    ("identify, 5000", "identify m.toml runs.csv --out o.json", 5000),
     ("identify, many", "identify m.toml runs.csv --out o.json", 10**6),
     ("identify, linear", "identify m.toml runs.csv --method linear --out o.json", 10**5),
     ("posterior", "identify m.toml runs.csv --method posterior --out o.json", 10**5),
-    ("posterior, 20 000", "identify m.toml runs.csv --method posterior --out o.json", 20000),
+    ("posterior, 5000", "identify m.toml runs.csv --method posterior --out o.json", 5000),
     ("gap", "gap m.toml runs.csv --out found", 1200),
     ("gap, refused", "gap m.toml runs.csv --out found", 12000),
 )  # fmt: skip

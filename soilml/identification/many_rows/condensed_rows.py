@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Rows above which they are condensed, and rows that become of them.
-MOST_ROWS, CELLS = 20_000, 1024
+MOST_ROWS, CELLS = 5_000, 1024
 #: Rows of the fit that shows where the optimum is, and rounds in which it is approached.
 FIRST_ROWS, ROUNDS = 1000, 2
 #: Rows that are solved at a time.
