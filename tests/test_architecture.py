@@ -201,3 +201,9 @@ def test_rooms_hold_a_handful_of_modules():
     for room in {file.parent for file in FILES}:
         modules = [f for f in room.glob("*.py") if f.name != "__init__.py"]
         assert len(modules) <= (9 if room.parent == ROOT else 14), room
+
+
+def test_no_two_test_files_share_a_name():
+    """Pytest imports test files by their name alone, and refuses a second one of it."""
+    names = [f.name for f in (ROOT / "tests").rglob("*.py")]
+    assert sorted(names) == sorted(set(names))
