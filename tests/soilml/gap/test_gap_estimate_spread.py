@@ -37,6 +37,24 @@ def test_an_omitted_effect_moves_the_soil_as_a_fit_to_changed_readings_does(prob
         assert abs(change) == pytest.approx(expected, rel=0.05, abs=1e-3 * soil.stds()[path])
 
 
+def test_a_prior_holds_the_soil_where_readings_are_poor(problem):
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    (signature,), _ = effect_signatures(
+        soil.fitted(), problem.readings, {"slip-sinkage": problem.effects["slip-sinkage"]}
+    )
+    poor = replace(problem.covariance, whiten=0.003 * problem.covariance.whiten)
+    spread = by_undetected_effects(replace(problem, covariance=poor), soil, [signature])
+    # the prior as three further readings: each coordinate is uniform from 0 to 1, variance 1/12
+    known = soil.whitened_by(poor.whiten)
+    assert (known.precision == 0.0).all() and (np.linalg.norm(known.jacobian, axis=0) < 3.0).any()
+    rows = np.vstack([known.jacobian, np.sqrt(12.0) * np.eye(3)])
+    column = np.concatenate([poor.whiten @ signature.column, np.zeros(3)])
+    moved = np.linalg.lstsq(rows, column)[0]
+    for i, coordinate in enumerate(known.coordinates):
+        expected = signature.sign * SIZES * moved[i] * coordinate.rate(float(known.x[i]))
+        assert spread.offset[coordinate.path][1:] == pytest.approx(expected)
+
+
 def test_a_size_that_the_readings_exclude_has_no_weight(problem):
     soil = problem.fit_soil([np.full(3, 0.5)])
     signatures, _ = effect_signatures(

@@ -164,3 +164,14 @@ def test_the_degree_of_the_smooth_basis_follows_the_data():
 def test_the_regions_of_the_map_cover_every_reading(clean):
     covered = np.any([region.selected for region in regions(clean.readings)], axis=0)
     assert covered.all()
+
+
+def test_a_region_holds_the_readings_of_its_channel_slips_and_loads(clean):
+    readings, seen = clean.readings, np.zeros(len(clean.readings), dtype=int)
+    for region in regions(readings):
+        seen += region.selected
+        channel = np.asarray(readings.channels)[readings.channel[region.selected]]
+        assert set(channel) == {region.channel}
+        for values, ends in ((readings.slip, region.slip), (readings.load, region.load)):
+            assert (values[region.selected].min(), values[region.selected].max()) == ends
+    assert (seen == 1).all()

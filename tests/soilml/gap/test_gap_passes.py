@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
+from soilml.gap import gap
 from soilml.gap.data.free_soil import free_soil_parameters
 from soilml.gap.fitting.coordinates import SoilCoordinate
 from soilml.gap.fitting.least_squares import GapFit
@@ -185,3 +186,11 @@ def test_a_fit_states_precision_and_covariance_of_its_parameters():
     white = fit.whitened_by(2.0 * np.eye(9))
     assert white.residual == pytest.approx(np.full(9, 2.0))
     assert white.jacobian == pytest.approx(2.0 * jacobian)
+
+
+def test_the_report_on_bad_data_has_its_reasons_and_the_case():
+    report = gap(CASE, driven(CASE, loads=(60.0,), slips=2), seed=7)
+    assert report.status == "bad-data" and report.model == CASE and report.seed == 7
+    assert "6 readings for 3 soil parameters" in report.reasons[0]
+    assert report.sentence == "; ".join(report.reasons)
+    assert report.cause_set == report.effects == ()

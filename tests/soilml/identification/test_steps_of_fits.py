@@ -127,6 +127,27 @@ def test_limits_of_the_linear_method_are_said(case):
         linear._channel(rows_of(case), "drawbar_pull")
 
 
+def test_the_linear_method_takes_the_larger_of_declared_and_seen_noise(case):
+    data, free = rows_of(case), select_free(case, ["cohesion", "friction_angle"])
+
+    def std(factor, scatter=0.0, count=4):
+        seen = np.asarray([0.0, 1.0, -1.0, 1.0]) * scatter
+        torque, sinkage = data.channels
+        torque = Channel("torque", torque.reading * (1.0 + seen), factor * torque.std, True)
+        sinkage = Channel("sinkage", sinkage.reading, factor * sinkage.std, True)
+        kept = np.where(np.arange(4) < count, torque.reading, np.nan)
+        torque = Channel("torque", kept, torque.std, True)
+        given = replace(data, channels=(torque, sinkage))
+        return np.sqrt(np.diag(linear._solve(case, given, free).covariance))
+
+    fine = std(1.0)
+    np.testing.assert_allclose(std(3.0), 3.0 * fine, rtol=0.1)  # residuals are below the noise
+    assert np.isfinite(std(1.0, count=3)).all()  # two rows: no residual is left
+    rough = std(0.01, scatter=0.1)
+    assert (rough > 0.03 * fine).all()  # residuals above the noise
+    np.testing.assert_allclose(std(0.02, scatter=0.1), rough, rtol=0.1)
+
+
 def test_samples_of_the_linearised_posterior_are_somewhat_wider(case):
     data = rows_of(case)
     density = PosteriorDensity(case, data, select_free(case, None), noise_scale=2.0)
