@@ -16,6 +16,8 @@ from soilml.log_import.recording import Floats
 LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 #: Slip from which a driving wheel has a torque worth judging.
 _SLIPS = 0.05
+#: Range of the usual sinkage over the radius.
+_USUAL_SINKAGE = (0.02, 0.7)
 #: Mistakes that make T / (W r) too large, by factor.
 _TOO_LARGE = (
     (9.80665, "the load is in kg and was taken as N"),
@@ -194,8 +196,13 @@ def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> It
     if sinkage is None or not np.isfinite(sinkage).any():
         return
     middle = float(np.nanmedian(sinkage))
-    if radius is not None and middle > float(np.nanmedian(radius)):
-        unit = "mm" if middle / 1000.0 < float(np.nanmedian(radius)) else "another unit"
+    if radius is not None and middle > (one := float(np.nanmedian(radius))):
+        units = [
+            unit
+            for unit, factor in (("cm", 100.0), ("mm", 1000.0))
+            if _USUAL_SINKAGE[0] < middle / factor / one < _USUAL_SINKAGE[1]
+        ]
+        unit = " or ".join(units) or "another unit"
         yield f"sinkage is {middle:.3g} m, more than the radius: probably it is in {unit}"
     elif middle < -0.002:
         yield f"sinkage is {middle:.3g} m in the middle of the rows: probably its sign is turned"

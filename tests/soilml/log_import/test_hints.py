@@ -125,6 +125,9 @@ def rows(**changes):
         ({"drawbar_pull_N": lambda x: 1000 + x}, "was not tared"),
         ({"drawbar_pull_N": lambda x: -x}, "its sign is turned"),
         ({"sinkage_m": lambda x: 1000 * x}, "probably it is in mm"),
+        ({"sinkage_m": lambda x: 100 * x}, "probably it is in cm"),
+        ({"sinkage_m": lambda x: 400 * x}, "probably it is in cm or mm"),
+        ({"sinkage_m": lambda x: 1e5 * x}, "probably it is in another unit"),
         ({"torque_Nm": lambda x: x * [1, 1, 9, 1]}, "look at that row"),
     ],
 )
