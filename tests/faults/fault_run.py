@@ -1,7 +1,8 @@
 """Kill commands at random moments and run them again: `make faults FAULT_KILLS=200`.
 
 After each kill every output is whole, old or new; after the rerun the outputs are those of an
-undisturbed run, bit for bit, and nothing else lies beside them.
+undisturbed run, bit for bit, and nothing else lies beside them. The time from SIGTERM or SIGINT to
+the end of the command is printed too.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -55,6 +57,16 @@ COMMANDS = {
     "simulate": "simulate model.toml --slip 0:0.6:400 --load 30:90:400 --out out/s.csv",
 }
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+
+
+@dataclass
+class Counts:
+    """What became of the kills, by command."""
+
+    kills: Counter[str] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    #: From SIGTERM or SIGINT to the end, s, of each command that said that it was interrupted.
+    seconds: dict[str, list[float]] = field(default_factory=dict)
 
 
 @contextmanager
@@ -119,19 +131,32 @@ def prepared(folder: Path) -> None:
 
 
 def disturbed(
-    folder: Path, words: str, right: dict[str, str], delay: float, number: signal.Signals
+    folder: Path,
+    words: str,
+    right: dict[str, str],
+    delay: float,
+    number: signal.Signals,
+    seconds: list[float],
 ) -> list[str]:
-    """Faults after one kill and a rerun, in words; an empty list where there are none."""
+    """Faults after one kill and a rerun, in words; an empty list where there are none.
+
+    `seconds` grows by the time from the signal to the end of a command that was interrupted.
+    """
     out = folder / "out"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir()
     with started(folder, words) as process:
         time.sleep(delay)
         process.send_signal(number)
+        begun = time.monotonic()
+        process.wait()
+        ended = time.monotonic() - begun
         error = process.communicate()[1]
     faults = []
     said = process.returncode == 128 + number and error.count("soilml: interrupted") == 1
-    if not said and process.returncode not in (0, -number):
+    if said:
+        seconds.append(ended)
+    elif process.returncode not in (0, -number):
         faults.append(f"said {error.strip()[-300:]!r} with status {process.returncode}")
     left = digests(out)
     whole = {name: digest for name, digest in left.items() if not Path(name).name.startswith(".")}
@@ -147,9 +172,7 @@ def disturbed(
     return faults
 
 
-def run(
-    kills: int, seed: int, counts: Counter[str], commands: Sequence[str] = tuple(COMMANDS)
-) -> None:
+def run(kills: int, seed: int, counts: Counts, commands: Sequence[str] = tuple(COMMANDS)) -> None:
     """Kill the commands in turn at random moments; count kills and faults by command."""
     rng = random.Random(seed)
     with TemporaryDirectory() as name, progress_bar("kills", kills) as show:
@@ -164,9 +187,10 @@ def run(
         for i in range(kills):
             command = commands[i % len(commands)]
             delay, number = rng.uniform(0.08, 1.1 * seconds[command]), rng.choice(SIGNALS)
-            faults = disturbed(folder, COMMANDS[command], right[command], delay, number)
-            counts[f"{command} kills"] += 1
-            counts[f"{command} faults"] += len(faults)
+            ended = counts.seconds.setdefault(command, [])
+            faults = disturbed(folder, COMMANDS[command], right[command], delay, number, ended)
+            counts.kills[command] += 1
+            counts.faults[command] += len(faults)
             for fault in faults:
                 print(f"{command}, {number.name} after {delay:.2f} s: {fault}", flush=True)
             show(i + 1)
@@ -179,19 +203,21 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("commands", nargs="*", metavar="COMMAND", help=", ".join(COMMANDS))
     args = parser.parse_args()
-    counts, interrupted = Counter[str](), False
+    counts, interrupted = Counts(), False
     try:
         run(args.kills, args.seed, counts, args.commands or tuple(COMMANDS))
     except KeyboardInterrupt:
         interrupted = True
     for command in args.commands or COMMANDS:
-        kills, faults = counts[f"{command} kills"], counts[f"{command} faults"]
-        print(f"{command:16} {kills:4} kills {faults:4} faults")
+        kills, faults = counts.kills[command], counts.faults[command]
+        times = counts.seconds.get(command, [])
+        ended = f", {len(times):3} interrupted within {max(times):.2f} s" if times else ""
+        print(f"{command:16} {kills:4} kills {faults:4} faults{ended}")
     if interrupted:
-        done = sum(counts[f"{command} kills"] for command in COMMANDS)
+        done = counts.kills.total()
         print(f"interrupted after {done} of {args.kills} kills", file=sys.stderr)
         return 130
-    return 1 if any(counts[f"{command} faults"] for command in COMMANDS) else 0
+    return 1 if counts.faults.total() else 0
 
 
 if __name__ == "__main__":
