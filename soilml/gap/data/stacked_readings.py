@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Readings that a table may have. The matrices of an analysis are of this size squared, and many
-#: are held at a time: 1.8 GB in all.
+#: are held at a time: 1.1 GB in all.
 MOST_READINGS = 3600
 
 

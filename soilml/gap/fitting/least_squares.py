@@ -22,6 +22,7 @@ from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate
 from soilml.gap.fitting.damped_steps import DampedSteps
 from soilml.gap.fitting.readings_by_gear import readings_by_gear
 from soilml.gap.fitting.soil_test_terms import SoilTestTerms
+from soilml.gap.fitting.whitening import Whitening
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.coarse_search import SinkageEstimate
 
@@ -62,7 +63,7 @@ class GapFit:
     reading: Floats  # (m,)
     derivatives: Floats  # (m, p) Jacobian in the readings' unit
 
-    def whitened_by(self, whiten: Floats) -> GapFit:
+    def whitened_by(self, whiten: Whitening) -> GapFit:
         """The same optimum with residuals and Jacobian whitened by another matrix (m, m)."""
         residual = whiten @ (self.reading - self.prediction)
         return replace(self, residual=residual, jacobian=whiten @ self.derivatives)
@@ -119,14 +120,15 @@ class GapFit:
 class FitRequest:
     """A descent to be made: its model, coordinates and data, and where it starts.
 
-    `whiten`, (m, m), is the inverse of the Cholesky factor L of the covariance of the readings;
+    `whiten`, (m, m), is a root of the inverse covariance of the readings, such as that of its
+    Cholesky factor L;
     `start`, (p,), are the first coordinates, clipped to the bounds.
     """
 
     case: Case
     coordinates: Sequence[FitCoordinate]
     readings: StackedReadings
-    whiten: Floats
+    whiten: Whitening
     start: Floats
 
 
@@ -134,7 +136,7 @@ def levenberg_marquardt(
     case: Case,
     coordinates: Sequence[FitCoordinate],
     readings: StackedReadings,
-    whiten: Floats,
+    whiten: Whitening,
     start: Floats,
 ) -> GapFit:
     """Bounded Levenberg-Marquardt descent from one start; see `descend_together`.
@@ -226,8 +228,9 @@ def _descent(request: FitRequest) -> _Descent:
     gears = readings_by_gear(request.case, coordinates, readings)
 
     def whitened_residual(y: Floats) -> Floats:
-        white = (readings.reading - y) @ request.whiten.T
-        return np.where(np.isfinite(white), white, INFEASIBLE_RESIDUAL)
+        feasible = np.isfinite(y).all(axis=-1, keepdims=True)
+        white = (request.whiten @ np.where(feasible, readings.reading - y, 0.0).T).T
+        return np.where(feasible, white, INFEASIBLE_RESIDUAL)
 
     def asked(x: Floats, sinkage: SinkageEstimate | None) -> PredictionRequest:
         return PredictionRequest(request.case, coordinates, x, readings, sinkage, gears)

@@ -21,6 +21,7 @@ from soilml.gap.fitting.coordinates import (
     size_coordinate,
 )
 from soilml.gap.fitting.least_squares import FitRequest, GapFit, descend_together
+from soilml.gap.fitting.whitening import Whitening
 from soilml.gap.statistics.discrepancy_process import discrepancy_process
 from soilml.gap.statistics.evidence import DiscrepancyModel
 from soilml.gap.statistics.reml_covariance import Covariance
@@ -147,7 +148,7 @@ class StartedFit:
     case: Case
     coordinates: Sequence[FitCoordinate]
     start: Mapping[str, float]
-    whiten: Floats | None = None
+    whiten: Whitening | None = None
 
 
 def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[GapFit | InputError]:

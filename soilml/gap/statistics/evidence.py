@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.gap.fitting.coordinates import EffectCoordinate, FitCoordinate
 from soilml.gap.fitting.least_squares import GapFit
+from soilml.gap.fitting.whitening import DiscrepancyWhitening
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
 from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
 from soilml.gap.statistics.linearised_fit import LinearisedFit, ProcessDivisions
@@ -59,10 +61,22 @@ class DiscrepancyModel:
     covariance: Covariance  # of noise and run-to-run scatter
     process: DiscrepancyProcess
 
+    def of_readings(self, selected: NDArray[np.bool_], run: NDArray[np.int64]) -> DiscrepancyModel:
+        """The covariance of the selected readings, of which each has a run (m,)."""
+        process = replace(self.process, columns=self.process.columns[selected])
+        return DiscrepancyModel(self.covariance.of_readings(selected, run), process)
+
+    @cached_property
+    def noise_whitening(self) -> Any:
+        """The matrix (m, m) that whitens noise and scatter, sparse: it does not mix runs."""
+        from scipy.sparse import csr_array
+
+        return csr_array(self.covariance.whiten)
+
     @cached_property
     def columns(self) -> Floats:
         """The functions of the process, whitened by noise and scatter, (m, q)."""
-        return np.asarray(self.covariance.whiten @ self.process.columns)
+        return np.asarray(self.noise_whitening @ self.process.columns)
 
     @cached_property
     def _factors(self) -> tuple[Floats, Floats]:
@@ -73,20 +87,17 @@ class DiscrepancyModel:
     def _divisions(self) -> ProcessDivisions:
         return ProcessDivisions(np.asarray(self.columns.T @ self.columns), self.process.channel)
 
-    def whiten(self, amplitude: Floats) -> Floats:
-        r"""Matrix (m, m) that whitens noise, scatter and a discrepancy of these amplitudes.
+    def whiten(self, amplitude: Floats) -> DiscrepancyWhitening:
+        r"""What whitens noise, scatter and a discrepancy of these amplitudes.
 
         .. math:: W = [I - Q (I - (I + R T^2 R^T)^{-1/2}) Q^T] W_0
         """
-        whiten = self.covariance.whiten
-        if not np.any(amplitude > 0.0):
-            return whiten
         q, r = self._factors
         scaled = r * amplitude[self.process.channel]
         value, vector = np.linalg.eigh(scaled @ scaled.T)
-        basis = q @ vector
-        shrink = 1.0 - 1.0 / np.sqrt(1.0 + np.maximum(value, 0.0))
-        return np.asarray(whiten - basis @ (shrink[:, None] * (basis.T @ whiten)))
+        present = value > 0.0
+        shrinkage = 1.0 - 1.0 / np.sqrt(1.0 + value[present])
+        return DiscrepancyWhitening(self.noise_whitening, q @ vector[:, present], shrinkage)
 
     def matrix(self, amplitude: Floats) -> Floats:
         """Covariance (m, m) of the readings from noise, scatter and discrepancy."""
@@ -138,7 +149,7 @@ class DiscrepancyModel:
 
 
 def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> LinearisedFit:
-    whiten = model.covariance.whiten
+    whiten = model.noise_whitening
     added = np.zeros((len(fit.reading), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
     block = np.column_stack([jacobian, whiten @ (fit.reading - fit.prediction)])

@@ -58,11 +58,11 @@ def outliers(
     """
     whiten = covariance.whiten
     basis = column_space(whiten @ space, **FIXED_EFFECT_TOLERANCES)
-    complement = np.eye(len(residual)) - basis @ basis.T
-    p = whiten.T @ complement @ whiten
-    diagonal = np.diag(p)
+    white, explained = whiten @ residual, whiten.T @ basis
+    projected = whiten.T @ (white - basis @ (basis.T @ white))  # P r
+    diagonal = (whiten**2).sum(axis=0) - (explained**2).sum(axis=1)  # of P
     defined = diagonal > MIN_RESIDUAL_VARIANCE / covariance.std**2
-    t = np.where(defined, (p @ residual) / np.sqrt(np.where(defined, diagonal, 1.0)), 0.0)
+    t = np.where(defined, projected / np.sqrt(np.where(defined, diagonal, 1.0)), 0.0)
     scale = 1.0
     if defined.any():
         scale = max(1.0, float(np.median(np.abs(t[defined]))) / Z_50)

@@ -77,6 +77,11 @@ class Covariance:
         """Standard deviation of each reading, (m,)."""
         return np.asarray(np.sqrt(np.diag(self.matrix)))
 
+    def of_readings(self, selected: NDArray[np.bool_], run: NDArray[np.int64]) -> Covariance:
+        """The covariance of the selected readings, of which each has a run (m,)."""
+        matrix = self.matrix[np.ix_(selected, selected)]
+        return Covariance(matrix, _whitening_matrix(matrix, run[selected]), self.components)
+
 
 def run_effect_columns(case: Case, readings: StackedReadings) -> Floats:
     """Change of each reading by one unit of run-to-run variation, (m, 2).

@@ -106,11 +106,12 @@ def repeat_disagreement(
         contrasts = _contrasts(alike, readings.channel == channel)
         if not len(contrasts):
             continue
-        difference = value[contrasts[:, 1]] - value[contrasts[:, 0]]
-        c = np.zeros((len(contrasts), len(readings)))
-        rows = np.arange(len(contrasts))
-        c[rows, contrasts[:, 0]], c[rows, contrasts[:, 1]] = -1.0, 1.0
-        chi_square = float(difference @ np.linalg.solve(c @ matrix @ c.T, difference))
+        first, other = contrasts.T
+        difference = value[other] - value[first]
+        rows = matrix[other] - matrix[first]  # C V
+        chi_square = float(
+            difference @ np.linalg.solve(rows[:, other] - rows[:, first], difference)
+        )
         pair, sigma = _worst_pair(alike, readings.channel == channel, value, matrix)
         found.append(
             RepeatComparison(
@@ -173,12 +174,15 @@ def _worst_pair(
     alike: Integers, in_channel: NDArray[np.bool_], value: Floats, matrix: Floats
 ) -> tuple[tuple[int, int], float]:
     """The two repeats that differ most in standard deviations, and by how many."""
+    own = np.flatnonzero(in_channel)
+    first, second = np.triu_indices(len(own), 1)
+    same = alike[own[first]] == alike[own[second]]
+    i, j = own[first[same]], own[second[same]]
     variance = np.diag(matrix)
-    squares = variance[:, None] + variance - 2.0 * matrix
-    sigma = np.abs(value[:, None] - value) / np.sqrt(np.where(squares > 0.0, squares, np.inf))
-    same = (alike[:, None] == alike) & in_channel[:, None] & in_channel
-    i, j = divmod(int(np.argmax(np.where(np.triu(same, 1), sigma, -1.0))), len(value))
-    return (i, j), float(sigma[i, j])
+    squares = variance[i] + variance[j] - 2.0 * matrix[i, j]
+    sigma = np.abs(value[i] - value[j]) / np.sqrt(np.where(squares > 0.0, squares, np.inf))
+    worst = int(np.argmax(sigma))
+    return (int(i[worst]), int(j[worst])), float(sigma[worst])
 
 
 def _pair_sentence(readings: StackedReadings, i: int, j: int) -> str:

@@ -140,11 +140,11 @@ def _predict_folds(
     readings = problem.readings
     requests, where = [], []
     for i, (marginal, folds) in enumerate(wanted):
-        fit, matrix = marginal.fit, problem.discrepancy.matrix(marginal.evidence.amplitude)
+        fit, amplitude = marginal.fit, marginal.evidence.amplitude
         for number in folds.predicted:
             rest = folds.fold != number
-            whiten = np.linalg.inv(np.linalg.cholesky(matrix[np.ix_(rest, rest)]))
-            kept = readings.subset(rest)
+            known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
+            kept, whiten = readings.subset(rest), known.whiten(amplitude)
             requests.append(FitRequest(fit.case, fit.coordinates, kept, whiten, fit.x))
             where.append((i, ~rest))
     predicted = [np.full(len(readings), np.nan) for _ in wanted]

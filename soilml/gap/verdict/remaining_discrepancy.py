@@ -48,7 +48,7 @@ def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
         return np.zeros(len(problem.readings))
     whiten = problem.discrepancy.whiten(amplitude)
     residual = problem.readings.reading - marginal.fit.prediction
-    weighted = process.columns.T @ (whiten.T @ (whiten @ residual))
+    weighted = (whiten @ process.columns).T @ (whiten @ residual)
     return np.asarray(process.columns @ (amplitude[process.channel] ** 2 * weighted))
 
 

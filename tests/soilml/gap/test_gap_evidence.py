@@ -45,7 +45,25 @@ def test_the_process_has_the_stated_covariance(problem):
 def test_whitening_leaves_unit_covariance(problem, amplitude):
     model, amplitude = problem.discrepancy, np.asarray(amplitude)
     whiten, matrix = model.whiten(amplitude), model.matrix(amplitude)
-    assert whiten @ matrix @ whiten.T == pytest.approx(np.eye(len(matrix)), abs=1e-6)
+    dense = whiten @ np.eye(len(matrix))
+    assert dense @ matrix @ dense.T == pytest.approx(np.eye(len(matrix)), abs=1e-6)
+    values = np.random.default_rng(1).normal(size=(len(matrix), 2))
+    assert whiten @ values == pytest.approx(dense @ values, rel=1e-9)
+    assert whiten @ values[:, 0] == pytest.approx(dense @ values[:, 0], rel=1e-9)
+    assert whiten.noise is model.noise_whitening  # shared: many fits hold one matrix
+    assert whiten.basis.shape[1] <= model.process.columns.shape[1]
+
+
+@pytest.mark.parametrize("amplitude", [(0.0, 0.0, 0.0), (1.0, 0.0, 4.0)])
+@pytest.mark.parametrize("by_run", [True, False])
+def test_whitening_of_a_part_leaves_unit_covariance(problem, amplitude, by_run):
+    amplitude, readings = np.asarray(amplitude), problem.readings
+    run = readings.run[readings.row]
+    selected = run > 0 if by_run else np.arange(len(readings)) % 3 > 0
+    part = problem.discrepancy.of_readings(selected, run)
+    dense = part.whiten(amplitude) @ np.eye(int(selected.sum()))
+    matrix = problem.discrepancy.matrix(amplitude)[np.ix_(selected, selected)]
+    assert dense @ matrix @ dense.T == pytest.approx(np.eye(len(matrix)), abs=1e-6)
 
 
 def test_the_evidence_is_that_of_dense_algebra(problem, soil):
