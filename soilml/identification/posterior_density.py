@@ -106,6 +106,11 @@ class PosteriorDensity:
 
     def of_predictions(self, y: Floats) -> Floats:
         """Log posterior density (sets,) of parameters that predict these readings (sets, k)."""
+        size = max(MOST_EVALUATIONS // y.shape[1], 1)
+        parts = [self._of_predictions(y[i : i + size]) for i in range(0, len(y), size)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _of_predictions(self, y: Floats) -> Floats:
         squares, log_determinant = self._squares_and_log_determinant(y, self._std(y))
         # the factor on all noise enters the determinant as a constant, which does not matter
         logs = -0.5 * squares / self.noise_scale**2 - log_determinant
