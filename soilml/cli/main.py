@@ -159,8 +159,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         number is not reproduced. An output file is complete or absent in every case.
     """
     try:
-        with StopSignals():
-            status = _run(arguments)
+        with StopSignals() as signals:
+            status = _run(arguments, signals)
     except (KeyboardInterrupt, Terminated) as stop:  # while the data of the command were freed
         status = _interrupted(stop)
     if arguments is None and threading.current_thread() is threading.main_thread():
@@ -168,19 +168,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-def _run(arguments: Sequence[str] | None) -> int:
+def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
     """Run one command; exceptions become one line on standard error."""
     reserve_standard_descriptors()
     replaced.clear()
     try:
-        words = _join_negative_values(list(sys.argv[1:] if arguments is None else arguments))
-        args = parser(words[0] if words else "").parse_args(words)
-        args.command_line, args.make_parser = words, parser
-        check_outputs(args.outputs(args), input_files(args))
-        status = int(args.run(args) or 0)
-        if sys.stdout is not None:
-            sys.stdout.flush()
-        return status
+        try:
+            return _status(list(sys.argv[1:] if arguments is None else arguments))
+        except Exception:
+            if signals.raised is not None:  # an import or a class has turned it into another one
+                raise signals.raised from None
+            raise
     except SoilmlError as error:
         return fail(str(error), 2)
     except (KeyboardInterrupt, Terminated) as stop:
@@ -199,6 +197,18 @@ def _run(arguments: Sequence[str] | None) -> int:
         return fail(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
     except MemoryError:
         return fail("this machine has too little memory for the command: ask for fewer rows", 2)
+
+
+def _status(words: list[str]) -> int:
+    """Run the command of these words; returns the exit status."""
+    words = _join_negative_values(words)
+    args = parser(words[0] if words else "").parse_args(words)
+    args.command_line, args.make_parser = words, parser
+    check_outputs(args.outputs(args), input_files(args))
+    status = int(args.run(args) or 0)
+    if sys.stdout is not None:
+        sys.stdout.flush()
+    return status
 
 
 def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:

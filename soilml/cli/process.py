@@ -2,7 +2,7 @@
 
 A signal handler that raises an exception is not enough: raised inside the import of a library, the
 exception turns into another one, is lost, or ends the process in its C++ code. While a module is
-imported nothing is half-written yet, and the process just ends.
+imported and no output is being written, nothing is half-written yet, and the process just ends.
 """
 
 from __future__ import annotations
@@ -26,19 +26,23 @@ class StopSignals:
 
     Ctrl-C raises `KeyboardInterrupt` and the others `Terminated`, so that temporary files are
     removed. A handler that the program has set already stays, and other threads change nothing.
+    `raised` is the exception that was raised, or None.
     """
 
-    def __enter__(self) -> None:
+    raised: KeyboardInterrupt | Terminated | None = None
+
+    def __enter__(self) -> StopSignals:
         self._before: dict[int, Any] = {}
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             number = getattr(signal, name, None)
             usual = (signal.SIG_DFL, signal.default_int_handler)
             if number is not None and (handler := signal.getsignal(number)) in usual:
                 try:
-                    signal.signal(number, _stop)
+                    signal.signal(number, self._stop)
                 except ValueError:  # another thread than the main one
-                    return
+                    break
                 self._before[number] = handler
+        return self
 
     def __exit__(
         self,
@@ -49,17 +53,18 @@ class StopSignals:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
-
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    if _is_importing(frame):
-        try:
-            os.write(2, b"soilml: interrupted; no output was written\n")
-        finally:
-            os._exit(128 + number)
-    if number == signal.SIGINT:
-        raise KeyboardInterrupt
-    signal.signal(number, signal.SIG_IGN)
-    raise Terminated(128 + number)
+    def _stop(self, number: int, frame: FrameType | None) -> NoReturn:
+        if _is_importing(frame):
+            try:
+                os.write(2, b"soilml: interrupted; no output was written\n")
+            finally:
+                os._exit(128 + number)
+        if number == signal.SIGINT:
+            self.raised = KeyboardInterrupt()
+        else:
+            signal.signal(number, signal.SIG_IGN)
+            self.raised = Terminated(128 + number)
+        raise self.raised
 
 
 def _is_importing(frame: FrameType | None) -> bool:

@@ -9,6 +9,9 @@ import sys
 import pytest
 from conftest import MODEL
 
+from soilml.cli import main
+from soilml.errors import InputError
+
 #: Runs the command line; SIGINT arrives when the named module is imported.
 INTERRUPTED = """
 import os, signal, sys
@@ -81,7 +84,27 @@ sys.exit(main())
 def test_a_signal_after_the_command_is_answered(monkeypatch, capsys, number):
     """Large tables take a while to be freed; a signal meanwhile comes when the command is over."""
     module = importlib.import_module("soilml.cli.main")
-    monkeypatch.setattr(module, "_run", lambda arguments: signal.raise_signal(number))
+    monkeypatch.setattr(module, "_run", lambda *_: signal.raise_signal(number))
     monkeypatch.setattr(module, "replaced", ["d.parquet"])
     assert module.main(["generate"]) == 128 + number
     assert capsys.readouterr().err == "soilml: interrupted; complete before that: d.parquet\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("turned", [RuntimeError, ImportError, InputError])
+def test_an_interruption_that_became_another_error_is_one(monkeypatch, capsys, number, turned):
+    """Python turns what is raised while a class is made into a RuntimeError, and libraries too."""
+
+    def run(_):
+        try:
+            signal.raise_signal(number)
+        except BaseException as stop:
+            raise turned("the library is not installed") from stop
+
+    module = importlib.import_module("soilml.cli.commands.soils")
+    monkeypatch.setattr(module, "run", run)
+    assert main(["soils"]) == 128 + number
+    assert capsys.readouterr().err == "soilml: interrupted; no output was written\n"
+    monkeypatch.setattr(module, "run", lambda _: int("no interruption"))
+    with pytest.raises(ValueError, match="no interruption"):
+        main(["soils"])
