@@ -33,9 +33,6 @@ STATUSES = {
     "bad-data": "the data cannot be analysed",
 }
 
-#: Statuses of a report that claims a cause; its model then contains the cause.
-CLAIMING = ("named", "partly-named", "form-open", "class")
-
 
 @dataclass(frozen=True)
 class GapReport:

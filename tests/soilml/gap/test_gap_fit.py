@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
+from soilml.errors import InputError
 from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.fitting.coordinates import linearise, predict_readings, size_coordinate
 from soilml.gap.fitting.least_squares import levenberg_marquardt
+from soilml.gap.search import problem as problem_module
+from soilml.gap.search.problem import StartedFit, fit_many
 from soilml.gap.statistics.signatures import effect_signatures
 from soilml.gap.statistics.smooth_basis import regions, smooth_basis
 from soilml.physics.effects import EFFECTS
@@ -175,3 +178,21 @@ def test_a_region_holds_the_readings_of_its_channel_slips_and_loads(clean):
         for values, ends in ((readings.slip, region.slip), (readings.load, region.load)):
             assert (values[region.selected].min(), values[region.selected].max()) == ends
     assert (seen == 1).all()
+
+
+def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(clean, monkeypatch):
+    coordinates = [*clean.soil, *clean.size_coordinates(("slip-sinkage",))]
+    start = {c.path: 0.25 for c in coordinates}
+    refusals = [InputError("first"), InputError("second")]
+    asked = []
+
+    def descend_together(requests):
+        asked.append([r.start for r in requests])
+        return ["a fit", refusals[0], refusals[0]] if len(asked) == 1 else ["later", refusals[1]]
+
+    monkeypatch.setattr(problem_module, "descend_together", descend_together)
+    request = StartedFit(clean.with_effects(("slip-sinkage",)), coordinates, start)
+    assert fit_many(clean, [request] * 3) == ["a fit", "later", refusals[1]]
+    first, again = asked
+    assert len(first) == 3 and np.all(np.stack(first) == 0.25)
+    assert np.array_equal(again, [[0.25] * len(clean.soil) + [0.0]] * 2)

@@ -51,6 +51,12 @@ def test_a_range_without_gaps_has_several_levels_that_cover_it():
     assert set(levels.index) == set(range(levels.count))
 
 
+@pytest.mark.parametrize(("count", "levels"), [(9, 1), (11, 2)])
+def test_a_range_is_one_level_up_to_the_scatter_that_chance_gives(count, levels):
+    """Standard deviations 0.0137 and 0.0166; the limits are 0.0158 and 0.0152."""
+    assert slip_levels(0.1 + 0.005 * np.arange(count)).count == levels
+
+
 def test_repeats_show_levels_that_are_set_more_finely():
     load = np.repeat([60.0, 64.0, 60.0, 64.0], 8)
     repeated = np.repeat(np.arange(4), 8)
