@@ -8,10 +8,12 @@ held. Texts are left as they are.
 from __future__ import annotations
 
 import ast
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import libcst as cst
+import libcst.matchers as matchers
 from mutmut.mutation.file_mutation import Mutation, create_mutations
 
 #: Arguments that check what holds anyway, and change no result: no mutants of them.
@@ -38,7 +40,8 @@ class MutantsOfFile:
     def __init__(self, path: str, source: str):
         self.path, self.source = path, source
         self.module, found, *_ = create_mutations(path, source)
-        self.mutations = [one for one in found if not _is_left_out(one)]
+        checks = _values_of_checks(self.module)
+        self.mutations = [one for one in found if not _is_left_out(one, checks)]
 
     def __len__(self) -> int:
         """Number of mutants."""
@@ -70,10 +73,17 @@ class MutantsOfFile:
         ]
 
 
-def _is_left_out(mutation: Mutation) -> bool:
+def _values_of_checks(module: cst.Module) -> list[cst.CSTNode]:
+    """The values of arguments that only check."""
+    arguments = matchers.Arg(keyword=matchers.OneOf(*map(matchers.Name, CHECKS)))
+    found = matchers.findall(module, arguments)
+    return [one.value for one in found if isinstance(one, cst.Arg)]
+
+
+def _is_left_out(mutation: Mutation, checks: Sequence[cst.CSTNode]) -> bool:
     """Whether a mutation changes a text, or an argument that only checks."""
     old, new = mutation.original_node, mutation.mutated_node
-    if isinstance(old, cst.BaseString):
+    if isinstance(old, cst.BaseString) or any(old is value for value in checks):
         return True
     if not (isinstance(old, cst.Call) and isinstance(new, cst.Call)):
         return False
