@@ -13,6 +13,7 @@ from soilml.onboard.fusion.joint_errors import (
     LEAST_AVERAGES,
     JointErrors,
     _disagreement,
+    _measure,
     _reach,
     joint_errors,
 )
@@ -111,10 +112,13 @@ def test_a_box_scales_the_std_as_the_estimate_differs_from_a_normal_one():
 
 def test_what_readings_tell_without_the_prior_is_the_difference_of_precisions():
     mean, std, width = np.asarray([0.4, 3.0]), np.asarray([0.1, 0.5]), np.asarray([1.0, 4.0])
-    found, covariance = _without_prior(mean, np.diag(std**2), np.zeros(2), width)
+    lower = np.asarray([0.1, -1.0])
+    found, covariance = _without_prior(mean, np.diag(std**2), lower, lower + width)
     precision = 1.0 / std**2 - 12.0 / width**2
     assert np.diag(covariance) == pytest.approx(1.0 / precision)
-    assert found == pytest.approx((mean / std**2 - 0.5 * width * 12.0 / width**2) / precision)
+    assert found == pytest.approx(
+        (mean / std**2 - (lower + 0.5 * width) * 12.0 / width**2) / precision
+    )
 
 
 def test_averages_that_are_worse_than_readings_share_no_more_than_everything():
@@ -135,6 +139,17 @@ def test_gain_and_ends_of_the_interval_are_those_of_the_held_out_rows():
     assert rule.gain == pytest.approx(away @ (truth - truth.mean()) / (away @ away))
     assert np.all((rule.low < -1.2) & (rule.low > -2.4))  # normal errors: near 1.645
     assert np.all((rule.high > 1.2) & (rule.high < 2.4))
+
+
+def test_ends_of_the_interval_are_in_standard_deviations_of_the_row():
+    """Errors of two sensors grow tenfold over the range of the true values."""
+    rng = np.random.default_rng(4)
+    truth = rng.uniform(0.0, 10.0, 6000)
+    std = np.stack([0.05 * (1.0 + truth), 0.08 * (1.0 + truth)])
+    mean = truth + std * rng.normal(size=(2, 6000))
+    rule = _measure(truth, mean, std)
+    assert rule.low == pytest.approx([-1.645] * len(rule.low), abs=0.6)
+    assert rule.high == pytest.approx([1.645] * len(rule.high), abs=0.6)
 
 
 def test_an_interval_is_widened_until_it_holds_nine_tenths():

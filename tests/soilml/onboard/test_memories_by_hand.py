@@ -78,3 +78,7 @@ def test_rows_in_question_are_remembered_with_their_flags():
     assert empty["lengths"].dtype == empty["numbers"].dtype == np.int64
     again = TrackerMemory.from_arrays(arrays, "file", start)
     assert again.question.disagree == (True, False) and len(again.question.rows) == 2
+    question = question.with_row(row, True).with_row(row, True)
+    stray = replace(memory, question=question, repeated=repeated)
+    again = TrackerMemory.from_arrays(stray.as_arrays("file"), "file", start)
+    assert again.question.in_succession == question.in_succession == 2

@@ -110,6 +110,7 @@ def test_the_prior_becomes_the_narrower_one(rover):
     [
         ({"kphi": (0.0, 1.0)}, "not estimated"),
         ({"cohesion": (500.0, 100.0)}, "in order"),
+        ({"cohesion": (500.0, 500.0)}, "in order"),
         ({"cohesion": (0.0, 1e6)}, "within the prior"),
         ({"cohesion": (0.0, np.nan)}, "cohesion"),
         ({"cohesion": 100.0}, "two values"),

@@ -3,6 +3,7 @@
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from driven_days import SLIP_STD, Kind, simulate_day
 
 from soilml import Estimator, SoilTracker
 from soilml.errors import InputError
-from soilml.onboard.tracking import Event
+from soilml.onboard.tracking import Event, soil_tracker
+from soilml.onboard.tracking.misfit_limits import chi_squared_limit
+from soilml.onboard.tracking.row_window import RowWindow
+from soilml.onboard.tracking.tracker_memory import TrackerMemory
 
 
 @pytest.fixture(scope="module")
@@ -210,3 +214,22 @@ def test_a_simulated_day(estimator, drift):
     assert Event.DRIFT in events[first_drifting : first_drifting + 110]
     # all rows in one memory: refused from the first glitch or change on
     assert not np.mean([plain[i] for i in steady]) > 0.5
+
+
+@pytest.mark.parametrize(("factor", "event"), [(0.99, Event.ACCEPTED), (1.01, Event.DRIFT)])
+def test_drift_is_a_misfit_of_all_rows_above_that_of_their_parts(
+    estimator, monkeypatch, factor, event
+):
+    """Three unknowns, and one degree more for errors that the parts share."""
+    tracker = SoilTracker(estimator)
+    start = tracker.estimator.start()
+    window = RowWindow((start,) * 4, start, 4)
+    tracker._memory = TrackerMemory(window, rows_since_change=16)
+    part = SimpleNamespace(misfit=10.0, readings=13.0, memory=start)
+    monkeypatch.setattr(soil_tracker, "fit_memory", lambda *_: part)
+    monkeypatch.setattr(SoilTracker, "_answer", lambda self, event, words: event)
+    # 26 readings less six unknowns explain a misfit of 20: no excess noise
+    misfit = 20.0 + factor * chi_squared_limit(4.0)
+    tracker._fit = SimpleNamespace(misfit=misfit, readings=26.0)
+    assert tracker._look_for_drift() == event
+    assert (tracker._memory.window.blocks == window.blocks) == (event == Event.ACCEPTED)
