@@ -226,3 +226,15 @@ def test_friction_angle_and_bearing_are_told_apart(rig, angle, bearing):
     stds = found.friction_angle_std / np.deg2rad(0.5), found.bearing_std / 0.05
     assert stds[0 if angle else 1] in (1.2, 1.8, 3.0) and stds[1 if angle else 0] <= 0.5
     assert found.degrees_of_freedom == len(sign)
+
+
+def test_the_covariance_of_some_readings_is_their_part(rig):
+    readings, columns, _ = rig
+    truth = VarianceComponents(np.asarray([1.0, 2.0, 0.5]), 0.02, 0.1, 0.3, 9.0)
+    whole = assemble_covariance(readings, columns, truth)
+    chosen = readings.slip > np.median(readings.slip)
+    part = whole.of_readings(chosen, readings.run[readings.row])
+    np.testing.assert_array_equal(part.matrix, whole.matrix[chosen][:, chosen])
+    assert part.components == truth
+    inverse = part.whiten.T @ part.whiten
+    np.testing.assert_allclose(inverse @ part.matrix, np.eye(chosen.sum()), atol=1e-8)

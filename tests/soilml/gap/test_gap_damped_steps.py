@@ -1,5 +1,7 @@
 """Steps of a bounded fit: parameters that move by ratios, bounds, and curved valleys."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
@@ -53,13 +55,25 @@ def test_steps_end_at_bounds_and_do_not_leave_them():
 
 
 def test_a_step_counts_the_prior():
-    """The optimum of (r - x)^2 + (x / 0.5)^2, from r = 1 at x = 0, is at 0.2."""
-    steps = DampedSteps(
-        np.full(1, -5.0), np.full(1, 5.0), np.full(1, 1.0 / 0.5), np.full(1, np.inf)
-    )
+    """The optimum of (r - x)^2 + (3 x)^2, from r = 1 at x = 0, is at 0.1."""
+    steps = DampedSteps(np.full(1, -5.0), np.full(1, 5.0), np.full(1, 3.0), np.full(1, np.inf))
     moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
-    assert moved[0, 0] == pytest.approx(0.2)
-    assert steps.objective(np.asarray([1.0 - 0.2]), moved[0]) == pytest.approx(0.8)
+    assert moved[0, 0] == pytest.approx(0.1)
+    assert steps.objective(np.asarray([1.0 - 0.1]), moved[0]) == pytest.approx(0.9)
+
+
+def test_the_objective_counts_tests_of_the_soil():
+    """A deviation of 2 x - 1: the optimum of (r - x)^2 + (2 x - 1)^2, from r = 1, is at 0.6."""
+    tests = SimpleNamespace(
+        deviation=lambda x: 2.0 * np.asarray(x) - 1.0, rates=lambda x: np.asarray([[2.0]])
+    )
+    steps = DampedSteps(
+        np.full(1, -5.0), np.full(1, 5.0), np.zeros(1), np.full(1, np.inf), tests
+    )  # fmt: skip
+    moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
+    assert moved[0, 0] == pytest.approx(0.6)
+    assert steps.objective(np.asarray([0.4]), moved[0]) == pytest.approx(0.16 + 0.04)
+    assert steps.objective(np.asarray([2.0]), np.asarray([-1.0])) == pytest.approx(4.0 + 9.0)
 
 
 def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():

@@ -268,3 +268,19 @@ def test_a_file_for_simulated_rows_has_no_errors_that_rows_share(case, any_wheel
     single = Estimator.load("exported/wheel_linear.onnx")
     if single.sets is None:
         assert trained.for_simulated_case(single, fitted) is single
+
+
+def test_a_file_takes_noise_and_biases_of_the_case(case, any_wheel):
+    bias = {
+        "torque_Nm": Noise(share=0.03, constant=0.4),
+        "slip": Noise(constant=0.012),
+        "load_N": Noise(share=0.05),
+    }
+    noise = {"torque_Nm": Noise(share=0.02, constant=0.3), "slip": Noise(constant=0.01)}
+    found = trained.with_sensors_of(any_wheel, replace(case, noise=noise, bias=bias)).sets
+    assert found.noise["torque"] == (0.3, 0.02) and found.noise["slip"] == (0.01, 0.0)
+    assert found.noise["torque_bias"] == (0.4, 0.0)
+    expected = any_wheel.sets.common_errors | {
+        "torque_gain": 0.03, "slip_bias": 0.012, "load_gain": 0.05
+    }  # fmt: skip
+    assert found.common_errors == expected != any_wheel.sets.common_errors

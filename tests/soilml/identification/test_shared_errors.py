@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from soilml import Operating, identify, read_case
 from soilml.cli import main
@@ -159,6 +160,24 @@ def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):
             answers.append((fit.interval[0] <= truth) & (truth <= fit.interval[1]))
     assert np.mean(held) >= 0.8
     assert np.mean(before) < np.mean(held)
+
+
+def test_the_misfit_counts_the_errors_that_rows_share(case):
+    """Soil and an offset of slip by scipy, from rows without noise whose slip is read 0.03 high."""
+    case = replace(case, noise={key: Noise(constant=0.05) for key in ("torque_Nm", "sinkage_m")})
+    other = case.with_values(TRUTH)
+    true = other.model(other.soil, Operating(slip=SLIPS - 0.03, load=LOADS)).torque
+    table = Table({"slip": SLIPS, "load_N": LOADS, "torque_Nm": np.asarray(true)})
+    fit = identify(replace(case, bias={"slip": Noise(constant=0.005)}), table)
+
+    def residuals(x):
+        soil = case.with_values(dict(zip(TRUTH, x[:3] * list(TRUTH.values()), strict=True))).soil
+        torque = case.model(soil, Operating(slip=SLIPS - 0.005 * x[3], load=LOADS)).torque
+        return np.append((np.asarray(torque) - true) / 0.05, x[3])
+
+    best = least_squares(residuals, [1.0, 1.0, 1.0, 1.0], xtol=1e-10)
+    assert best.x[3] > 2.0
+    assert fit.misfit == pytest.approx(2.0 * best.cost / (len(SLIPS) - 3), rel=1e-3)
 
 
 def test_the_misfit_of_soil_and_errors_is_that_of_the_best_fit(case):
