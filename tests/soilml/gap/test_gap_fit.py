@@ -8,6 +8,7 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
 from soilml.gap.data.candidate_effects import with_effect
+from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.fitting.coordinates import linearise, predict_readings, size_coordinate
 from soilml.gap.fitting.least_squares import levenberg_marquardt
 from soilml.gap.search import problem as problem_module
@@ -149,6 +150,17 @@ def test_smooth_columns_are_independent_and_of_one_channel_each(clean):
     assert np.linalg.matrix_rank(scaled) == smooth.shape[1]
 
 
+def test_the_smooth_basis_is_legendre_polynomials_between_the_ends_of_slip_and_load():
+    readings = stack_readings(case_of(), driven(case_of(), loads=(40.0, 60.0, 90.0), slips=4))
+    basis = smooth_basis(readings)
+    torque = readings.channel == 0
+    own = basis[np.ix_(torque, (basis[torque] != 0.0).any(axis=0))]
+    x = 2.0 * (readings.slip[torque] - 0.06) / 0.54 - 1.0
+    y = 2.0 * np.log(readings.load[torque] / 40.0) / np.log(90.0 / 40.0) - 1.0
+    expected = np.stack([np.ones_like(x), x, y], axis=1)  # 12 readings a channel: 3 functions
+    np.testing.assert_allclose(own, np.median(readings.std[torque]) * expected, atol=1e-12)
+
+
 def test_the_degree_of_the_smooth_basis_follows_the_data():
     case = case_of()
     count = {}
@@ -196,3 +208,14 @@ def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(cle
     first, again = asked
     assert len(first) == 3 and np.all(np.stack(first) == 0.25)
     assert np.array_equal(again, [[0.25] * len(clean.soil) + [0.0]] * 2)
+
+
+def test_a_calibrated_sensor_has_the_error_that_is_stated(clean):
+    """Sizes are in reference sizes; uncalibrated sensors have the usual error of their kind."""
+    unit = EFFECTS["torque-gain"].about.reference["gain"]
+    known = replace(clean, calibration={"torque-gain": 0.003})
+    (size,) = known.size_coordinates(["torque-gain"])
+    assert size.std == pytest.approx(0.003 / unit)
+    usual, free = clean.size_coordinates(["torque-gain", "slip-sinkage"])
+    assert usual.std == problem_module.UNCALIBRATED_STD
+    assert free.std == np.inf

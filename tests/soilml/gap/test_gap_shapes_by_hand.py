@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import candidate, case_of, driven, fit_problem
 
+from soilml.gap.search import candidate_fits
 from soilml.gap.search.candidate_fits import (
     _better,
     predicted_shape_gain,
@@ -71,6 +72,39 @@ def test_an_effect_of_a_small_size_in_its_direction_gains_by_its_own_law(dug):
     gains = free_law_gains(problem, none, exact, signatures)
     assert gains["up"] == gains["any"] > 0.5
     assert gains["down"] == gains["turned"] == 0.0
+
+
+def test_a_gain_by_an_own_law_is_what_columns_beside_the_fit_explain(dug):
+    problem, found = dug
+    soil, none = problem.fit_soil([np.full(3, 0.5)]), candidate(problem, [], {})
+    whiten = problem.discrepancy.whiten(none.amplitude)
+    white = soil.whitened_by(whiten)
+    signature = found.fit.derivatives[:, 3]
+    terms = (np.ones(len(problem.readings)), *problem.readings.log_slip_and_load)
+    columns = whiten @ np.column_stack([signature * term for term in terms])
+    beside = columns - white.jacobian @ np.linalg.lstsq(white.jacobian, columns)[0]
+    left = white.residual - beside @ np.linalg.lstsq(beside, white.residual)[0]
+    gains = free_law_gains(problem, none, soil, [Signature("dug", "soil", signature, 0)])
+    assert gains["dug"] == pytest.approx(np.sum(white.residual**2) - np.sum(left**2), rel=1e-6)
+
+
+def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatch):
+    """The first has two starts, under discrepancy and under noise; the second has one."""
+    problem, found = dug
+    first = replace(found, noise_only=found.fit)
+    none = np.zeros(1)
+    fits = [MarginalFit(SimpleNamespace(), Evidence(v, none, none, none)) for v in (2.0, 3.0, 1.0)]
+    asked = []
+
+    def fitted(problem, started, lowest):
+        asked.extend(amplitude for _, amplitude in started)
+        return fits
+
+    monkeypatch.setattr(candidate_fits, "fit_marginal", fitted)
+    one, two = candidate_fits.fit_shapes(problem, [first, found])
+    assert one.free_law is fits[0] and two.free_law is fits[2]
+    np.testing.assert_array_equal(asked[0], found.amplitude)
+    np.testing.assert_array_equal(asked[1], np.zeros(len(problem.readings.channels)))
 
 
 def test_of_two_fits_the_one_of_larger_evidence_is_kept():

@@ -94,6 +94,15 @@ def test_halves_of_a_plate_test_are_those_of_its_logarithm_without_the_shallow_t
     log_p = np.append(0.0, np.cumsum(bend[1:] * np.diff(np.log(z))))
     halves = pressure_sinkage._fit_curve(plate(z, 1e3 * np.exp(log_p)), 0.05).halves
     assert halves[0] == pytest.approx(0.5, abs=0.1) and halves[1] == pytest.approx(1.5, abs=0.02)
+    # readings end far before the last one, whose tenth is the shallow part
+    gap = np.append(z[z < 0.03], 0.1)
+    log_p = np.interp(np.log(gap), np.log(z), log_p)
+    halves = pressure_sinkage._fit_curve(plate(gap, 1e3 * np.exp(log_p)), 0.05).halves
+    assert np.isnan(halves).all()  # one reading in the deeper half
+    beyond = np.append(gap, 0.1001)
+    log_p = np.append(log_p, log_p[-1] + 1.5 * np.log(1.001))
+    halves = pressure_sinkage._fit_curve(plate(beyond, 1e3 * np.exp(log_p)), 0.05).halves
+    assert halves[0] == pytest.approx(0.5, abs=0.1)
     few = pressure_sinkage._fit_curve(plate([0.02, 0.03, 0.1], [1.0, 2.0, 3.0]), 0.05)
     assert np.isnan(few.halves).all() and few.exponent > 0.0  # one point in the deeper half
     curves = [replace(few, halves=h) for h in ((0.4, 1.0), (0.6, 1.4), (np.nan, np.nan))]

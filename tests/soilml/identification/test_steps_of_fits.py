@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -200,3 +201,9 @@ def test_methods_in_closed_form_say_what_rows_they_need(case):
         newton.newton(case, first(3, [torque]), select_free(case, None))
     except FitError as error:  # three readings may not determine three unknowns
         assert "needs three or more" not in str(error)
+
+
+def test_a_row_without_equilibrium_has_a_residual_of_a_thousand_standard_deviations():
+    problem = SimpleNamespace(reading=np.asarray([1.0, 2.0]), std=np.asarray([0.1, 0.5]))
+    found = descent.LeastSquaresProblem.residual(problem, np.asarray([[1.5, np.nan]]))
+    np.testing.assert_allclose(found, [[0.5, 500.0]])
