@@ -63,6 +63,10 @@ def test_discrimination_is_the_root_of_what_new_rows_add_to_the_misfit():
     # with both rows d is 3, and 2 is left in each
     assert design._discrimination(free, present, new) == pytest.approx(np.sqrt(8.0))
     assert design._discrimination(free, present, present) == pytest.approx(0.0, abs=1e-9)
+    # two rows leave 2 already; with a third like the second d is 7 / 3, and 8 / 3 is left
+    two = np.asarray([1.0, 3.0]), np.ones((2, 1))
+    third = np.asarray([3.0]), np.ones((1, 1))
+    assert design._discrimination(free, two, third) == pytest.approx(np.sqrt(2.0 / 3.0))
     unsolved = np.asarray([np.nan]), np.asarray([[1.0]])
     assert np.isnan(design._discrimination(free, present, unsolved))
     unsolved = np.asarray([1.0]), np.asarray([[np.inf]])

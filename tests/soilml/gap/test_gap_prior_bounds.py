@@ -51,3 +51,14 @@ def test_a_further_effect_that_relieves_a_bound_is_counted(soil):
     curvature[1, 3] = curvature[3, 1] = 9.0  # the effect changes the readings as the soil does
     relieved = outside_bounds(fit, np.asarray([0.0, 30.0, 0.0, 3.3]), curvature)
     assert relieved < pressed - 1.0
+
+
+def test_a_neighbour_that_its_bound_holds_does_not_move(soil):
+    """The second coordinate has its own curvature, the first what the second leaves it."""
+    fit = replace(soil, x=np.asarray([0.0, 0.9, 0.5]))
+    gradient, curvature = np.asarray([-20.0, 4.0, 0.0]), np.diag([400.0, 200.0, 1e9])
+    curvature[0, 1] = curvature[1, 0] = 150.0
+    first = 400.0 - 150.0**2 / 200.0
+    expected = by_integration(0.0, -20.0 - 150.0 / 200.0 * 4.0, first)
+    expected += by_integration(0.9, 4.0, 200.0)
+    assert outside_bounds(fit, gradient, curvature) == pytest.approx(expected, rel=1e-3, abs=1e-3)

@@ -107,6 +107,20 @@ def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatc
     np.testing.assert_array_equal(asked[1], np.zeros(len(problem.readings.channels)))
 
 
+def test_a_candidate_keeps_its_fit_under_noise_alone(dug):
+    problem, found = dug
+    none = np.zeros(len(problem.readings.channels))
+    starts = [None, {}]
+    one, two = candidate_fits.fit_candidates(
+        problem, [candidate_fits.CandidateRequest(("slip-sinkage",), {}, none, s) for s in starts]
+    )
+    assert one.noise_only is None and two.noise_only is not None
+    white = problem.covariance.whiten
+    by_noise = two.noise_only.whitened_by(white)
+    beside = found.fit.whitened_by(white)
+    assert np.sum(by_noise.residual**2) <= np.sum(beside.residual**2)
+
+
 def test_of_two_fits_the_one_of_larger_evidence_is_kept():
     none = np.zeros(1)
     first, second = (

@@ -9,6 +9,12 @@ import pytest
 
 from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
+from soilml.onboard.model_file import (
+    find_model,
+    read_pooling,
+    released_models,
+    write_pooling,
+)
 
 
 @pytest.fixture(scope="module")
@@ -267,3 +273,21 @@ def test_the_file_holds_no_path_of_the_machine_it_was_made_on(small_model):
     content = small_model.read_bytes()
     for trace in (b"site-packages", str(Path.home()).encode(), b"stack_trace", b".py"):
         assert trace not in content
+
+
+def test_a_short_name_is_a_file_or_a_released_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert find_model("wheel") == released_models()["wheel"]
+    for path in ("folder/wheel", "wheel.onnx", Path("folder") / "wheel"):
+        assert find_model(path) == Path(path)  # that it is missing is said when it is opened
+    Path("wheel").touch()
+    assert find_model("wheel") == Path("wheel")
+
+
+def test_the_calibration_of_pooled_rows_is_written_as_it_was_read():
+    entry = json.loads(Estimator.load("exported/slip_torque.onnx").metadata["together"])
+    pooling = read_pooling(entry)
+    assert pooling.held_out is not None
+    assert json.loads(json.dumps(write_pooling(pooling))) == entry
+    without = read_pooling({key: entry[key] for key in entry if key != "held_out"})
+    assert without.held_out is None

@@ -152,6 +152,17 @@ def test_ends_of_the_interval_are_in_standard_deviations_of_the_row():
     assert rule.high == pytest.approx([1.645] * len(rule.high), abs=0.6)
 
 
+def test_an_interval_holds_its_mean_where_all_errors_of_a_bin_lie_on_one_side():
+    """Estimates too low in the lower half of the range and too high in the upper one."""
+    rng = np.random.default_rng(5)
+    truth = np.sort(rng.uniform(0.0, 10.0, 4000))
+    shift = np.where(truth < 5.0, -0.4, 0.4)
+    mean = truth + shift + 0.02 * rng.normal(size=(2, 4000))
+    rule = _measure(truth, mean, np.full((2, 4000), 0.4))
+    assert (rule.low <= 0.0).all() and (rule.high >= 0.0).all()
+    assert (rule.low == 0.0).any() and (rule.high == 0.0).any()
+
+
 def test_an_interval_is_widened_until_it_holds_nine_tenths():
     """Errors of -1, -0.9 ... 1 below and above 0.5, in an interval from -1 to 1.5 around it."""
     truth = 0.5 + np.linspace(-1.0, 1.0, 21)

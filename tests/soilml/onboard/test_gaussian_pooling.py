@@ -156,3 +156,10 @@ def test_factors_scale_the_covariance_up_to_the_prior():
     narrower = replace(rule, std_scale=np.asarray([0.5, 0.5]))
     found = pool_within_prior(mean[None], row[None], prior, narrower)
     assert found.covariance == pytest.approx(0.25 * row, rel=1e-6)
+
+
+def test_a_pattern_is_named_by_the_conditions_that_vary():
+    calibration = PoolingCalibration(BOX, (), np.asarray([1.6]), np.asarray([5.0, 0.2]))
+    varies = ((False, False), (True, False), (False, True), (True, True))
+    names = [calibration.label(pattern(*each)) for each in varies]
+    assert names == ["steady", "slip free", "load free", "slip and load free"]

@@ -69,6 +69,10 @@ def test_standard_deviations_are_those_of_the_noise_model_or_as_measured():
     assert more["torque_std"].tolist() == [0.7, 0.7]
     # a pull without noise, in the file or given, has no weight
     assert more["drawbar_pull_std"].tolist() == [ABSENT_STD] * 2
+    # nor has a standard deviation without its reading
+    alone = SETS.rows(ROWS | {"sinkage_std": 0.002})
+    assert alone["sinkage"].tolist() == [ABSENT_READING] * 2
+    assert alone["sinkage_std"].tolist() == [ABSENT_STD] * 2
 
 
 @pytest.mark.parametrize("name, value, said", [

@@ -149,6 +149,17 @@ def test_a_box_beyond_the_estimate_moves_it_by_what_it_was_off_at_most():
     assert found.low == pytest.approx(after.low + left * (0.002 - before.low))
 
 
+def test_a_spread_is_at_most_half_the_box():
+    """An estimate that is wider than a normal one between the same ends: 0.45 of the prior."""
+    mean, covariance = np.asarray([0.5]), np.asarray([[0.45**2]])
+    prior, interval = (np.zeros(1), np.ones(1)), np.asarray([[0.0], [1.0]])
+    found = within_box(mean, covariance, interval, prior, (np.asarray([0.2]), np.asarray([0.6])))
+    assert found.std[0] == pytest.approx(0.45 * 0.4, rel=1e-3)
+    covariance = np.asarray([[0.8**2]])
+    found = within_box(mean, covariance, interval, prior, (np.asarray([0.2]), np.asarray([0.6])))
+    assert found.std[0] == pytest.approx(0.2)
+
+
 def test_readings_that_tell_nothing_are_as_wide_as_twenty_priors():
     _, covariance = _without_prior(
         np.asarray([0.5]), np.asarray([[1.0 / 12.0]]), np.zeros(1), np.ones(1)

@@ -81,7 +81,9 @@ def test_another_soil_is_told_and_the_rows_before_are_forgotten(settled, wheel_p
 def test_a_small_change_is_flagged_as_drift(settled, wheel_posterior):
     states = driven(settled, rows_of(wheel_posterior, 60, seed=3, x=(0.2, -0.12, 0.1)))
     flags = [state.drifting for state in states]
-    assert Event.DRIFT in [state.event for state in states] and flags[-1]
+    events = [state.event for state in states]
+    assert Event.DRIFT in events and flags[-1]
+    assert flags.index(True) == events.index(Event.DRIFT)  # from the row at which it is found
     assert states[flags.index(True)].rows_remembered < 60
 
 
