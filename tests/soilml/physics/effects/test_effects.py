@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import input_box, solved
 
-from soilml import EFFECTS, GEARS, Model, Operating, Status, Wheel, soil
+from soilml import EFFECTS, GEARS, Model, Operating, Status, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics import effects
@@ -28,6 +28,9 @@ FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 RIGID = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
 OF_WHEELS = [name for name, effect in EFFECTS.items() if effect.applies_to(WHEEL.gear)]
 every = pytest.mark.parametrize("name", OF_WHEELS)
+TRACK = Model(Track(radius=0.1, width=0.08, base=0.6))
+#: Those of tracks alone are tried on a track.
+on_its_gear = pytest.mark.parametrize("name", EFFECTS)
 shaped = pytest.mark.parametrize(
     "name", [n for n in OF_WHEELS if issubclass(EFFECTS[n], SlipLoadScaling)]
 )
@@ -68,9 +71,10 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
-@every
+@on_its_gear
 def test_an_effect_that_is_given_no_size_is_neutral(name):
-    before, neutral = WHEEL(SAND, AT), (WHEEL + EFFECTS[name]())(SAND, AT)
+    model = WHEEL if name in OF_WHEELS else TRACK
+    before, neutral = model(SAND, AT), (model + EFFECTS[name]())(SAND, AT)
     for field in FORCES:
         assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
 
@@ -112,20 +116,22 @@ def test_a_sign_is_a_sign(name):
     assert set(EFFECTS[name].about.signs.values()) <= {-1, 1}
 
 
-@every
+@on_its_gear
 def test_signs_are_as_declared(name):
-    effect = sized(name)
-    before, changed = WHEEL(SAND, AT), (WHEEL + effect)(SAND, AT)
+    effect, model = sized(name), WHEEL if name in OF_WHEELS else TRACK
+    before, changed = model(SAND, AT), (model + effect)(SAND, AT)
     assert set(effect.about.signs) <= set(CHANNELS)
     for channel, sign in effect.about.signs.items():
         assert (sign * (getattr(changed, channel) - getattr(before, channel)) > 0).all()
     assert any((getattr(changed, c) != getattr(before, c)).all() for c in CHANNELS)
 
 
-@every
+@on_its_gear
 def test_answers_change_smoothly_with_the_size(name):
+    model = WHEEL if name in OF_WHEELS else TRACK
+
     def at_size(share):
-        force = (WHEEL + sized(name, share))(SAND, AT)
+        force = (model + sized(name, share))(SAND, AT)
         return np.stack([getattr(force, c) for c in CHANNELS])
 
     h = 1e-4
