@@ -38,7 +38,7 @@ ROOT = Path(__file__).parents[1]
 #: Source folders, the folders of their tests, and what is left out: drawing, and other rooms.
 ROOMS = {
     "physics": ("soilml/physics", "tests/soilml/physics", ""),
-    "identification": ("soilml/identification", "tests/soilml/identification", ""),
+    "identification": ("soilml/identification", "tests/soilml/identification", "/plot"),
     "fusion": ("soilml/onboard/fusion", "tests/soilml/onboard", ""),
     "onboard": ("soilml/onboard", "tests/soilml/onboard", "/fusion/"),
     "gap": ("soilml/gap", "tests/soilml/gap", "/html/|_figure"),
