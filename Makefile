@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-browser check models limit kls1 gap-real bench bench-gap fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-newest test-browser check models limit kls1 gap-real bench bench-gap fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -97,14 +97,23 @@ mutation: $(VENV)/.ready ## change the source at random places and see whether a
 	  --disable-pip-version-check --editable '.[mutation]'
 	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)
 
+# what the tests need beside the libraries that users install, and the tests that tell versions apart
+TEST_LIBRARIES := '.[ground,logs,cluster,serve]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
+TEST_VERSIONS := -m pytest -q -n auto -p no:cacheprovider \
+	  -m "not slow and not network and not long and not browser" tests/soilml tests/training tests/datagen
+
 test-oldest: ## quick tests with the oldest libraries that are allowed, twenty minutes on two cores
 	@$(PYTHON) -m venv .venv-oldest
 	@mkdir -p build && $(PYTHON) bench/oldest.py > build/oldest.txt
 	@PIP_CONSTRAINT=build/oldest.txt .venv-oldest/bin/python -m pip install --quiet \
-	  --disable-pip-version-check '.[ground,logs,cluster,serve]' \
-	  array-api-strict filelock hypothesis pytest pytest-xdist sympy
-	@SCIPY_ARRAY_API=1 .venv-oldest/bin/python -m pytest -q -n auto -p no:cacheprovider \
-	  -m "not slow and not network and not long and not browser" tests/soilml tests/training tests/datagen
+	  --disable-pip-version-check $(TEST_LIBRARIES)
+	@SCIPY_ARRAY_API=1 .venv-oldest/bin/python $(TEST_VERSIONS)
+
+test-newest: ## quick tests with the newest libraries that are allowed, ten minutes on two cores
+	@$(PYTHON) -m venv .venv-newest
+	@.venv-newest/bin/python -m pip install --quiet --upgrade --upgrade-strategy eager \
+	  --disable-pip-version-check $(TEST_LIBRARIES)
+	@SCIPY_ARRAY_API=1 .venv-newest/bin/python $(TEST_VERSIONS)
 
 endurance: $(VENV)/.ready ## a day at 10 Hz through the estimator on board, an hour
 	@$(BIN)/python tests/endurance/endurance_run.py
@@ -140,4 +149,4 @@ audit-packages: .venv-supply/.ready ## compare the packages with known faults, b
 	@$(PYTHON) bench/packages.py audit
 
 clean: ## remove the environment and what demo and tests made
-	rm -rf $(VENV) .venv-supply demo build dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) .venv-supply .venv-oldest .venv-newest demo build dist .mypy_cache .ruff_cache .pytest_cache
