@@ -12,6 +12,9 @@ from soilml.experiment_design import is_identified
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.quantities import column
 
+#: Runs that are told the same thing have a line each up to this number, and one together beyond it.
+MOST_LINES = 10
+
 
 def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
     """Mean, std and interval of every parameter, by column name."""
@@ -53,7 +56,7 @@ def refusal_notes(
 
     `outside` and `rows` are the rows out of range, and all rows, of each.
     """
-    notes = []
+    told = []
     for i, name in enumerate(names):
         if estimate.in_range[i]:
             continue
@@ -63,5 +66,18 @@ def refusal_notes(
             why = f"{outside[i]} of {rows[i]} rows are out of range"
         if reason == Reason.INCONSISTENT:
             what = "the estimate is widened as far as the misfit says"
-        notes.append(f"{by} {name}: {why}; {what}")
-    return notes
+        told.append((name, f"{why}; {what}"))
+    return notes_on_runs(by, told)
+
+
+def notes_on_runs(by: str, told: Sequence[tuple[Any, str]]) -> list[str]:
+    """A line for each run that is told something; one for many that are told the same."""
+    names: dict[str, list[str]] = {}
+    for name, sentence in told:
+        names.setdefault(sentence, []).append(str(name))
+    lines = []
+    for sentence, own in names.items():
+        if len(own) > MOST_LINES:
+            own = [f"{', '.join(own[:3])} and {len(own) - 3} more"]
+        lines += [f"{by} {name}: {sentence}" for name in own]
+    return lines

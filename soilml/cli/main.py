@@ -22,7 +22,7 @@ from soilml.cli.process import (
 )
 from soilml.errors import InputError, SoilmlError, did_you_mean
 from soilml.io.atomic_files import check_outputs
-from soilml.io.swap import replaced
+from soilml.io.swap import clear_interrupted, replaced
 
 DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
@@ -213,6 +213,7 @@ def _status(words: list[str]) -> int:
 
 def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:
     """Say that a signal stopped the command, and what was complete; returns the exit status."""
+    clear_interrupted()
     code = stop.code if isinstance(stop, Terminated) else 128 + signal.SIGINT
     written = f"complete before that: {', '.join(replaced)}" if replaced else ""
     said = getattr(stop, "said", f"interrupted; {written or 'no output was written'}")

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 try:
     import fcntl
@@ -28,8 +28,8 @@ replaced: list[str] = []
 #: Last line of a journal whose files are all complete.
 _COMPLETE = "complete\n"
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-#: Journals of this process, whose locks it would not notice.
-_own: set[Path] = set()
+#: Swaps of this process by their journals, whose locks it would not notice.
+_own: dict[Path, Swap] = {}
 
 
 class Swap:
@@ -40,9 +40,10 @@ class Swap:
         self.targets, self.remove = list(targets), list(remove)
         self.parts = [t.parent / f".{t.name[:40]}.{token}.part" for t in self.targets]
         self._journal = _journal_name(self.targets[0], token)
+        self._opened: IO[str] | None = None
 
     def __enter__(self) -> Swap:
-        _own.add(self._journal)
+        _own[self._journal] = self
         self._opened = self._journal.open("x", encoding="utf-8")
         if fcntl is not None:
             with suppress(OSError):  # a file system without locks
@@ -57,14 +58,19 @@ class Swap:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove what is left of the temporary files, and the journal."""
         try:
             for part in self.parts:
                 part.unlink(missing_ok=True)
         finally:
             self._journal.unlink(missing_ok=True)
-            with suppress(OSError):
-                self._opened.close()
-            _own.discard(self._journal)
+            if self._opened is not None:
+                with suppress(OSError):
+                    self._opened.close()
+            _own.pop(self._journal, None)
 
     def replace_all(self, names: str) -> None:
         """Put every temporary file in its place; a signal to stop waits, and then says so."""
@@ -75,6 +81,7 @@ class Swap:
                 replaced.append(names)
 
     def _write(self, text: str) -> None:
+        assert self._opened is not None
         self._opened.write(text)
         self._opened.flush()
         os.fsync(self._opened.fileno())
@@ -83,6 +90,13 @@ class Swap:
 def is_writing() -> bool:
     """Whether this process has temporary files."""
     return bool(_own)
+
+
+def clear_interrupted() -> None:
+    """Clear what this process left where a signal arrived as a swap began or ended."""
+    for swap in list(_own.values()):
+        with suppress(OSError):
+            swap.clear()
 
 
 def finish_interrupted(targets: Sequence[Path]) -> None:

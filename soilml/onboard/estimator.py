@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.features import flatten_readings
+from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.model_file import find_model, open_model, read_fields, read_prior, read_probe
@@ -21,7 +21,7 @@ from soilml.onboard.probe import reproduces
 from soilml.onboard.row_estimates import run_rows
 from soilml.onboard.session import Session
 from soilml.onboard.set_estimate import estimate_of_set
-from soilml.onboard.set_posterior import SetPosterior, without_copies
+from soilml.onboard.set_posterior import SetPosterior
 
 Floats = NDArray[np.float64]
 NoiseModels = Mapping[str, tuple[float, float]]

@@ -5,7 +5,7 @@ Training and the onboard runtime share this module, so that their inputs are the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from numbers import Real
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
 from soilml.quantities import QUANTITIES
 
 Floats = NDArray[np.float64]
@@ -116,3 +117,29 @@ def flatten_readings(
         sizes = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
         raise InputError(f"readings must have one shape, or broadcast; given: {sizes}") from None
     return [np.broadcast_to(a, shape).reshape(-1) for a in arrays], shape
+
+
+def parts_of_rows(rows: Mapping[str, Floats], most: int) -> Iterator[Mapping[str, Floats]]:
+    """Consecutive parts of at most `most` rows; one part without a row where there are none."""
+    count = len(next(iter(rows.values())))
+    if count <= most:
+        yield rows
+        return
+    for first in range(0, count, most):
+        yield {name: values[first : first + most] for name, values in rows.items()}
+
+
+def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Rows without those that repeat another in every reading: copies carry no information."""
+    if len(rows["slip"]) < 2:
+        return dict(rows)
+    slip = rows["slip"]
+    if len(set(slip.tolist())) == len(slip):
+        return dict(rows)
+    table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
+    first: dict[bytes, int] = {}
+    for i, row in enumerate(table):
+        first.setdefault(row.tobytes(), i)
+    if len(first) == len(table):
+        return dict(rows)
+    return {name: values[list(first.values())] for name, values in rows.items()}

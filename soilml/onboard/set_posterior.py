@@ -21,7 +21,13 @@ from soilml.onboard.common_errors import (
     read_common_errors,
     with_common_errors,
 )
-from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings
+from soilml.onboard.features import (
+    READABLE,
+    as_number,
+    as_numbers,
+    flatten_readings,
+    parts_of_rows,
+)
 from soilml.onboard.memory import Memory
 from soilml.onboard.session import Session
 from soilml.onboard.set_contract import (
@@ -229,8 +235,10 @@ class SetPosterior:
 
     def rows_in_range(self, session: Session, rows: Mapping[str, Floats]) -> NDArray[np.bool_]:
         """Which rows (m,) lie in the range of the response surface."""
-        flags: NDArray[np.bool_] = session.run((ROW_IN_RANGE,), self.feed(rows, self.start()))[0]
-        return flags
+        none = self.start()
+        parts = parts_of_rows(rows, ROWS_PER_CALL)
+        flags = [session.run((ROW_IN_RANGE,), self.feed(part, none))[0] for part in parts]
+        return np.concatenate(flags)
 
     def update(
         self, session: Session, rows: Mapping[str, Floats], memory: Memory
@@ -239,32 +247,12 @@ class SetPosterior:
 
         The memory is not packed.
         """
-        count = len(rows["slip"])
-        last = (count - 1) // ROWS_PER_CALL * ROWS_PER_CALL if count else 0
-        for first in range(0, last, ROWS_PER_CALL):
-            part = {name: v[first : first + ROWS_PER_CALL] for name, v in rows.items()}
+        *parts, last = parts_of_rows(rows, ROWS_PER_CALL)
+        for part in parts:
             memory = memory.grown(*session.run(MEMORY_OUTPUTS, self.feed(part, memory))).packed()
-        if last:
-            rows = {name: values[last:] for name, values in rows.items()}
         memory = memory.packed()
-        outputs = session.run(OUTPUTS, self.feed(rows, memory))
+        outputs = session.run(OUTPUTS, self.feed(last, memory))
         return outputs[: len(SET_OUTPUTS)], memory.grown(*outputs[len(SET_OUTPUTS) :])
-
-
-def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Rows without those that repeat another in every reading: copies carry no information."""
-    if len(rows["slip"]) < 2:
-        return dict(rows)
-    slip = rows["slip"]
-    if len(set(slip.tolist())) == len(slip):
-        return dict(rows)
-    table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
-    first: dict[bytes, int] = {}
-    for i, row in enumerate(table):
-        first.setdefault(row.tobytes(), i)
-    if len(first) == len(table):
-        return dict(rows)
-    return {name: values[list(first.values())] for name, values in rows.items()}
 
 
 def _items(name: str, value: Any) -> list[tuple[Any, Any]]:

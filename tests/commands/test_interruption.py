@@ -11,6 +11,7 @@ from conftest import MODEL
 
 from soilml.cli import main
 from soilml.errors import InputError
+from soilml.io.swap import Swap
 
 #: Runs the command line; SIGINT arrives when the named module is imported.
 INTERRUPTED = """
@@ -108,3 +109,29 @@ def test_an_interruption_that_became_another_error_is_one(monkeypatch, capsys, n
     monkeypatch.setattr(module, "run", lambda _: int("no interruption"))
     with pytest.raises(ValueError, match="no interruption"):
         main(["soils"])
+
+
+@pytest.mark.parametrize("where", ["__enter__", "__exit__"])
+def test_a_signal_as_a_set_of_files_begins_or_ends_leaves_nothing(
+    tmp_path, monkeypatch, capsys, where
+):
+    """Python calls neither method to the end where a signal arrives in it."""
+    (tmp_path / "model.toml").write_text(MODEL)
+    done = getattr(Swap, where)
+
+    def interrupted(swap, *error):
+        if where == "__enter__":
+            done(swap)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Swap, where, interrupted)
+    monkeypatch.chdir(tmp_path)
+    assert (
+        main(["simulate", "model.toml", "--slip", "0.1", "--load", "60", "--out", "s.csv"]) == 130
+    )
+    said = capsys.readouterr().err
+    assert said.startswith("soilml: interrupted; ") and said.count("\n") == 1
+    complete = where == "__exit__"
+    assert ("complete before that: s.csv" in said) == complete
+    files = ["model.toml", "s.csv"] if complete else ["model.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == files

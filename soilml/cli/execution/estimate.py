@@ -23,6 +23,7 @@ from soilml.cli.output import save_columns, show, tell
 from soilml.cli.progress import progress_bar
 from soilml.cli.reports.estimate import check_size, estimate_report
 from soilml.cli.reports.report_files import write_with_report
+from soilml.cli.row_progress import row_progress
 from soilml.cli.table_reading import read_rows
 from soilml.cli.table_remarks import print_table_hints
 from soilml.cli.usual_errors.usual_model_error import tell_answers, usual_answer
@@ -222,14 +223,14 @@ def _estimates_of_runs(
 ) -> tuple[NDArray[np.int64], Estimate]:
     """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
     in_range = np.zeros(len(readings), dtype=np.int64)
-    with progress_bar(f"estimating by {by}", len(readings)) as done:
+    twice = 2 * sum(len(one["slip"]) for one in readings)
+    with row_progress(f"estimating by {by}", estimator, twice) as counted:
 
         def estimates() -> Iterator[Estimate]:
             for i, one in enumerate(readings):
-                in_range[i] = estimator.rows_in_range(**one).sum()
-                found = estimator.run(**one)
+                in_range[i] = counted.rows_in_range(**one).sum()
+                found = counted.run(**one)
                 yield found.within(**box) if box else found
-                done(i + 1)
 
         return in_range, Estimate.stack(estimates(), (len(readings),))
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.cli.estimate_text import estimate_columns
+from soilml.cli.estimate_text import estimate_columns, notes_on_runs
 from soilml.cli.output import is_terminal, show, tell_columns
+from soilml.cli.row_progress import row_progress
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import MODEL_ERROR_INPUT
@@ -52,11 +53,12 @@ def usual_answer(
     errors = {} if estimator.sets is None else estimator.sets.common_errors
     if declared or errors.get(MODEL_ERROR_INPUT) != 0.0:
         return {}, []
-    usual = estimator.on(model_error=1.0)
-    second = Estimate.stack(
-        (usual.run(**inputs).within(**box) if box else usual.run(**inputs) for inputs in readings),
-        (len(readings),),
-    )
+    usual, rows = estimator.on(model_error=1.0), sum(len(inputs["slip"]) for inputs in readings)
+    with row_progress(f"estimating by {by} with usual errors", usual, rows) as counted:
+        found = (counted.run(**inputs) for inputs in readings)
+        second = Estimate.stack(
+            (one.within(**box) if box else one for one in found), (len(readings),)
+        )
     return _columns(second), _notes(by, names, first, second)
 
 
@@ -104,12 +106,11 @@ def _notes(by: str, names: Sequence[Any], first: Estimate, second: Estimate) -> 
             f"believe the columns with _{USUAL}, unless this model was checked on a soil that is "
             f"known; their intervals are wider by factors of {widths}"
         )
+    told = []
     for i, name in enumerate(names):
-        if int(first.reason[i]) != Reason.INCONSISTENT:
-            continue
-        told = f"{by} {name}: the model as it is does not explain the rows, "
-        if second.in_range[i]:
-            notes.append(told + f"with its usual errors it does; believe the columns with _{USUAL}")
-        else:
-            notes.append(told + "nor does it with its usual errors; believe neither answer")
-    return notes
+        if int(first.reason[i]) == Reason.INCONSISTENT:
+            believe = "nor does it with its usual errors; believe neither answer"
+            if second.in_range[i]:
+                believe = f"with its usual errors it does; believe the columns with _{USUAL}"
+            told.append((name, f"the model as it is does not explain the rows, {believe}"))
+    return notes + notes_on_runs(by, told)

@@ -7,7 +7,12 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.features import compute_features, flatten_readings
+from soilml.onboard.features import (
+    compute_features,
+    flatten_readings,
+    parts_of_rows,
+    without_copies,
+)
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
     PoolingRule,
@@ -25,7 +30,7 @@ from soilml.onboard.multi_sensor import (
     fuse_estimates,
 )
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
-from soilml.onboard.set_posterior import SetPosterior, _broadcast, without_copies
+from soilml.onboard.set_posterior import SetPosterior, _broadcast
 
 SETS = SetPosterior(
     terms=4,
@@ -297,3 +302,12 @@ def test_an_estimate_draws_a_panel_for_each_quantity():
     assert [ax.get_title(loc="left") or ax.get_xlabel() or ax.get_ylabel() for ax in axes]
     words = [" ".join(t.get_text() for t in ax.findobj() if hasattr(t, "get_text")) for ax in axes]
     assert len(axes) == 2 and "a" in words[0].split() and "b" in words[1].split()
+
+
+@pytest.mark.parametrize(("count", "sizes"), [(0, [0]), (4, [4]), (5, [4, 1]), (8, [4, 4])])
+def test_rows_are_fed_in_parts(count, sizes):
+    rows = {"slip": np.arange(count), "load": -np.arange(count)}
+    parts = list(parts_of_rows(rows, 4))
+    assert [len(part["slip"]) for part in parts] == sizes
+    for name, values in rows.items():
+        assert np.concatenate([part[name] for part in parts]).tolist() == values.tolist()
