@@ -21,6 +21,9 @@ MOST_ROWS = 10_000_000
 BLOCK = 8192
 #: Characters of a line; a longer one is not of a table.
 _LINE = 1_000_000
+#: Characters of a cell that a message shows.
+_SHOWN = 60
+_QUOTES = "quotation marks must stand in pairs around a whole cell"
 
 
 def read_csv(
@@ -49,7 +52,7 @@ def read_csv(
         and a cell that is not what its column holds.
     """
     with file.open(encoding="utf-8-sig") as opened:
-        reader, buffer = csv.reader(_lines(file, opened)), cast(Any, opened.buffer)
+        reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
         try:
             header = [name.strip() for name in next(reader, [])]
             if not header:
@@ -68,7 +71,7 @@ def read_csv(
         except UnicodeDecodeError as error:
             raise TableError(f"{file} cannot be read as text: {error}") from None
         except csv.Error as error:
-            raise TableError(f"{file} line {reader.line_num}: {error}") from None
+            raise TableError(f"{file} line {reader.line_num}: {error}; {_QUOTES}") from None
     empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
     found = {
         name: np.concatenate([empty[name], *filled])
@@ -97,8 +100,11 @@ def _blocks(
     lines: list[int] = []
     total = 0
     for row in reader:
-        if not "".join(row).strip():
+        text = "".join(row)
+        if not text.strip():
             continue
+        if "\n" in text or "\r" in text:  # a quote that is not closed swallows the rows below
+            raise TableError(f"{file} line {reader.line_num}: a cell has several lines; {_QUOTES}")
         if len(row) != width:
             raise TableError(
                 f"{file} line {reader.line_num}: {len(row)} cells; needed are {width}, as in the "
@@ -129,8 +135,9 @@ def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -
         values[filled] = read_numbers([cells[i] for i in filled])
     except ValueError:
         wrong = next(i for i in filled if not _is_number(cells[i]))
+        shown = cells[wrong] if len(cells[wrong]) <= _SHOWN else f"{cells[wrong][:_SHOWN]}..."
         raise TableError(
-            f"{file} line {lines[wrong]}, column {name}: {cells[wrong]!r} is not a number; needed "
+            f"{file} line {lines[wrong]}, column {name}: {shown!r} is not a number; needed "
             "is a finite number, or a blank cell where it was not measured"
         ) from None
     return values

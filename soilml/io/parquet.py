@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -105,7 +106,7 @@ def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
         )
 
 
-def own_columns(metadata: dict[str, str]) -> list[str]:
+def own_columns(metadata: Mapping[str, str]) -> list[str]:
     """Columns whose units are in the file's own metadata, such as parameters of effects."""
     try:
         return list(json.loads(metadata.get("soilml_units", "{}")))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soilml.errors import TableError
-from soilml.io.parquet import ArrowStream
+from soilml.io.parquet import ArrowStream, own_columns
 from soilml.io.read_table import FILLED, check_table, known_columns, read_table
 from soilml.io.table import TEXT, Column, Table, fault_of_text
 
@@ -19,7 +19,7 @@ Rows = Table | ArrowStream | Mapping[str, ArrayLike]
 
 
 def as_table(rows: Rows) -> Table:
-    """The table of rows; data frames and columns are checked as files are.
+    """The table of rows; data frames, columns and tables made of them are checked as files are.
 
     Parameters
     ----------
@@ -38,7 +38,8 @@ def as_table(rows: Rows) -> Table:
     2
     """
     if isinstance(rows, Table):
-        return rows
+        # the rows of files have been checked, and have the lines of their file
+        return rows if len(rows.line) else _checked(rows.columns, rows.source, rows.metadata)
     if isinstance(rows, ArrowStream):
         return read_table(rows)
     if not isinstance(rows, Mapping):
@@ -46,30 +47,43 @@ def as_table(rows: Rows) -> Table:
             f"rows are {type(rows).__name__}; needed is a Table, as read_table returns it, a data "
             "frame, or a mapping of columns by name"
         )
-    file = Path("rows")
-    columns = {name: _column(name, rows[name]) for name in known_columns(file, list(rows), False)}
+    return _checked(rows, "rows", {})
+
+
+def _checked(rows: Mapping[str, ArrayLike], source: str, metadata: Mapping[str, str]) -> Table:
+    """A table of columns by name; `source` is what messages call it."""
+    odd = next((name for name in rows if not isinstance(name, str)), None)
+    if odd is not None:
+        raise TableError(f"{source}: a column is named {odd!r}; needed is a text such as 'load_N'")
+    file = Path(source)
+    names = known_columns(file, list(rows), False, own_columns(metadata))
+    columns = {name: _column(source, name, rows[name]) for name in names}
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise TableError(f"rows: columns differ in length: {listed}")
-    return check_table(Table(columns, str(file)), file, (), FILLED, None)
+        raise TableError(f"{source}: columns differ in length: {listed}")
+    table = Table(columns, source, metadata=dict(metadata))
+    return check_table(table, file, (), FILLED, None)
 
 
-def _column(name: str, values: ArrayLike) -> Column:
+def _column(source: str, name: str, values: ArrayLike) -> Column:
     """A column (rows,) of text or of numbers; a single value is a column of one row."""
     try:
         given = np.atleast_1d(np.asarray(values))
     except ValueError:  # lists of different lengths
-        raise TableError(f"rows, column {name}: needed is one value a row") from None
+        raise TableError(f"{source}, column {name}: needed is one value a row") from None
     if given.ndim != 1:
-        raise TableError(f"rows, column {name}: has shape {given.shape}; needed is one value a row")
+        shape = given.shape
+        raise TableError(f"{source}, column {name}: has shape {shape}; needed is one value a row")
     if name in TEXT:
-        return _text(name, given)
+        return _text(source, name, given)
     if given.dtype.kind in "iuf":
         return given.astype(np.float64)
     cells = given.tolist()
     if given.dtype.kind != "O" or not all(c is None or _is_number(c) for c in cells):
-        raise TableError(f"rows, column {name}: needed are numbers, and None where one is missing")
+        raise TableError(
+            f"{source}, column {name}: needed are numbers, and None where one is missing"
+        )
     return np.asarray([np.nan if c is None else c for c in cells], dtype=np.float64)
 
 
@@ -77,10 +91,10 @@ def _is_number(cell: object) -> bool:
     return isinstance(cell, int | float | np.number) and not isinstance(cell, bool)
 
 
-def _text(name: str, given: NDArray[Any]) -> Column:
+def _text(source: str, name: str, given: NDArray[Any]) -> Column:
     """A column of text, "" where blank, as a file would have it."""
     names = ["" if c is None else str(c).strip() for c in given.tolist()]
     for i, cell in enumerate(names):
         if fault := fault_of_text(cell):
-            raise TableError(f"rows, row {i + 1}, column {name}: {fault}")
+            raise TableError(f"{source}, row {i + 1}, column {name}: {fault}")
     return np.asarray(names, dtype=np.str_)

@@ -71,7 +71,8 @@ class Table:
 
     def __getitem__(self, name: str) -> Column:
         if name not in self.columns:
-            raise TableError(f"{self.source}: column {name} is missing; found: {self._found()}")
+            shown = name or "''"
+            raise TableError(f"{self.source}: column {shown} is missing; found: {self._found()}")
         return self.columns[name]
 
     def _found(self) -> str:

@@ -52,6 +52,10 @@ FAULTS = {
     "run blank": (GOOD.replace("b,", ","), "line 4, column run: the cell is blank"),
     "cells missing": (GOOD.replace("a,0.2,60,", "a,0.2,"), "line 3: 4 cells; needed are 5"),
     "semicolons": (GOOD.replace(",", ";"), "separator must be a comma"),
+    "quote not closed": (GOOD.replace("a,0.2", '"a,0.2'), "line 4: "),
+    "two stray quotes": (GOOD.replace("a,", '"a,').replace("b,", 'b",'), "quotation marks must"),
+    "cell of two lines": (GOOD.replace("a,0.2", '"a\nb",0.2'), "a cell has several lines"),
+    "endless cell": (GOOD.replace("0.013", "x" * 9000), f"'{'x' * 60}...' is not a number"),
     "no rows": (GOOD.splitlines()[0] + "\n", "no row"),
     "empty file": ("", "is empty"),
     "binary": (b"PK\x03\x04\x00\x00", "binary"),
@@ -98,3 +102,10 @@ def test_a_table_with_names_of_another_laboratory_is_told_all_at_once(tmp_path):
     (tmp_path / "box.csv").write_text("test,normal_kPa\na,4\n")
     with pytest.raises(TableError, match="normal_stress_Pa"):
         read_table(tmp_path / "box.csv")
+
+
+def test_a_quote_that_is_not_closed_in_a_column_that_is_passed_over_loses_no_rows(tmp_path):
+    lines = [f"{line},{note}" for line, note in zip(GOOD.splitlines(), "noxyz", strict=False)]
+    text = "\n".join(lines).replace(",o", ',"o (open') + "\n"
+    with pytest.raises(TableError, match="quotation marks must stand in pairs"):
+        read_table(written(tmp_path, text), RUNS, ignore_extra=True)

@@ -89,8 +89,30 @@ def test_other_rows_are_refused_in_one_line(rows, said):
     assert "\n" not in str(raised.value)
 
 
-def test_a_table_stays_and_single_values_are_a_row():
-    table = Table(COLUMNS)
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"torque_Nm": np.full(12, np.inf)}, "column torque_Nm: inf given"),
+        ({"torque_Nm": np.full(12, 1e300)}, "a torque between -1e7 and 1e7"),
+        ({"torque_Nm": np.ones(3)}, "columns differ in length"),
+        ({"torque_Nm": [1.0] * 11 + ["2"]}, "column torque_Nm: needed are numbers"),
+        ({"torque_Nm": np.ones((12, 1))}, "one value a row"),
+        ({"drawbarpull": np.ones(12)}, "column 'drawbarpull'"),
+        ({5: np.ones(12)}, "a column is named 5"),
+    ],
+)
+def test_a_table_that_no_file_held_is_checked_as_files_are(changes, said):
+    rows = COLUMNS | changes
+    for given in (Table(rows, "mine"), rows):
+        with pytest.raises(TableError, match=said) as raised:
+            as_table(given)
+        assert "\n" not in str(raised.value)
+    kept = as_table(Table(COLUMNS, "mine", metadata={"a": "b"}))
+    assert (kept.source, kept.metadata) == ("mine", {"a": "b"})
+
+
+def test_a_table_of_a_file_stays_and_single_values_are_a_row():
+    table = Table(COLUMNS, "runs.csv", np.arange(2, 14))
     assert as_table(table) is table
     assert as_table({"slip": 0.1, "load_N": 60, "run": "a"})["run"].tolist() == ["a"]
     blank = as_table({"slip": [0.1, 0.2], "torque_Nm": [None, np.float32(2.0)]})

@@ -1,5 +1,6 @@
 """A set of files is replaced as one, whatever stops or kills the process."""
 
+import errno
 import json
 import os
 import signal
@@ -116,4 +117,16 @@ def test_this_process_remembers_what_it_replaced(folder):
     before = len(swap.replaced)
     save_text(folder / "one", "new")
     assert swap.replaced[before:] == [str(folder / "one")]
+    assert not swap.is_writing()
+
+
+def test_a_disk_without_room_for_a_line_keeps_no_journal(folder, monkeypatch):
+    def full(self, text):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    before = sorted(path.name for path in folder.iterdir())
+    monkeypatch.setattr(swap.Swap, "_write", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        save_text(folder / "new.txt", "new")
+    assert sorted(path.name for path in folder.iterdir()) == before
     assert not swap.is_writing()
