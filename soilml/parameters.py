@@ -138,11 +138,11 @@ def _with_fields(tree: Any, changed: Mapping[str | int, Any]) -> Any:
 
 
 def check(tree: Any, where: str = "") -> None:
-    """Raise `InputError` where a parameter is not finite or lies outside its bounds."""
+    """Raise `InputError` where a parameter is no number or lies outside its bounds."""
     for path, (parameter, value) in located(tree).items():
         if type(value) is float and parameter.lower <= value <= parameter.upper:
             continue
-        numbers = to_numpy(value)
+        numbers = _numbers(where + path, value)
         bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
         if np.any(bad):
             worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
@@ -151,6 +151,17 @@ def check(tree: Any, where: str = "") -> None:
                 + f"; it must lie {_range_text(parameter)}"
                 + _hint(parameter, worst)
             )
+
+
+def _numbers(path: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """The value as numbers; raises `InputError` for text, ragged lists and masked arrays."""
+    try:
+        if not isinstance(value, str | bytes | np.ma.MaskedArray):
+            return to_numpy(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    shown = f"{value!r:.60}".splitlines()[0]
+    raise InputError(f"{path} is {shown}; needed is a number, or an array of numbers")
 
 
 def _range_text(parameter: Parameter) -> str:

@@ -158,7 +158,11 @@ def flattened(load_case: LoadCase) -> tuple[LoadCase, tuple[int, ...]]:
     xp = namespace(*parameters.values())
     device = next((v.device for v in parameters.values() if hasattr(v, "device")), None)
     arrays = {k: _float64(v, xp, device) for k, v in parameters.items()}
-    shape: tuple[int, ...] = np.broadcast_shapes(*(tuple(v.shape) for v in arrays.values()))
+    try:
+        shape: tuple[int, ...] = np.broadcast_shapes(*(tuple(v.shape) for v in arrays.values()))
+    except ValueError:
+        sizes = ", ".join(f"{k} {tuple(v.shape)}" for k, v in arrays.items() if v.ndim)
+        raise InputError(f"arrays that do not fit together: {sizes}") from None
     size = math.prod(shape)
     for path, array in arrays.items():
         if array.shape == shape == (size,):

@@ -23,6 +23,8 @@ Floats = NDArray[np.float64]
 ROWS_PER_RUN, FEWEST_ROWS = 8, 3
 #: Highest slip that is proposed: near 1 a wheel digs itself in before its readings are steady.
 HIGHEST_SLIP = 0.8
+#: Highest speed that is proposed, m/s: no rover, and hardly a rig, drives faster.
+HIGHEST_SPEED = 10.0
 #: Steps of proposed slips, the first that gives enough rows: what speed control can set.
 SLIP_STEPS = (0.05, 0.01)
 #: Heavier loads that are tried, as multiples of the heaviest driven, until the soil carries one:
@@ -92,8 +94,10 @@ def run_options(
     if speed is None or float(np.min(speed)) >= 0.0:
         options.append(run("reverse", "the same slips in reverse", usual, middle, speed=-pace))
     if _unvaried(speed):
-        text = f"the same slips ten times as fast, at {10.0 * pace:.2g} m/s,"
-        options.append(run("other speed", text, usual, middle, speed=10.0 * pace))
+        faster = 10.0 * abs(pace) <= HIGHEST_SPEED
+        other = (10.0 if faster else 0.1) * pace
+        text = f"the same slips {'ten times' if faster else 'a tenth'} as fast, at {other:.2g} m/s,"
+        options.append(run("other speed", text, usual, middle, speed=other))
     if _unvaried(readings.at.pass_number):
         text = "the same slips again in the same rut"
         options.append(run("second pass", text, usual, middle, pass_number=2.0))

@@ -110,7 +110,9 @@ class TrackerMemory:
         """
         try:
             return _read(arrays, identity, start)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except InputError:
+            raise
+        except Exception as error:  # whatever a damaged array raises
             raise InputError(
                 f"this state of a tracker is damaged ({error}): begin with SoilTracker(estimator)"
             ) from None
@@ -131,8 +133,9 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> TrackerMem
     system = np.asarray(arrays["system"], dtype=start.system.dtype)
     if system.shape != (ends[-1] if len(ends) else 0, start.system.shape[1]):
         raise ValueError(f"its system has shape {system.shape}")
-    if not (np.isfinite(system).all() and np.isfinite(arrays["counts"]).all()):
-        raise ValueError("it has numbers that are not finite")
+    for part in (system, np.asarray(arrays["counts"], dtype=np.float64)):
+        if not (np.abs(part) < np.finfo(np.float32).max).all():
+            raise ValueError("it has numbers that are not finite, or too large")
     parts = zip(np.split(system, ends[:-1]), arrays["counts"], strict=True) if len(ends) else ()
     blocks = tuple(
         replace(start, system=part, counts=np.asarray(count, np.float32)) for part, count in parts

@@ -71,6 +71,10 @@ def test_covariates_of_the_driven_rows_are_kept():
     assert found["heavier"].at.pass_number.tolist() == [1.0] * 8
     still = options(speed=[0.0] * 3)
     assert still["other speed"].at.speed.tolist() == [0.5] * 8
+    fast = options(speed=[1.5] * 3)["other speed"]
+    assert fast.at.speed.tolist() == [pytest.approx(0.15)] * 8  # ten times is beyond 10 m/s
+    assert fast.text == "the same slips a tenth as fast, at 0.15 m/s, under 60 N"
+    assert options(speed=[1.0] * 3)["other speed"].at.speed.tolist() == [pytest.approx(10.0)] * 8
     varied = options(speed=[0.02, 0.1, 0.5])
     assert "other speed" not in varied and "reverse" in varied
     assert "reverse" not in options(speed=[-0.02, 0.1, 0.5])

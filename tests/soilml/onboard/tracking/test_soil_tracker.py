@@ -168,6 +168,14 @@ def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator)
             SoilTracker.restore(estimator, {k: v for k, v in arrays.items() if k != name})
     with pytest.raises(InputError, match="its system has shape"):
         SoilTracker.restore(estimator, arrays | {"system": arrays["system"][:-1]})
+    for name, value in (
+        ("format", np.inf),
+        ("repeated", np.ma.array([1], mask=[1])),
+        ("system", np.full(arrays["system"].shape, 1e300)),
+        ("counts", np.full(arrays["counts"].shape, -np.inf)),
+    ):
+        with pytest.raises(InputError, match="this state of a tracker is damaged"):
+            SoilTracker.restore(estimator, arrays | {name: value})
     with pytest.raises(InputError, match="has format 0"):
         SoilTracker.restore(estimator, arrays | {"format": np.asarray(0)})
     with pytest.raises(InputError, match="give the length that it was made with"):
