@@ -110,6 +110,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
         raise InputError("--device is solved on by one process: omit --workers and --engine dask")
     if args.scheduler is not None and args.workers is not None:
         raise InputError("--workers is for this machine; a scheduler has its own: omit --workers")
+    if not args.out:
+        raise InputError("OUT is empty; needed is a .parquet file or a folder")
     return [] if _is_folder(args.out) else output_files(args.out, ".parquet")
 
 

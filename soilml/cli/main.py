@@ -94,7 +94,13 @@ class _Parser(argparse.ArgumentParser):
         if unknown := _UNKNOWN_OPTION.search(message):
             near = did_you_mean(unknown[1], self.known).removesuffix(" ")
             message += f"; {near}" if near else ""
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        self.exit(fail(f"{message} (see {self.prog} --help)", 2, self.prog))
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help and version; argparse itself passes over a stream that cannot be written."""
+        if message and (stream := file or sys.stderr) is not None:
+            stream.write(message)
+            stream.flush()
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -193,7 +199,8 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
         return fail(f"{what} cannot be read or written: {error.strerror or error}", 2)
     except UnicodeEncodeError as error:
         odd = error.object[error.start : error.end]
-        hint = "set PYTHONIOENCODING=utf-8, or rename it"
+        names = all("\udc80" <= c <= "\udcff" for c in odd)  # bytes of a name that is not UTF-8
+        hint = "rename it" if names else "set PYTHONIOENCODING=utf-8, or rename it"
         return fail(f"{odd!a} cannot be written as {error.encoding}: {hint}", 2)
     except MemoryError:
         return fail("this machine has too little memory for the command: ask for fewer rows", 2)

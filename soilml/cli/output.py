@@ -15,6 +15,7 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
+from soilml.io.plain_text import escaped
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
 from soilml.report.terminal import rounded, shown_column
 
@@ -54,11 +55,13 @@ def is_terminal() -> bool:
 
 def show(text: str) -> None:
     """Print text on standard output; sentences are broken to the width of a terminal."""
+    text = escaped(text)
     write_stdout(f"{wrapped(text) if is_terminal() else text}\n")
 
 
 def tell(text: str) -> None:
     """Print a message on standard error; broken to the width of a terminal, else one line."""
+    text = escaped(text)
     print(
         wrapped(text) if sys.stderr is not None and sys.stderr.isatty() else text, file=sys.stderr
     )

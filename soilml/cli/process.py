@@ -79,11 +79,17 @@ def _is_importing(frame: FrameType | None) -> bool:
     return False
 
 
-def fail(text: str, status: int) -> int:
+def fail(text: str, status: int, program: str = "soilml") -> int:
     """Print `text` as one line on standard error; returns the exit status."""
+    from contextlib import suppress
+
     from soilml.io.plain_text import escaped
 
-    print(f"soilml: {' '.join(escaped(text).split())}", file=sys.stderr)
+    try:
+        print(f"{program}: {' '.join(escaped(text).split())}", file=sys.stderr)
+    except OSError:  # a full device: the status says what the line cannot
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
     return status
 
 

@@ -31,7 +31,8 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
     if kind is not None and not kind & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH):
         raise InputError(f"{path} is read-only; make it writable, or give another name")
     if folder is None or not stat.S_ISDIR(folder):
-        raise InputError(f"{path}: the folder {Path(path).parent} does not exist; create it first")
+        missing = target.parent if Path(path).is_symlink() else Path(path).parent
+        raise InputError(f"{path}: the folder {missing} does not exist; create it first")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: no permission to write to its folder")
     return target

@@ -49,7 +49,12 @@ class Swap:
             with suppress(OSError):  # a file system without locks
                 fcntl.lockf(self._opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
         moves = [[str(p), str(t)] for p, t in zip(self.parts, self.targets, strict=True)]
-        self._write(json.dumps({"moves": moves, "remove": [str(p) for p in self.remove]}) + "\n")
+        try:
+            remove = [str(path) for path in self.remove]
+            self._write(json.dumps({"moves": moves, "remove": remove}) + "\n")
+        except BaseException:  # a disk without room for a line
+            self.clear()
+            raise
         return self
 
     def __exit__(

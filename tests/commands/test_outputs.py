@@ -204,3 +204,36 @@ def test_every_argument_that_names_an_input_file_is_declared_as_one():
                 continue
             expected = is_file and action.dest not in outputs
             assert (action.type is InputFile) == expected, f"{name} {action.dest}"
+
+
+@pytest.mark.parametrize(
+    "words", [["gap", "model.toml", "runs.csv", "--out", ""], ["generate", "wheel", ""]]
+)
+def test_an_empty_name_is_no_folder(folder, capsys, words):
+    """A shell gives it for a variable that is not set."""
+    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    assert main(words) == 2
+    assert "is empty; needed is a" in capsys.readouterr().err
+    assert {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()} == before
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
+@pytest.mark.parametrize("command", ["--version", "identify --help", "identify no.toml no.csv"])
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_full_streams_end_with_status_2_where_something_had_to_be_said(folder, command, stream):
+    with Path("/dev/full").open("w") as full:
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | {stream: full}
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        words = [sys.executable, "-m", "soilml", *command.split()]
+        done = subprocess.run(words, text=True, env=environment, **streams)
+    assert done.returncode == (2 if stream == "stdout" or "no.toml" in command else 0)
+    other = done.stderr if stream == "stdout" else done.stdout
+    assert "Traceback" not in other and "Exception" not in other
+
+
+def test_a_link_into_a_missing_folder_names_that_folder(folder, capsys):
+    (folder / "link.csv").symlink_to(folder / "nowhere" / "q.csv")
+    assert (
+        main(["simulate", "model.toml", "--slip", "0.3", "--load", "60", "--out", "link.csv"]) == 2
+    )
+    assert f"the folder {folder / 'nowhere'} does not exist" in capsys.readouterr().err

@@ -122,6 +122,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_benchmark(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.io.table import Table
@@ -139,7 +140,7 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     estimators = {file.stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
-        print(note, file=sys.stderr)
+        tell(note)
     with create_folder(args.out or FOLDER) as folder, stage_progress() as progress:
         results = benchmark(estimators, None, args.sets, args.against, progress)
         progress("drawing the report", 0, 1)
@@ -222,6 +223,7 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from soilml.cli.table_reading import read_long_table
     from soilml.config.case import read_case_of_one_gear
@@ -241,7 +243,7 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names
     for note in check_same_provenance(case, table, estimators, names):
-        print(note, file=sys.stderr)
+        tell(note)
     with create_folder(args.out) as folder, stage_progress() as progress:
         scores = compare(case, table, estimators, progress, args.analytic_sets)
         progress("drawing the report", 0, 1)

@@ -11,9 +11,9 @@ from soilml.cli.options import (
     add_effects_option,
     add_ignore_extra_option,
     add_seed_option,
+    folder_outputs,
 )
 from soilml.cli.output_names import GAP_FILES, GAP_SUSPECTED
-from soilml.errors import InputError
 
 HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
@@ -81,10 +81,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder exists already."""
-    folder = Path(args.out)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {args.out} is a file; needed is a folder")
-    return [folder / name for name in (*GAP_FILES, GAP_SUSPECTED)] if folder.is_dir() else []
+    return folder_outputs("--out", args.out, (*GAP_FILES, GAP_SUSPECTED))
 
 
 def run(args: argparse.Namespace) -> int:
