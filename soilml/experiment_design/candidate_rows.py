@@ -99,10 +99,9 @@ def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list
     """
     slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
     group = rows_driven_alike(Operating(slip=slip, load=load))
-    points = sorted(
-        (float(np.median(slip[group == i])), float(np.median(load[group == i])))
-        for i in np.unique(group)
-    )
+    ends = np.cumsum(np.unique(group, return_counts=True)[1])
+    members = np.split(np.argsort(group, kind="stable"), ends[:-1])
+    points = sorted((float(np.median(slip[i])), float(np.median(load[i]))) for i in members)
     if len(points) > REPETITIONS:
         kept = np.linspace(0, len(points) - 1, REPETITIONS).round().astype(int)
         points = [points[i] for i in kept]

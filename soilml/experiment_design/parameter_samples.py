@@ -13,6 +13,7 @@ from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
 from soilml.identification.data.prior_fractions import prior_fractions
 from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.many_rows.condensed_rows import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
@@ -73,7 +74,8 @@ def samples_of_rows(
 
     `found` are samples that were drawn of it before.
     """
-    found = posterior_samples(case, data, free) if found is None else found
+    if found is None:
+        found = posterior_samples(case, condensed(case, data, free), free)
     offset = np.random.default_rng(seed).random()
     drawn = systematic_resampling(found.sample.weights, count, offset)
     index, multiplicity = np.unique(drawn, return_counts=True)

@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.identification.data.observations import Observations
 from soilml.identification.data.prior_fractions import prior_fractions
 from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.many_rows.condensed_rows import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.numerics.resampling import systematic_resampling
 
@@ -47,7 +48,7 @@ def posterior_draws(
     case: Case, data: Observations, free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0
 ) -> PosteriorDraws:
     """Draws of the posterior of the rows; raises `FitError` as the posterior method does."""
-    found = posterior_samples(case, data, free)
+    found = posterior_samples(case, condensed(case, data, free), free)
     offset = np.random.default_rng(seed).random()
     rows = systematic_resampling(found.sample.weights, count, offset)
     return PosteriorDraws(_soil_draws(free, found.sample.u[rows]), found)

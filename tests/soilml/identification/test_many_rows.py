@@ -9,11 +9,13 @@ from test_descent import measured, two_gears, with_model
 from soilml import identification, identify
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
+from soilml.experiment_design import samples_of_rows
 from soilml.identification.data.observations import read_observations
 from soilml.identification.free_parameters import select_free
 from soilml.identification.many_rows import condensed_rows
 from soilml.identification.many_rows.cells import cells_of
 from soilml.io.table import Table
+from soilml.traction.soil_draws import posterior_draws
 
 ROWS = 2400
 
@@ -136,3 +138,19 @@ def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
         assert np.ptp(points[own, 0]) < 4.0 / 16.0
     equal = cells_of(np.repeat([[0.1, 0.2], [0.3, 0.4]], 10, axis=0), np.zeros(20, np.int64), 64)
     assert len(np.unique(equal)) == 2
+
+
+def test_advice_and_pull_rest_on_condensed_rows(case, condensing, monkeypatch):
+    """Samples of soil of the same mean and spread as those of all rows."""
+    data = read_observations(case, measured(case, np.random.default_rng(4), ROWS))
+    free, found = select_free(case, None), {}
+    for name in ("condensed", "all"):
+        samples = samples_of_rows(case, data, free)
+        draws = posterior_draws(case, data, free).draws.values
+        found[name] = samples.remaining_fraction, draws.mean(axis=0), draws.std(axis=0)
+        monkeypatch.setattr(condensed_rows, "MOST_ROWS", ROWS)
+    (left, mean, std), (all_left, all_mean, all_std) = found.values()
+    assert not np.array_equal(mean, all_mean)  # not the same computation
+    np.testing.assert_allclose(left, all_left, rtol=0.2)
+    assert np.abs((mean - all_mean) / all_std).max() < 0.3
+    np.testing.assert_allclose(std, all_std, rtol=0.2)
