@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.io.number_text import read_number
 from soilml.log_import.channels.resampling import (
     derivative,
     on_grid,
@@ -173,7 +174,7 @@ def channel_constant(run: Run, channel: Channel) -> float:
         key, place, texts, pattern = "file_name", "the name of", (run.name,), channel.name_pattern
     for match in filter(None, map(pattern.search, texts)):
         try:
-            number = channel.scale * float(match[1].replace(",", "."))
+            number = channel.scale * read_number((match[1] or "").strip().replace(",", "."))
         except ValueError:
             continue
         return float(our_slip(number, channel.definition)) if channel.role == "slip" else number

@@ -91,8 +91,9 @@ def fields_of(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[
             yield from _array(place, value, names, depth)
         elif isinstance(value, dict) or _names(value):
             yield from fields_of(value, f"{place}.", depth + 1)
-    if {"x", "y", "z", "w"} <= content.keys():
-        yield from _angles(prefix, *(float(content[k]) for k in "xyzw"))
+    turn: list[Any] = [content.get(key) for key in "xyzw"]
+    if all(isinstance(value, int | float | np.number) for value in turn):
+        yield from _angles(prefix, *map(float, turn))
 
 
 def _array(place: str, value: Any, names: Any, depth: int) -> Iterator[tuple[str, float]]:

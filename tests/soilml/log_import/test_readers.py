@@ -168,8 +168,30 @@ def test_values_have_units_and_uncertainties():
     assert parse_uncertain("0.7 +- 0.05", "1", "x").std == 0.05
     assert parse_uncertain(3, "m", "x").std == 0.0
     assert parse_uncertain("about 3", "m", "x") is None
+    assert parse_uncertain("\uff12 m", "m", "x") is None
+    assert parse_uncertain("1e999", "m", "x") is None
 
 
 def test_units_at_the_end_of_names():
     names = ("torque_Nm", "v_mm_s", "time_ms", "omega_rad_s", "F_z", "pos_x", "current_mA")
     assert [unit_in_name(n) for n in names] == ["Nm", "mm/s", "ms", "rad/s", "", "", "mA"]
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["2_0.5", "\uff12\uff10\uff0e\uff15", "\uff120.5", "\u0968\u0966.\u096b", "0x14", "1e999"],
+)
+def test_a_cell_is_a_number_in_plain_digits_alone(tmp_path, cell):
+    """Python's own `float` reads most of these."""
+    (tmp_path / "log.csv").write_text(PLAIN.replace("1.6", cell).replace("-4", "1d1"), "utf-8")
+    (recording,) = read_log(tmp_path / "log.csv")
+    np.testing.assert_array_equal(recording.columns["F"], [1.5, np.nan, np.nan, 1.8, 1.9])
+    assert recording.columns["M"][2] == 10.0
+
+
+def test_a_column_in_digits_of_another_script_is_text(tmp_path):
+    digits = str.maketrans("0123456789", "".join(chr(0x966 + k) for k in range(10)))
+    rows = "".join(f"{i},{i},{f'{i}:00:{i}'.translate(digits)}\n" for i in range(10, 30))
+    (tmp_path / "log.csv").write_text("t,F,M\n" + rows, "utf-8")
+    (recording,) = read_log(tmp_path / "log.csv")
+    assert list(recording.texts) == ["M"]
