@@ -39,7 +39,12 @@ def read_delimited_text(path: Path) -> list[Recording]:
     text, encoding = decode_text(path.read_bytes(), path)
     text = _GROUPED.sub("", text)
     lines = text.splitlines()
-    layout = find_layout(lines)
+    try:
+        layout = find_layout(lines)
+    except csv.Error as error:
+        raise InputError(
+            f"{path} {error}; needed is a table, with the names of its columns above the samples"
+        ) from None
     if layout is None:
         raise InputError(
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "

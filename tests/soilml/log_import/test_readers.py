@@ -66,6 +66,17 @@ def test_broken_lines_are_left_out_and_counted(tmp_path):
     assert recording.notes == ("2 lines have a wrong number of cells and are left out",)
 
 
+def test_a_cell_that_is_endless(tmp_path):
+    """In a header it is refused with its line, in a sample the line is left out."""
+    endless = "a" * 200_000
+    (tmp_path / "log.csv").write_text("# rig 3\n" + PLAIN.replace("F", endless))
+    with pytest.raises(InputError, match=r"log\.csv line 2: field larger than field limit"):
+        read_log(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_text(f"{PLAIN}{endless},1,2\n".replace("1.5", '"1.5"'))
+    (recording,) = read_log(tmp_path / "log.csv")
+    assert len(recording) == 5 and "1 lines" in recording.notes[0]
+
+
 def test_a_log_without_header_numbers_its_columns(tmp_path):
     (tmp_path / "log.dat").write_text(PLAIN.split("\n", 1)[1])
     (recording,) = read_log(tmp_path / "log.dat")
