@@ -91,6 +91,9 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
     parts = [part for several in raw.values() for part in several]
     if not parts:
         raise InputError(f"run {run.name}: the map names no column")
+    intervals = [sampling_interval(times, values) for times, values in parts]
+    if not np.isfinite(min(intervals)):
+        raise InputError(f"run {run.name}: no channel has two samples with a time")
     starts = [times[0] for times, _ in parts]
     stops = [times[-1] for times, _ in parts]
     if not max(starts) < min(stops):
@@ -98,9 +101,6 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
             f"run {run.name}: the recordings do not overlap in time ({max(starts):.6g} s to "
             f"{min(stops):.6g} s); where their clocks differ, write clock = 'start' in [files]"
         )
-    intervals = [sampling_interval(times, values) for times, values in parts]
-    if not np.isfinite(min(intervals)):
-        raise InputError(f"run {run.name}: no channel has two samples")
     grid = uniform_grid(intervals, max(starts), min(stops))
     if grid.size < 8:
         raise InputError(f"run {run.name} has {grid.size} samples; needed are 8 or more")
