@@ -26,7 +26,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/numerics/sobol_points.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/plot.py": {"matplotlib"},
-    "soilml/identification/bevameter/plot.py": {"matplotlib"},
     "soilml/gap/statistics/repeats.py": {"scipy"},
     "soilml/gap/verdict/disagreements.py": {"scipy"},
     "soilml/report/page.py": {"jinja2"},

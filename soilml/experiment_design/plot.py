@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.experiment_design.design import Advice
 from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
-from soilml.report.figure_style import take_axes
+from soilml.report.figure_style import save_png, take_axes
 
 #: Most grid points that are labelled with their value, and most ticks of an axis.
 MOST_LABELS, TICKS = 80, 8
@@ -23,15 +24,12 @@ def save_maps(path: str | os.PathLike[str], advice: Advice, measured: Operating 
     The frame marks the best point, rings the measured rows. Points at which the wheel might not be
     carried are blank. Channels are those of the first set.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure = plot_maps(advice, measured, None)[0].figure
     with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=110)
-    pyplot.close(figure)
+        save_png(partial(plot_maps, advice, measured), 1, len(advice.names), _size(advice), part)
+
+
+def _size(advice: Advice) -> tuple[float, float]:
+    return 3.3 * len(advice.names) + 1.2, 3.6
 
 
 def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[Any]:
@@ -42,7 +40,7 @@ def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[An
     slips = sorted({c.candidate.slip for c in choices})
     loads = sorted({c.candidate.load for c in choices})
     count = len(advice.names)
-    axes = take_axes(ax, 1, count, (3.3 * count + 1.2, 3.6))[0]
+    axes = take_axes(ax, 1, count, _size(advice))[0]
     for i, (name, panel) in enumerate(zip(advice.names, axes, strict=True)):
         fraction = np.full((len(loads), len(slips)), np.nan)
         for c in choices:
@@ -72,5 +70,5 @@ def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[An
     middle.set_xlabel("slip of the next row (frame: best, rings: measured)", fontsize=9)
     axes[0].set_ylabel("load of the next row, N")
     label = "expected remaining fraction of the prior width"
-    axes[0].figure.colorbar(image, ax=list(axes), label=label)
+    axes[0].figure.colorbar(image, ax=list(axes)).set_label(label, fontsize=9)
     return np.asarray(axes)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.optional_imports import load_matplotlib, quiet_matplotlib
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,6 +40,10 @@ _STYLE: dict[str, Any] = {
 }
 
 
+#: Characters of a long label at its beginning and its end, which says what kind of answer it is.
+_HEAD, _TAIL = 20, 35
+
+
 @dataclass(frozen=True)
 class SvgImage:
     """A figure as a data URI, with its text alternative."""
@@ -49,10 +54,14 @@ class SvgImage:
 
 @contextmanager
 def report_style() -> Iterator[None]:
-    """Matplotlib's defaults with the style of the report, whatever the user's settings are."""
+    """Matplotlib's defaults with the style of the report, whatever the user's settings are.
+
+    Its messages do not reach the terminal: a browser has the characters that its fonts lack.
+    """
+    load_matplotlib()
     import matplotlib
 
-    with matplotlib.rc_context():
+    with quiet_matplotlib(), matplotlib.rc_context():
         matplotlib.rcdefaults()
         settings: Any = matplotlib.rcParams
         settings.update(_STYLE)
@@ -64,6 +73,15 @@ def new_figure(height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(WIDTH / 72, height / 72))
+
+
+def short_label(text: str) -> str:
+    """A label that leaves room for its picture: its beginning and its end.
+
+    >>> short_label(f"run {'a' * 99}, with the usual errors of a model")
+    'run aaaaaaaaaaaaaaaa…a, with the usual errors of a model'
+    """
+    return text if len(text) <= _HEAD + 1 + _TAIL else f"{text[:_HEAD]}…{text[-_TAIL:]}"
 
 
 def take_axes(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> NDArray[Any]:
@@ -100,9 +118,9 @@ def picture(
     draw: Callable[[Any], object], rows: int, columns: int, size: tuple[float, float], alt: str
 ) -> SvgImage:
     """The image of a figure with axes (rows, columns), size in inches, which `draw` fills."""
-    from matplotlib.figure import Figure
-
     with report_style():
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots(rows, columns, squeeze=False))
         return svg_image(figure, alt)
@@ -116,9 +134,9 @@ def save_png(
     path: str | os.PathLike[str],
 ) -> None:
     """The same figure as a PNG file."""
-    from matplotlib.figure import Figure
-
     with report_style():
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots(rows, columns, squeeze=False))
         figure.savefig(path, format="png", dpi=110, metadata={"Software": "soilml"})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.report.figure_style import AFTER, take_axes
+from soilml.report.figure_style import AFTER, short_label, take_axes
 from soilml.report.numbers import display_unit, parameter_name
 
 if TYPE_CHECKING:
@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 PRIOR = "#d9d9d9"
 #: Most results that are lines with labels; more are points over their number.
 MOST_LINES = 12
+#: Characters of a label from which on all are small, so that room is left for the panels.
+_LONG = 41
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,9 @@ class ParameterIntervals:
             if np.isfinite(prior).all():
                 panel.axvspan(*prior, color=PRIOR, lw=0, zorder=0)
             panel.set_ylim(len(self.labels) + 0.6, 0.4)
-            panel.set_yticks(place if len(place) > 1 else [], self.labels if len(place) > 1 else [])
+            shown = [short_label(label) for label in self.labels] if len(place) > 1 else []
+            panel.set_yticks(place if shown else [], shown)
+            if max(map(len, shown), default=0) > _LONG:
+                panel.tick_params(axis="y", labelsize=8)
         title = parameter_name(self.names[k])
         panel.set_title(f"{title} ({unit})" if unit else title)

@@ -2,7 +2,13 @@
 
 import csv
 import hashlib
+import html
 import json
+import os
+import re
+import subprocess
+import sys
+from base64 import b64decode
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -140,3 +146,50 @@ def test_hints_at_wrong_units_come_with_every_command(folder, command, capsys):
     (folder / "runs.csv").write_text(wrong)
     main([command, "model.toml", "runs.csv"])
     assert "! runs.csv: torque is" in capsys.readouterr().err
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["\u6f22\u5b57\u7802", "x" * 256, "W" * 256, "$\\frac$", "_a"])
+def test_runs_of_any_name_are_drawn_without_a_warning(folder, name, capsys):
+    (folder / "runs.csv").write_text(RUNS.replace(EVIL, name), encoding="utf-8")
+    assert main([*COMMANDS["identify"], "--report", "page"]) == 0
+    assert "warning" not in capsys.readouterr().err.lower()
+    (page,) = (folder / "page").glob("*.html")
+    images = re.findall(r"svg\+xml;base64,([\w+/=]+)", page.read_text(encoding="utf-8"))
+    shown = html.unescape(b64decode(images[0]).decode())
+    assert f"run {name}, with" in shown or f"run {name[:16]}…" in shown
+
+
+def drawn_apart(folder, settings):
+    """A picture of `pull` by a process of its own."""
+    words = "pull model.toml runs.csv --load 60 --slip-limit 0.4 --picture a.png"
+    return subprocess.run(
+        [sys.executable, "-m", "soilml", *words.split()],
+        cwd=folder, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])} | settings,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("settings", "file"),
+    [
+        ({"MPLBACKEND": "foo"}, b""),
+        ({"HOME": os.devnull, "MPLCONFIGDIR": ""}, b""),
+        ({}, b"junk : 3\nbackend: foo\n"),
+    ],
+    ids=["backend", "home", "matplotlibrc"],
+)
+def test_pictures_do_not_depend_on_settings_of_matplotlib(folder, settings, file):
+    (folder / "matplotlibrc").write_bytes(file)
+    done = drawn_apart(folder, settings)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert not re.search("matplotlib|mkdir|Bad key", done.stderr)
+
+
+def test_a_broken_settings_file_of_matplotlib_is_one_line(folder):
+    (folder / "matplotlibrc").write_bytes(b"\xff")
+    done = drawn_apart(folder, {})
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert "look for a file matplotlibrc" in done.stderr
+    assert not (folder / "a.png").exists()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
-from soilml.report.figure_style import picture, take_axes
+from soilml.report.figure_style import picture, short_label, take_axes
 from soilml.report.page import Report, ReportPicture, ReportTable
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
@@ -107,8 +107,12 @@ def plot_comparison(
             x = np.asarray([sizes.index(s.rows) for s in own]) + 0.09 * (i - len(methods) / 2)
             marker = "s" if kinds[method] is MethodKind.ANALYTIC else "o"
             style: dict[str, Any] = {"color": f"C{i}", "ms": 5}
-            error.plot(x, [s.rmse_over_prior[k] for s in own], marker, label=method, **style)
-            coverage.plot(x, [s.coverage90[k] for s in own], marker, label=method, **style)
+            error.plot(
+                x, [s.rmse_over_prior[k] for s in own], marker, label=short_label(method), **style
+            )
+            coverage.plot(
+                x, [s.coverage90[k] for s in own], marker, label=short_label(method), **style
+            )
         error.set_title(name.replace("_", " "))
         error.set_ylim(bottom=0)
         coverage.axhspan(*COVERAGE_RANGE, color="C2", alpha=0.2, lw=0)

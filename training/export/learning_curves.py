@@ -10,6 +10,7 @@ import numpy as np
 from sklearn.base import clone
 
 from soilml.io.atomic_files import atomic_output
+from soilml.optional_imports import load_matplotlib, quiet_matplotlib
 from training.regressors.feature_subset import FeatureSubset
 from training.train import TrainedModel
 
@@ -21,6 +22,7 @@ LEAST_ROWS = 40
 
 def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) -> None:
     """Error against rows, loss against epochs, and held-out error against gamma, as PNG."""
+    load_matplotlib()
     from matplotlib.figure import Figure
 
     regressors = [member.regressor for member in trained.members]
@@ -34,7 +36,7 @@ def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) ->
         _plot_search(axis, regressor)
     for axis, regressor in zip(axes[1 + len(searched) :], by_epochs, strict=True):
         _plot_epochs(axis, regressor)
-    with atomic_output(path) as part:
+    with quiet_matplotlib(), atomic_output(path) as part:
         figure.savefig(part, format="png", dpi=110, metadata={"Software": "soilml"})
 
 

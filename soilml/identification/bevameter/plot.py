@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.result import BevameterResult
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.io.atomic_files import atomic_output
-from soilml.report.figure_style import take_axes
+from soilml.report.figure_style import save_png, short_label, take_axes
 
 #: Tests that a legend lists.
 LISTED = 6
@@ -23,21 +24,13 @@ def save_picture(path: str | os.PathLike[str], result: BevameterResult) -> None:
 
     Dots are measured, thin lines fitted to each test, thick lines the law of the result.
     """
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure = plot_tests(result, None)[0].figure
     with atomic_output(path) as part:
-        figure.savefig(part, format="png", dpi=110)
-    pyplot.close(figure)
+        save_png(partial(plot_tests, result), 1, _panels(result), _size(result), part)
 
 
 def plot_tests(result: BevameterResult, ax: Any) -> NDArray[Any]:
     """Draw the tests into axes (panels,); see `BevameterResult.plot`."""
-    count = (result.plates is not None) + 2 * (result.shear is not None)
-    axes = take_axes(ax, 1, count, (4.6 * count, 3.9))[0]
+    axes = take_axes(ax, 1, _panels(result), _size(result))[0]
     panels = list(axes)
     if result.plates is not None:
         _draw_plates(panels.pop(0), result.plates)
@@ -47,10 +40,20 @@ def plot_tests(result: BevameterResult, ax: Any) -> NDArray[Any]:
     return np.asarray(axes)
 
 
+def _panels(result: BevameterResult) -> int:
+    return (result.plates is not None) + 2 * (result.shear is not None)
+
+
+def _size(result: BevameterResult) -> tuple[float, float]:
+    return 4.6 * _panels(result), 3.9
+
+
 def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
     kc, kphi = fit.moduli
     for test, curve in zip(fit.tests, fit.curves, strict=True):
-        (dots,) = panel.loglog(1e3 * test.sinkage, 1e-3 * test.pressure, ".", label=test.name)
+        (dots,) = panel.loglog(
+            1e3 * test.sinkage, 1e-3 * test.pressure, ".", label=short_label(test.name)
+        )
         own = np.exp(curve.log_pressure) * (test.sinkage / fit.depth) ** curve.exponent
         panel.loglog(1e3 * test.sinkage, 1e-3 * own, color=dots.get_color(), linewidth=0.8)
     depth = np.geomspace(
@@ -71,7 +74,7 @@ def _draw_curves(panel: Any, fit: ShearFit) -> None:
     for test, curve in zip(fit.tests, fit.curves, strict=True):
         shown = np.isfinite(test.displacement)
         j = test.displacement[shown]
-        (dots,) = panel.plot(1e3 * j, 1e-3 * test.stress[shown], ".", label=test.name)
+        (dots,) = panel.plot(1e3 * j, 1e-3 * test.stress[shown], ".", label=short_label(test.name))
         grid = np.linspace(0.0, float(j.max()), 200)
         own = curve.strength * -np.expm1(-grid / curve.modulus)
         panel.plot(1e3 * grid, 1e-3 * own, color=dots.get_color(), linewidth=0.8)

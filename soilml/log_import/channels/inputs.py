@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.io.number_text import read_number
 from soilml.log_import.channels.resampling import (
     derivative,
     on_grid,
@@ -90,6 +91,9 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
     parts = [part for several in raw.values() for part in several]
     if not parts:
         raise InputError(f"run {run.name}: the map names no column")
+    intervals = [sampling_interval(times, values) for times, values in parts]
+    if not np.isfinite(min(intervals)):
+        raise InputError(f"run {run.name}: no channel has two samples with a time")
     starts = [times[0] for times, _ in parts]
     stops = [times[-1] for times, _ in parts]
     if not max(starts) < min(stops):
@@ -97,9 +101,6 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
             f"run {run.name}: the recordings do not overlap in time ({max(starts):.6g} s to "
             f"{min(stops):.6g} s); where their clocks differ, write clock = 'start' in [files]"
         )
-    intervals = [sampling_interval(times, values) for times, values in parts]
-    if not np.isfinite(min(intervals)):
-        raise InputError(f"run {run.name}: no channel has two samples")
     grid = uniform_grid(intervals, max(starts), min(stops))
     if grid.size < 8:
         raise InputError(f"run {run.name} has {grid.size} samples; needed are 8 or more")
@@ -173,7 +174,7 @@ def channel_constant(run: Run, channel: Channel) -> float:
         key, place, texts, pattern = "file_name", "the name of", (run.name,), channel.name_pattern
     for match in filter(None, map(pattern.search, texts)):
         try:
-            number = channel.scale * float(match[1].replace(",", "."))
+            number = channel.scale * read_number((match[1] or "").strip().replace(",", "."))
         except ValueError:
             continue
         return float(our_slip(number, channel.definition)) if channel.role == "slip" else number

@@ -33,7 +33,8 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
         if not own:
             return ()
         word = max(sorted(own), key=len)
-        kinds.append(FileKind(word, f"*{word}*"))
+        # a dot in the name of a table of TOML would begin another one
+        kinds.append(FileKind(word.replace(".", "_"), f"*{word}*"))
     try:
         runs = matched_files(logs, kinds)
     except InputError:

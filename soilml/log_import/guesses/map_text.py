@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from soilml.errors import InputError
+from soilml.io.plain_text import escaped
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.clocks import (
     guess_clock,
@@ -166,7 +167,8 @@ class _MapText:
                 lines += self._table(f"[wheels.{name}.{role}]", role, draft)
         if not self.steady:
             lines += guess_windows(self.runs, first)
-        return "\n".join(lines) + "\n"
+        # values are plain already; names and lines of the log also stand in comments
+        return "\n".join(escaped(line).replace("\n", "\\n") for line in lines) + "\n"
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -9,7 +10,7 @@ from soilml.log_import.recording import Recording
 from soilml.log_import.units.conversion import dimension, factor
 
 _VALUE = r"\s*(?:\[[^\]]*\]|\([^)]*\))?\s*[:=,;\t ][:=,;\s]*"
-_VALUE += r"([+-]?\d+(?:[.,]\d+)?)\s*([A-Za-z/%°*^0-9-]*)"
+_VALUE += r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z/%°*^0-9-]*)"
 _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re.IGNORECASE)
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
@@ -35,7 +36,7 @@ _STATED = {
     "load": (r"(?:normal[ _]?|vertical[ _]?|wheel[ _]?)?(?:load|weight)", "N"),
 }
 _WHEELS = re.compile(
-    r"\b(\d{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*(\d{1,2})\b", re.IGNORECASE
+    r"\b([0-9]{1,2})[ -]?wheel(?:s|ed)\b|\bwheels\s*[:=,;]\s*([0-9]{1,2})\b", re.IGNORECASE
 )
 #: Numbers in names of files: role, pattern and unit.
 _IN_NAMES = (
@@ -60,9 +61,11 @@ def stated_constants(lines: Sequence[str]) -> dict[str, tuple[str, str]]:
             if match is None:
                 continue
             number, unit = match[1].replace(",", "."), match[2].strip()
-            inverse = re.match(r"\s*[:/]\s*(\d+(?:[.,]\d+)?)", line[match.end(1) :])
+            inverse = re.match(r"\s*[:/]\s*([0-9]+(?:[.,][0-9]+)?)", line[match.end(1) :])
             if name == "gear_ratio" and float(number) == 1.0 and inverse:  # 1:64
                 number = inverse[1].replace(",", ".")
+            if math.isinf(float(number)):  # hundreds of digits
+                continue
             if not unit and (before := _UNIT_BEFORE.search(line[match.start() : match.start(1)])):
                 unit = before[1] or before[2]
             if ours == "Hz":
@@ -116,7 +119,7 @@ def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[flo
     for kind, pattern, unit in _IN_NAMES:
         if kind != role:
             continue
-        matches = [re.search(pattern, name, re.IGNORECASE) for name in names]
+        matches = [re.search(pattern, name, re.IGNORECASE | re.ASCII) for name in names]
         if all(matches):
             return pattern, unit, [float(m[1].replace("p", ".")) for m in matches if m]
     return None

@@ -9,7 +9,7 @@ from soilml.log_import.guesses.columns.column_words import name_scores, words_of
 from soilml.log_import.units.conversion import dimension
 from soilml.log_import.units.unit_names import is_raw_signal, spelling
 
-_NUMBER = r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)"
+_NUMBER = r"([+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)"
 _RAW = r"([munµμ]?V(?:/V)?|volts?|digits?|counts?|lsb)\b"
 _UNIT = r"([A-Za-zµ·*][A-Za-zµ·* ²^0-9-]*)"
 _LAZY = r"([A-Za-zµ·*][A-Za-zµ·* ²^0-9-]*?)"

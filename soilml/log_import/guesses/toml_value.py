@@ -7,13 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from soilml.io.plain_text import is_plain
+
 
 def toml_value(value: Any) -> str:
-    """A value in TOML: numbers without needless digits, patterns in single quotes."""
+    """A value in TOML: numbers without needless digits, patterns in single quotes.
+
+    Characters that are not plain are written as escapes, and half a pair of surrogates, which TOML
+    does not have, as a question mark.
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float | int | np.number):
         return f"{float(value):g}" if float(value) != int(value) else f"{int(value)}"
-    if isinstance(value, str) and "\\" in value and "'" not in value:
+    if isinstance(value, str) and "\\" in value and "'" not in value and is_plain(value):
         return f"'{value}'"
-    return json.dumps(value, ensure_ascii=False)
+    written = json.dumps(value, ensure_ascii=False).encode("utf-8", "replace").decode()
+    return "".join(c if is_plain(c) else f"\\U{ord(c):08x}" for c in written)

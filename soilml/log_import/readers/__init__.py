@@ -41,10 +41,16 @@ def read_log(path: str | Path) -> list[Recording]:
     suffix = file.suffix.lower()
     if suffix in _OTHERS and file.is_file():
         raise InputError(f"{file} {_OTHERS[suffix]} and import that")
-    if suffix == ".db3":
+    in_bag = suffix == ".db3" and file.is_file()
+    if in_bag:
         file = file.parent
     if file.is_dir():
         if not (file / "metadata.yaml").is_file():
+            if in_bag:
+                raise InputError(
+                    f"{path} is not in the folder of a ROS 2 bag; needed is a metadata.yaml beside "
+                    "it"
+                )
             raise InputError(
                 f"{file} is a folder; needed are log files, or the folder of a ROS 2 bag, which "
                 "has a metadata.yaml"

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.io.number_text import read_number, read_numbers
 from soilml.log_import.readers.long_table import signals_of
 from soilml.log_import.readers.text_blocks import BLOCK, find_blocks
 from soilml.log_import.readers.text_encoding import decode_text
@@ -19,12 +20,12 @@ from soilml.log_import.recording import Floats, Recording
 
 #: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
 _LOOKED, _NUMBERS = 300, 0.5
-_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
-_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
+_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?", re.ASCII)
+_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?", re.ASCII)
 #: A mark between thousands that is no decimal mark: a hard or thin space, an apostrophe.
-_GROUPED = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))")
-_SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
-_CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?")
+_GROUPED = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))", re.ASCII)
+_SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
+_CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?", re.ASCII)
 
 
 def read_delimited_text(path: Path) -> list[Recording]:
@@ -38,7 +39,12 @@ def read_delimited_text(path: Path) -> list[Recording]:
     text, encoding = decode_text(path.read_bytes(), path)
     text = _GROUPED.sub("", text)
     lines = text.splitlines()
-    layout = find_layout(lines)
+    try:
+        layout = find_layout(lines)
+    except csv.Error as error:
+        raise InputError(
+            f"{path} {error}; needed is a table, with the names of its columns above the samples"
+        ) from None
     if layout is None:
         raise InputError(
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
@@ -114,11 +120,11 @@ def as_numbers(cells: list[str], decimal_comma: bool = False) -> tuple[Floats, i
     cells = without_thousands(cells, decimal_comma)
     if decimal_comma:
         cells = [cell.replace(",", ".") for cell in cells]
+    cells = [cell.strip() for cell in cells]
     try:
-        values = np.array(cells, dtype=np.float64)
+        values = np.array(read_numbers(cells), dtype=np.float64)
     except ValueError:
         values = np.array([_number(cell) for cell in cells], dtype=np.float64)
-    values[~np.isfinite(values)] = np.nan
     return values, int(np.isfinite(values).sum())
 
 
@@ -136,13 +142,9 @@ def without_thousands(cells: list[str], decimal_comma: bool) -> list[str]:
 
 def _number(cell: str) -> float:
     try:
-        return float(cell)
+        return read_number(cell.strip('"').strip().replace("d", "e").replace("D", "e"))
     except ValueError:
-        text = cell.strip().strip('"').replace("d", "e").replace("D", "e")
-        try:
-            return float(text) if text.lower() not in MISSING else float("nan")
-        except ValueError:
-            return float("nan")
+        return float("nan")
 
 
 def time_of_day(cells: list[str]) -> Floats | None:
@@ -167,6 +169,8 @@ def _seconds(cells: list[str], parse: Callable[[str], float]) -> Floats:
 
 def _iso_seconds(cell: str) -> float:
     text = cell.replace("Z", "+00:00").replace("/", "-")
+    if not text.isascii():
+        return float("nan")
     if len(text) < 10 or not text[:4].isdigit():
         for form in ("%d-%m-%Y %H:%M:%S.%f", "%d-%m-%Y %H:%M:%S", "%d.%m.%Y %H:%M:%S.%f",
                      "%d.%m.%Y %H:%M:%S"):  # fmt: skip

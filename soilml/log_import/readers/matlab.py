@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.io.number_text import read_number
 from soilml.log_import.recording import Floats, Recording
 from soilml.optional_imports import need
 
@@ -58,7 +59,7 @@ def _add_settings_of_tests(named: dict[str, dict[str, Floats]], about: tuple[str
         place, _, text = line.partition(" = ")
         parent, _, name = place.rpartition(".")
         try:
-            numbers.setdefault(name, {})[parent] = float(text)
+            numbers.setdefault(name, {})[parent] = read_number(text)
         except ValueError:
             continue
     for name, by_struct in numbers.items():

@@ -86,13 +86,14 @@ def fields_of(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[
     for key, value in content.items():
         place = f"{prefix}{key}"
         if isinstance(value, bool | int | float | np.number):
-            yield place, float(value)
+            yield place, _number(value)
         elif isinstance(value, list | tuple | np.ndarray):
             yield from _array(place, value, names, depth)
         elif isinstance(value, dict) or _names(value):
             yield from fields_of(value, f"{place}.", depth + 1)
-    if {"x", "y", "z", "w"} <= content.keys():
-        yield from _angles(prefix, *(float(content[k]) for k in "xyzw"))
+    turn: list[Any] = [content.get(key) for key in "xyzw"]
+    if all(isinstance(value, int | float | np.number) for value in turn):
+        yield from _angles(prefix, *map(_number, turn))
 
 
 def _array(place: str, value: Any, names: Any, depth: int) -> Iterator[tuple[str, float]]:
@@ -102,9 +103,16 @@ def _array(place: str, value: Any, names: Any, depth: int) -> Iterator[tuple[str
     for i, element in enumerate(value):
         label = f"{place}.{names[i] if named else i}"
         if isinstance(element, bool | int | float | np.number):
-            yield label, float(element)
+            yield label, _number(element)
         elif isinstance(element, dict) or _names(element):
             yield from fields_of(element, f"{label}.", depth + 1)
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return math.nan
 
 
 def _names(value: Any) -> tuple[str, ...]:

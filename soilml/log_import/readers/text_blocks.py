@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 
 from soilml.log_import.readers.text_layout import TextLayout, is_number, split_line
@@ -43,12 +44,20 @@ def find_blocks(lines: Sequence[str], layout: TextLayout) -> tuple[list[str], li
     return samples, [title for title, size in zip(titles, sizes, strict=True) for _ in range(size)]
 
 
+def _cells(line: str, layout: TextLayout) -> list[str]:
+    """The cells of a line; none where it cannot be divided, as damaged samples."""
+    try:
+        return split_line(line, layout.separator)
+    except csv.Error:
+        return []
+
+
 def _is_header(line: str, layout: TextLayout) -> bool:
     """Whether a line has the names of the columns, or their units."""
     first = line.lstrip()[:1]
     if not (first.isalpha() or first in "#%\"'[(" or first == layout.separator):
         return False
-    cells = [cell.strip("# %\"'") for cell in split_line(line, layout.separator)]
+    cells = [cell.strip("# %\"'") for cell in _cells(line, layout)]
     known = [cell for cell in cells if cell]
     if len(known) < max(2, len(layout.names) / 2):
         return False
@@ -60,5 +69,5 @@ def _is_header(line: str, layout: TextLayout) -> bool:
 
 def _is_title(line: str, layout: TextLayout) -> bool:
     """Whether a line has one text and no numbers beside it."""
-    cells = [cell for cell in split_line(line, layout.separator) if cell]
+    cells = [cell for cell in _cells(line, layout) if cell]
     return len(cells) == 1 < len(layout.names) and not is_number(cells[0], layout.decimal_comma)

@@ -34,12 +34,12 @@ MISSING = frozenset(
     )
 ) | {"1.#qnan", "-1.#ind", "missing", "?", "overflow"}
 COMMENTS = ("#", "%", "//", ";;")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
-_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
+_COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?", re.ASCII)
 #: Thousands that cannot be taken for decimals: both marks, or two groups.
-_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}")
-_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}")
-_SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?")
+_COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3}){1,}\.\d*|[+-]?[1-9]\d{0,2}(,\d{3}){2,}", re.ASCII)
+_DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3}){1,},\d*|[+-]?[1-9]\d{0,2}(\.\d{3}){2,}", re.ASCII)
+_SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 #: A quantity over its unit, as `Zeit / s` and `T in N m`.
 _OVER_UNIT = re.compile(r"^(.+?\w)\s+(?:/|in)\s+(\S.{0,15})$")
@@ -79,7 +79,10 @@ class TextLayout:
 
 
 def find_layout(lines: Sequence[str]) -> TextLayout | None:
-    """The layout of the lines of a text file; None where nothing in it looks like samples."""
+    """The layout of the lines of a text file; None where nothing in it looks like samples.
+
+    Raises `csv.Error`, with the line, for a line before the samples that has no cells.
+    """
     head = list(lines[:_LOOKED])
     found = [(s, d, *_samples(head, s, d)) for s in (*_SEPARATORS, " ") for d in (False, True)]
     # a comma cannot separate cells and be the decimal mark
@@ -172,7 +175,10 @@ def _header(
         text = line.strip()
         for mark in COMMENTS:
             text = text.removeprefix(mark).strip() if text.startswith(mark) else text
-        cells = _header_cells(_UNITS_FOLLOW.sub("", text), separator, width)
+        try:
+            cells = _header_cells(_UNITS_FOLLOW.sub("", text), separator, width)
+        except csv.Error as error:
+            raise csv.Error(f"line {i + 1}: {error}") from None
         while cells and not cells[-1] and len(cells) > width:
             cells.pop()
         if _UNITS_FOLLOW.match(text) and len(cells) == width:

@@ -6,10 +6,11 @@ import math
 import re
 from dataclasses import dataclass
 
+from soilml.io.number_text import read_number
 from soilml.io.toml_settings import Settings
 from soilml.log_import.units.conversion import factor
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FORM = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER})\s*(.*?))?\s*")
 
 
@@ -37,11 +38,14 @@ def parse_uncertain(text: str | int | float, ours: str, where: str) -> Uncertain
     match = _FORM.fullmatch(text)
     if match is None:
         return None
-    scale = factor(match[2], ours, where)
-    value = float(match[1]) * scale
+    try:
+        number, std = read_number(match[1]), read_number(match[3] or "0")
+    except ValueError:  # more than a number can hold
+        return None
+    scale, unit = factor(match[2], ours, where), match[4]
+    value = number * scale
     if match[3] is None:
         return Uncertain(value)
-    std, unit = float(match[3]), match[4]
     if unit == "%" and match[2] != "%":
         return Uncertain(value, std / 100.0 * abs(value))
     return Uncertain(value, std * (factor(unit, ours, where) if unit else scale))

@@ -96,22 +96,22 @@ def test_json_of_the_result_holds_every_test():
     assert isinstance(found.estimates()["n"], SpreadEstimate)
 
 
+def saved_figures(monkeypatch):
+    """A list that gets each figure that is saved."""
+    figure, found = pytest.importorskip("matplotlib.figure").Figure, []
+    save = figure.savefig
+    monkeypatch.setattr(figure, "savefig", lambda f, *a, **k: (found.append(f), save(f, *a, **k)))
+    return found
+
+
 @pytest.mark.parametrize(("kinds", "panels"), [("plates", 1), ("shear", 2), ("both", 3)])
 def test_a_picture_shows_tests_curves_and_laws(tmp_path, monkeypatch, kinds, panels):
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    drawn = []
-    monkeypatch.setattr(pyplot, "close", drawn.append)
+    drawn = saved_figures(monkeypatch)
     found = bevameter(
         None if kinds == "shear" else plates(repeats=1), None if kinds == "plates" else shear()
     )
     save_picture(tmp_path / "soil.png", found)
-    monkeypatch.undo()
     axes = drawn[0].axes
-    pyplot.close(drawn[0])
     assert (tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG") and len(axes) == panels
     assert list(drawn[0].get_size_inches()) == pytest.approx([4.6 * panels, 3.9])
     lines = {a.get_ylabel(): [line.get_data() for line in a.lines] for a in axes}
@@ -140,13 +140,7 @@ def test_a_picture_shows_tests_curves_and_laws(tmp_path, monkeypatch, kinds, pan
 
 
 def test_a_legend_of_many_tests_is_left_out(tmp_path, monkeypatch):
-    from matplotlib import pyplot
-
-    drawn = []
-    monkeypatch.setattr(pyplot, "close", drawn.append)
+    drawn = saved_figures(monkeypatch)
     for repeats in (3, 4):  # six and eight tests
         save_picture(tmp_path / "soil.png", bevameter(plates(repeats=repeats)))
-    monkeypatch.undo()
     assert [figure.axes[0].get_legend() is not None for figure in drawn] == [True, False]
-    for figure in drawn:
-        pyplot.close(figure)

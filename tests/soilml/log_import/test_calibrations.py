@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
 
+from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 from soilml.log_import.channels.whole_seconds import spread_over_seconds
 from soilml.log_import.guesses.columns.behaviour import time_unit
@@ -217,3 +218,18 @@ def test_a_sinkage_that_no_wheel_has_at_rest_is_tared(tmp_path):
         assert ("sinkage counts from where the wheel rests" in text) == tared
         expected = law(np.asarray(SLIPS), 60.0)[2] - 0.004 * tared
         np.testing.assert_allclose(rows["sinkage_m"], expected, atol=3e-4)
+
+
+def test_stated_numbers_are_in_plain_digits(tmp_path):
+    """Python's own `float` reads digits of other scripts, and hundreds of them as infinite."""
+    assert "radius" in stated_constants(["radius: 150 mm"])
+    assert not stated_constants(["radius: \uff11\uff15\uff10 mm"])
+    assert not stated_constants([f"gear ratio: {'9' * 400}"])
+    file = tmp_path / "load_\uff16\uff10N.csv"
+    file.write_text("v,w,M\n" + "0.1,1,2\n" * 30, "utf-8")
+    assert "file_name" not in init_map(file)
+    given = {"time": {"rate": "10 Hz"}, "wheel": {"radius": RADIUS}}
+    given |= {"wheel_speed": {"column": "w"}, "ground_speed": {"column": "v"}}
+    given["load"] = {"file_name": r"load_(\d+)N"}
+    with pytest.raises(InputError, match="finds no number in the name of the run"):
+        import_log(file, given | {"torque": {"column": "M"}})

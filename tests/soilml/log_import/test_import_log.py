@@ -231,3 +231,10 @@ def test_a_model_file_of_another_wheel_is_refused(tmp_path, model_file):
     found = import_log(tmp_path / "a.csv", tmp_path / "map.toml")
     with pytest.raises(TableError, match=r"radius_m: 0\.11 given, the model's wheel has 0\.15"):
         identify(read_case(model_file), found.table)
+
+
+def test_a_clock_of_huge_numbers_is_no_time(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,w,v,torque,Fz\n" + "".join(f"{i}e300,1,0.1,2,60\n" for i in range(40)))
+    with pytest.raises(InputError, match="run a: no channel has two samples with a time"):
+        import_log(path, MAP | SPEEDS)

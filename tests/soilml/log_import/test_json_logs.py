@@ -44,6 +44,12 @@ def test_lines_that_are_cut_off_are_counted(tmp_path):
     assert found.notes == ("1 lines are no JSON objects and are left out",)
 
 
+def test_an_orientation_in_texts_has_no_angles(tmp_path):
+    rows = [{"t": i, "q": dict.fromkeys("xyzw", "1_0")} for i in range(5)]
+    (tmp_path / "a.json").write_text(json.dumps(rows))
+    assert list(read_log(tmp_path / "a.json")[0].columns) == ["t"]
+
+
 def test_stamps_of_headers_are_the_clock(tmp_path):
     """Messages come out of order; texts stay beside their numbers."""
     lines = [

@@ -66,6 +66,17 @@ def test_broken_lines_are_left_out_and_counted(tmp_path):
     assert recording.notes == ("2 lines have a wrong number of cells and are left out",)
 
 
+def test_a_cell_that_is_endless(tmp_path):
+    """In a header it is refused with its line, in a sample the line is left out."""
+    endless = "a" * 200_000
+    (tmp_path / "log.csv").write_text("# rig 3\n" + PLAIN.replace("F", endless))
+    with pytest.raises(InputError, match=r"log\.csv line 2: field larger than field limit"):
+        read_log(tmp_path / "log.csv")
+    (tmp_path / "log.csv").write_text(f"{PLAIN}{endless},1,2\n".replace("1.5", '"1.5"'))
+    (recording,) = read_log(tmp_path / "log.csv")
+    assert len(recording) == 5 and "1 lines" in recording.notes[0]
+
+
 def test_a_log_without_header_numbers_its_columns(tmp_path):
     (tmp_path / "log.dat").write_text(PLAIN.split("\n", 1)[1])
     (recording,) = read_log(tmp_path / "log.dat")
@@ -94,6 +105,7 @@ def test_times_of_day_are_seconds():
         ("a.parquet", b"PAR1", "is not a complete Parquet file"),
         ("a.mcap", b"not mcap", "cannot be read as a bag"),
         ("a.bag", b"not a bag", "cannot be read as a bag"),
+        ("a.db3", b"not a bag", "needed is a metadata.yaml beside it"),
     ],
 )
 def test_what_cannot_be_read_is_said_in_one_line(tmp_path, name, content, words):
@@ -168,8 +180,30 @@ def test_values_have_units_and_uncertainties():
     assert parse_uncertain("0.7 +- 0.05", "1", "x").std == 0.05
     assert parse_uncertain(3, "m", "x").std == 0.0
     assert parse_uncertain("about 3", "m", "x") is None
+    assert parse_uncertain("\uff12 m", "m", "x") is None
+    assert parse_uncertain("1e999", "m", "x") is None
 
 
 def test_units_at_the_end_of_names():
     names = ("torque_Nm", "v_mm_s", "time_ms", "omega_rad_s", "F_z", "pos_x", "current_mA")
     assert [unit_in_name(n) for n in names] == ["Nm", "mm/s", "ms", "rad/s", "", "", "mA"]
+
+
+@pytest.mark.parametrize(
+    "cell",
+    ["2_0.5", "\uff12\uff10\uff0e\uff15", "\uff120.5", "\u0968\u0966.\u096b", "0x14", "1e999"],
+)
+def test_a_cell_is_a_number_in_plain_digits_alone(tmp_path, cell):
+    """Python's own `float` reads most of these."""
+    (tmp_path / "log.csv").write_text(PLAIN.replace("1.6", cell).replace("-4", "1d1"), "utf-8")
+    (recording,) = read_log(tmp_path / "log.csv")
+    np.testing.assert_array_equal(recording.columns["F"], [1.5, np.nan, np.nan, 1.8, 1.9])
+    assert recording.columns["M"][2] == 10.0
+
+
+def test_a_column_in_digits_of_another_script_is_text(tmp_path):
+    digits = str.maketrans("0123456789", "".join(chr(0x966 + k) for k in range(10)))
+    rows = "".join(f"{i},{i},{f'{i}:00:{i}'.translate(digits)}\n" for i in range(10, 30))
+    (tmp_path / "log.csv").write_text("t,F,M\n" + rows, "utf-8")
+    (recording,) = read_log(tmp_path / "log.csv")
+    assert list(recording.texts) == ["M"]

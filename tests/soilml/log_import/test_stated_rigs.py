@@ -1,5 +1,7 @@
 """What stands in names, heads and comments of a log takes part, and so does what it leaves out."""
 
+import json
+
 import numpy as np
 import pytest
 from foreign_rigs import drive, law, nearest_stage, table
@@ -7,6 +9,7 @@ from stated_rigs import WRITERS, a_lever
 
 from soilml.log_import import import_log, init_map
 from soilml.log_import.channels.slopes import slope_of
+from soilml.log_import.readers import read_log
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.text_layout import name_and_unit
 from soilml.log_import.recording import Recording
@@ -81,12 +84,29 @@ def test_slope_of_accelerations_and_of_a_quaternion_agree():
         ([0.1, 0.2, 65535.0, 65535.0, 0.15], 3),
         ([5.0, 6.0, 1000.0, 1000.0, 5.5], 5),  # no code
         ([9999.0, 9999.0, 9999.0], 3),
+        ([1.0, 1e308, -1e30, 1.2, 9.9e29], 3),
     ],
 )
 def test_codes_of_missing_readings(values, left, tmp_path):
     found = without_codes(Recording("", tmp_path, {"a": np.asarray(values)}))
     assert int(np.isfinite(found.columns["a"]).sum()) == left
     assert bool(found.notes) == (left < len(values))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("column", ["t", "M"])
+def test_huge_numbers_are_missing_in_every_format(tmp_path, column):
+    """Differences and sums of them overflow, in readers as in guesses."""
+    rows = [{"t": i, "v": 0.1, "w": 1.0, "M": 2 + i % 3} for i in range(40)]
+    rows = [row | {column: (-1) ** i * 10**308} for i, row in enumerate(rows)]
+    lines = [",".join(map(str, row.values())) for row in rows]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(rows[0]), *lines]))
+    (csv,) = read_log(tmp_path / "a.csv")
+    assert np.isnan(csv.columns[column]).all()
+    assert csv.notes == (f"{column}: 40 numbers of 1e+30 or more are no readings",)
+    assert csv.notes[0] in init_map(tmp_path / "a.csv")
+    (tmp_path / "a.json").write_text(json.dumps([row | {column: 10**400} for row in rows]))
+    assert column not in read_log(tmp_path / "a.json")[0].columns
 
 
 def test_a_map_without_torque_is_remarked_on(tmp_path):

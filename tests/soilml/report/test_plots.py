@@ -1,5 +1,8 @@
 """Every result draws itself, into axes of the caller or into a figure of its own."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -156,3 +159,15 @@ def test_shaded_priors_are_those_that_are_given(case):
 def test_an_unknown_part_of_a_gap_report_is_refused(case):
     with pytest.raises(InputError, match=r"this report has train"):
         gap(case).plot(part="held_out")
+
+
+def test_the_backend_is_left_to_the_user():
+    """Reports need none; what the user draws after them has the one of MPLBACKEND."""
+    code = "from soilml.report.figure_style import report_style\nwith report_style(): pass\n"
+    code += "import os; from matplotlib import pyplot; pyplot.figure()\n"
+    code += "print(pyplot.get_backend().lower(), os.environ['MPLBACKEND'])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "svg"},
+    )  # fmt: skip
+    assert done.stdout.split() == ["svg", "svg"]
