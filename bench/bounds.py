@@ -33,13 +33,14 @@ torque_Nm = "2 %"
 drawbar_pull_N = "2 % + 0.2"
 sinkage_m = "2 %"
 """
+LSSVM, WHEEL = (f"{ROOT}/exported/{name}.onnx" for name in ("wheel_lssvm", "wheel"))
 #: Title, words of the command, and rows of `runs.csv` with six in a run.
 CASES = (
     ("simulate", "simulate m.toml --slip 0.05:0.6:1000 --load 30:120:1000 --out o.csv", 0),
     ("generate", "generate wheel o.parquet --rows 1000000 --workers 1", 0),
-    ("estimate, rows", f"estimate {ROOT}/exported/wheel_lssvm.onnx runs.csv --out o.csv", 10**6),
-    ("estimate --by all", f"estimate {ROOT}/exported/wheel.onnx runs.csv --by all --out o.csv", 10**6),
-    ("estimate --by run", f"estimate {ROOT}/exported/wheel.onnx runs.csv --by run --out o.csv", 10**5),
+    ("estimate, rows", f"estimate {LSSVM} runs.csv --out o.csv", 10**6),
+    ("estimate --by all", f"estimate {WHEEL} runs.csv --by all --out o.csv", 10**6),
+    ("estimate --by run", f"estimate {WHEEL} runs.csv --by run --out o.csv", 10**5),
     ("identify", "identify m.toml runs.csv --out o.json", 10**5),
     ("identify, 5000", "identify m.toml runs.csv --out o.json", 5000),
     ("identify, many", "identify m.toml runs.csv --out o.json", 10**6),
