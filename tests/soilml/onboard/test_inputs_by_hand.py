@@ -8,6 +8,7 @@ import pytest
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import (
+    as_numbers,
     compute_features,
     flatten_readings,
     parts_of_rows,
@@ -311,3 +312,11 @@ def test_rows_are_fed_in_parts(count, sizes):
     assert [len(part["slip"]) for part in parts] == sizes
     for name, values in rows.items():
         assert np.concatenate([part[name] for part in parts]).tolist() == values.tolist()
+
+
+def test_a_wrong_argument_is_shown_in_forty_characters():
+    with pytest.raises(InputError, match=r"^slip is 'a{39}\.\.\.; needed is a number") as raised:
+        as_numbers("slip", "a" * 9000)
+    assert len(str(raised.value)) < 100
+    with pytest.raises(InputError, match=r"^slip is 'much'; needed"):
+        as_numbers("slip", "much")

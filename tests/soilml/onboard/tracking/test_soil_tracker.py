@@ -123,6 +123,9 @@ def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
         settled.read(slip=0.3, torque=[2.0, 2.1], load=60.0)
     with pytest.raises(InputError, match="length is 5; needed is a whole number of 16 or more"):
         SoilTracker(estimator, length=5)
+    with pytest.raises(InputError, match="length is 15;"):
+        SoilTracker(estimator, length=15)
+    assert SoilTracker(estimator, length=16).length == 16
 
 
 def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):

@@ -48,5 +48,5 @@ def test_single_values_can_be_replaced():
 def test_unknown_names_come_with_a_hint():
     with pytest.raises(InputError, match="wong1989/dry_sand"):
         soil("wong/dry_sand")
-    with pytest.raises(InputError, match="friction_angle"):
+    with pytest.raises(InputError, match=r"a soil has no 'phi'; it has: .*friction_angle"):
         soil("wong1989/dry_sand", phi=0.6)
