@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from soilml import __version__
-from soilml.onboard.model_file import FORMAT, write_pooling
+from soilml.onboard.metadata.pooling_entry import write_pooling
+from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES
 from training.data.targets import PER_ROW
