@@ -97,9 +97,14 @@ def _metadata(table: Any) -> dict[str, str]:
 
 def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
     """Raise `TableError` where the recipe in the metadata is not the one that was written."""
-    if (recipe := metadata.get("soilml_recipe")) is None:
-        return
-    if hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
+    recipe = metadata.get("soilml_recipe")
+    if recipe is None:
+        if "soilml_recipe_sha256" in metadata:
+            raise TableError(
+                f"{path}: its metadata have the checksum of a recipe and no recipe; generate it "
+                "again"
+            )
+    elif hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
         raise TableError(
             f"{path}: the recipe in its metadata does not match its checksum; generate it again"
         )

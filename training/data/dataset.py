@@ -161,12 +161,8 @@ def _checked_recipe(text: str, source: str) -> dict[str, Any]:
     """
     content = recipe_content(text, source)
     if content:
-        effects = content.get("effect", [])
-        if isinstance(effects, list) and all(isinstance(entry, dict) for entry in effects):
-            known = [entry for entry in effects if entry.get("name") in EFFECTS]
-            parse_recipe(json.dumps(json.loads(text) | {"effect": known}), f"recipe of {source}")
-        else:
-            raise InputError(f"{source}: its recipe is damaged; generate it again")
+        known = [entry for entry in content.get("effect", []) if entry["name"] in EFFECTS]
+        parse_recipe(json.dumps(json.loads(text) | {"effect": known}), f"recipe of {source}")
     return content
 
 

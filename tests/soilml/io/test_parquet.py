@@ -88,6 +88,11 @@ def test_extra_columns_can_be_passed_over_and_a_file_s_own_are_known(tmp_path):
         assert len(read_table(written(tmp_path, {"soilml_units": units}))) == 2
 
 
+def test_a_checksum_without_its_recipe_is_refused(tmp_path):
+    with pytest.raises(TableError, match="the checksum of a recipe and no recipe"):
+        read_table(written(tmp_path, {"soilml_recipe_sha256": "0" * 64}))
+
+
 def test_a_changed_byte_of_a_generated_file_is_found(tmp_path, small_data):
     whole = bytearray(small_data.read_bytes())
     for place in (1000, len(whole) // 2):
