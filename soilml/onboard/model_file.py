@@ -156,9 +156,7 @@ def _read_content(file: Path) -> bytes:
     if stat.S_ISDIR(found.st_mode):
         raise ModelFileError(f"{file} cannot be read: {os.strerror(errno.EISDIR)}")
     if not stat.S_ISREG(found.st_mode):
-        raise ModelFileError(
-            f"{file} is a device or a pipe; needed is the name of a model file, which is read twice"
-        )
+        raise ModelFileError(f"{file} is a device or a pipe; needed is a model file")
     raise ModelFileError(
         f"{file} has {found.st_size / 2**20:.0f} MB; a model file has at most {MOST_BYTES >> 20} MB"
     )
