@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -73,9 +74,11 @@ def _read_file(file: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with file.open("rb") as opened:
+    with file.open("rb"):  # raises where it is missing or may not be read
+        # threads of Arrow that read from an object of Python abort the process where it ends first
         try:
-            arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
+            with pa.OSFile(os.fsencode(file)) as opened:
+                arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise TableError(f"{file} is not a complete Parquet file: {first}") from None
