@@ -148,7 +148,7 @@ def complete_part(recipe: Recipe, folder: Path, part: Part) -> PartResult:
 def _read_right(recipe: Recipe, file: Path, part: Part) -> pa.Table | None:
     """The content of a file that is whole and what it should be; None where it is not."""
     try:
-        with file.open("rb") as opened:
+        with pa.OSFile(os.fsencode(file)) as opened:  # no object of Python: see soilml.io.parquet
             found = pq.ParquetFile(opened, page_checksum_verification=True).read()
     except (OSError, pa.ArrowException):
         return None

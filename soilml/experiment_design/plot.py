@@ -66,8 +66,7 @@ def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[An
         panel.set_yticks(up, [f"{loads[k]:.3g}" for k in up])
         panel.set_title(f"{name.replace('_', ' ')}: now {advice.current_fraction[i]:.0%}")
         panel.set_xlabel("slip of the next row")
-    middle = axes[count // 2]
-    middle.set_xlabel("slip of the next row (frame: best, rings: measured)", fontsize=9)
+    axes[count // 2].set_xlabel("slip (frame: best, rings: measured)")
     axes[0].set_ylabel("load of the next row, N")
     label = "expected remaining fraction of the prior width"
     axes[0].figure.colorbar(image, ax=list(axes)).set_label(label, fontsize=9)

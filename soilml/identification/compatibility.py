@@ -16,7 +16,7 @@ import numpy as np
 from soilml.config.case import Case, take_case
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError, TableError
-from soilml.io.table import Table
+from soilml.io.table import Table, fault_of_text
 from soilml.io.toml_settings import Settings
 from soilml.quantities import QUANTITIES
 
@@ -36,9 +36,19 @@ def recipe_content(text: str, source: str) -> dict[str, Any]:
         content = json.loads(text, parse_int=float)
     except (ValueError, RecursionError):
         content = None
-    if not isinstance(content, dict):
+    if not (isinstance(content, dict) and _names_effects(content.get("effect", []))):
         raise InputError(f"{source}: its recipe is damaged; generate or train it again")
     return content
+
+
+def _names_effects(entries: Any) -> bool:
+    """Whether these are tables with names; they are printed, also those that are not known here."""
+    return isinstance(entries, list) and all(
+        isinstance(entry, dict)
+        and isinstance(name := entry.get("name"), str)
+        and not fault_of_text(name)
+        for entry in entries
+    )
 
 
 def recipe_case(text: str, source: str) -> Case | None:

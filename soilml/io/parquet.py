@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -74,9 +75,11 @@ def _read_file(file: Path) -> Any:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with file.open("rb") as opened:
+    with file.open("rb"):  # raises where it is missing or may not be read
+        # threads of Arrow that read from an object of Python abort the process where it ends first
         try:
-            arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
+            with pa.OSFile(os.fsencode(file)) as opened:
+                arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise TableError(f"{file} is not a complete Parquet file: {first}") from None
@@ -98,9 +101,14 @@ def _metadata(table: Any) -> dict[str, str]:
 
 def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
     """Raise `TableError` where the recipe in the metadata is not the one that was written."""
-    if (recipe := metadata.get("soilml_recipe")) is None:
-        return
-    if hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
+    recipe = metadata.get("soilml_recipe")
+    if recipe is None:
+        if "soilml_recipe_sha256" in metadata:
+            raise TableError(
+                f"{path}: its metadata have the checksum of a recipe and no recipe; generate it "
+                "again"
+            )
+    elif hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
         raise TableError(
             f"{path}: the recipe in its metadata does not match its checksum; generate it again"
         )

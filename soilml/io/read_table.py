@@ -11,6 +11,7 @@ import numpy as np
 
 from soilml.errors import TableError
 from soilml.io.csv_file import read_csv
+from soilml.io.devices import refuse_device
 from soilml.io.parquet import (
     ArrowStream,
     arrow_columns,
@@ -115,6 +116,7 @@ def read_table(
         return check_table(table, file, need, filled, limits)
     file = Path(path)
     try:
+        refuse_device(file)
         if file.suffix == ".parquet" or file.is_dir():
             table = _read_parquet(file, ignore_extra)
         else:

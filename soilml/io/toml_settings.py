@@ -9,10 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
+from soilml.io.devices import refuse_device
 from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.
 MOST_DEPTH = 20
+#: Characters of a settings file; those of the project have some thousand.
+MOST_CHARACTERS = 4_000_000
 
 
 class Settings:
@@ -99,7 +102,15 @@ def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
     """
     file = Path(path)
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+        refuse_device(file)
+        with file.open(encoding="utf-8-sig") as opened:  # which may be a pipe, of any length
+            text = opened.read(MOST_CHARACTERS + 1)
+        if len(text) > MOST_CHARACTERS:
+            raise InputError(
+                f"{file} has more than {MOST_CHARACTERS / 1e6:.0f} million characters; needed are "
+                "settings in TOML"
+            )
+        content = tomllib.loads(text)
         _check_depth(content, str(file))
         _check_whole_numbers(content, str(file))
     except FileNotFoundError:

@@ -16,7 +16,8 @@ from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
-from soilml.onboard.model_file import find_model, open_model, read_fields, read_prior, read_probe
+from soilml.onboard.metadata.fields import read_fields, read_prior, read_probe
+from soilml.onboard.model_file import find_model, open_model
 from soilml.onboard.probe import reproduces
 from soilml.onboard.row_estimates import run_rows
 from soilml.onboard.session import Session
@@ -85,13 +86,12 @@ class Estimator:
         file = find_model(path)
         session, metadata = open_model(file)
         try:
-            fields, probe = read_fields(metadata), read_probe(metadata)
-            estimator = Estimator(str(file), metadata=metadata, session=session, **fields)
-            passed = all(reproduces(estimator, **entry) for entry in probe)
-        except (KeyError, TypeError, ValueError) as error:
+            estimator = Estimator(str(file), session=session, **read_fields(metadata))
+            passed = all(reproduces(estimator, **entry) for entry in read_probe(metadata))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
-            raise ModelFileError(f"{file} cannot be run: {error}") from None
+            raise ModelFileError(f"{file} cannot be run: {' '.join(str(error).split())}") from None
         if not passed:
             raise ModelFileError(f"{file} fails its own probe on this machine: do not use it")
         return estimator

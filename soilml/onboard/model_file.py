@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from soilml.errors import ModelFileError, did_you_mean
-from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
-from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, RunPattern
 from soilml.onboard.session import Session, create_session
 from soilml.onboard.set_contract import INTERFACE
-from soilml.onboard.set_posterior import SetPosterior
 
 #: Version of the file format: names of inputs and outputs, keys of the metadata.
 FORMAT = "3"
+#: Largest model file, bytes. Those that `soilml train` writes have some MB at most.
+MOST_BYTES = 256 << 20
+#: Characters of an entry of the metadata that a message shows.
+_MOST_SHOWN = 40
 #: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
 ONE_STEP = "step"
-#: Metadata key of each array of `RunConditions`, and of `RunPattern`.
-CONDITION_KEYS = {"lower": "lower", "upper": "upper", "std": "std"}
-PATTERN_KEYS = {
-    "rows": "rows",
-    "worth": "information",
-    "widening": "std_scale",
-    "reach": "coverage_factor",
-}
 
 
 def released_models() -> dict[str, Path]:
@@ -88,16 +79,16 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
             f"{file} is an ONNX model without soilml metadata; needed is one that soilml train "
             "wrote"
         )
-    if metadata["soilml_format"] != FORMAT:
+    # nothing is known yet of these texts: they may be of any length, and of any characters
+    if (form := metadata["soilml_format"]) != FORMAT:
         raise ModelFileError(
-            f"{file} has format {metadata['soilml_format']}; this version of soilml reads format "
-            f"{FORMAT}"
+            f"{file} has format {_shown(form)}; this version of soilml reads format {FORMAT}"
         )
     interface = metadata.get("soilml_interface", "1")
-    if not (interface.isdecimal() and int(interface) <= int(INTERFACE)):
+    if interface not in [str(number) for number in range(1, int(INTERFACE) + 1)]:
         raise ModelFileError(
-            f"{file} has interface {interface}; this version of soilml reads up to {INTERFACE}: "
-            "update soilml"
+            f"{file} has interface {_shown(interface)}; this version of soilml reads up to "
+            f"{INTERFACE}: update soilml"
         )
     if metadata.get("soilml_kind") == ONE_STEP:
         raise ModelFileError(
@@ -126,99 +117,6 @@ def serialise_metadata(metadata: Mapping[str, str]) -> bytes:
     return content
 
 
-def read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
-    """Fields of an `Estimator` from the metadata of its file, by field name.
-
-    Raises `KeyError`, `TypeError` or `ValueError` where an entry is missing or malformed.
-    """
-    inputs, outputs = json.loads(metadata["inputs"]), json.loads(metadata["outputs"])
-    _check_provenance(metadata)
-    if not all(
-        str(entry[key]).isprintable() for entry in (*inputs, *outputs) for key in ("name", "unit")
-    ):
-        raise ValueError("a name with control characters")
-    return {
-        "inputs": tuple(entry["name"] for entry in inputs),
-        "names": tuple(entry["name"] for entry in outputs),
-        "units": tuple(entry["unit"] for entry in outputs),
-        "per_row": tuple(entry["name"] for entry in outputs if entry.get("per_row", False)),
-        "prior": read_prior(metadata, {}),
-        "pooling": read_pooling(json.loads(metadata["together"])),
-        "sets": SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None,
-    }
-
-
-def read_prior(metadata: Mapping[str, str], context: Mapping[str, float]) -> PriorSummary:
-    """The prior of the outputs, where need be scaled by the context value that an output names."""
-    outputs = json.loads(metadata["outputs"])
-    scale = np.asarray([context.get(entry.get("scale", ""), 1.0) for entry in outputs])
-    return PriorSummary(
-        *(
-            scale * np.asarray([entry[key] for entry in outputs], dtype=np.float64)
-            for key in ("prior_mean", "prior_std", "lower", "upper")
-        )
-    )
-
-
-def read_probe(metadata: Mapping[str, str]) -> list[dict[str, Any]]:
-    """Readings with the answers that the file must reproduce."""
-    probe = json.loads(metadata["probe"])
-    if not (isinstance(probe, list) and probe):
-        raise ValueError("no probe")
-    return probe
-
-
-def read_pooling(entry: Mapping[str, Any]) -> PoolingCalibration:
-    """The pooling calibration from the metadata entry "together"."""
-    conditions = RunConditions(
-        names=tuple(entry["over"]),
-        **{field: np.asarray(entry[key], float) for key, field in CONDITION_KEYS.items()},
-    )
-    patterns = tuple(
-        RunPattern(
-            varies=tuple(pattern["varies"]),
-            **{field: np.asarray(pattern[key], float) for key, field in PATTERN_KEYS.items()},
-        )
-        for pattern in entry["kinds"]
-    )
-    return PoolingCalibration(
-        conditions=conditions,
-        patterns=patterns,
-        single_row_coverage_factor=np.asarray(entry["alone"], float),
-        inconsistency_limits=np.asarray(entry["doubt"], float),
-        held_out=HeldOutErrors.of(entry["held_out"]) if "held_out" in entry else None,
-    )
-
-
-def write_pooling(pooling: PoolingCalibration) -> dict[str, Any]:
-    """The metadata entry "together" of a pooling calibration; the inverse of `read_pooling`."""
-    conditions = pooling.conditions
-    return {
-        "over": conditions.names,
-        **{key: getattr(conditions, field).tolist() for key, field in CONDITION_KEYS.items()},
-        "kinds": [
-            {"varies": pattern.varies}
-            | {key: getattr(pattern, field).tolist() for key, field in PATTERN_KEYS.items()}
-            for pattern in pooling.patterns
-        ],
-        "alone": pooling.single_row_coverage_factor.tolist(),
-        "doubt": pooling.inconsistency_limits.tolist(),
-        **({} if pooling.held_out is None else {"held_out": pooling.held_out.entry()}),
-    }
-
-
-def _check_provenance(metadata: Mapping[str, str]) -> None:
-    """Raise `ValueError` where the gear or the recipe in the metadata is malformed.
-
-    The runtime does not use them; commands compare them with a user's model file.
-    """
-    gear, recipe = json.loads(metadata["gear"]), json.loads(metadata["recipe"])
-    sizes = [float(gear[name]) for name in ("radius", "width") if name in gear]
-    names = [str(effect["name"]) for effect in recipe.get("effect", [])]
-    if not (isinstance(gear, dict) and all(size > 0.0 for size in sizes) and all(names)):
-        raise ValueError("gear or recipe")
-
-
 def _field(number: int, content: bytes) -> bytes:
     """A field of a protobuf message: its number and wire type 2, its length, its content."""
     size, length = len(content), bytearray()
@@ -239,13 +137,29 @@ def _is_intact(content: bytes, metadata: Mapping[str, str]) -> bool:
     )
 
 
+def _shown(text: str) -> str:
+    """A text of an unknown file for a message."""
+    return (
+        ascii(text)[1:-1] if len(text) <= _MOST_SHOWN else f"{ascii(text[:_MOST_SHOWN])[1:-1]}..."
+    )
+
+
 def _read_content(file: Path) -> bytes:
     try:
-        return file.read_bytes()
+        found = file.stat()
+        if stat.S_ISREG(found.st_mode) and found.st_size <= MOST_BYTES:
+            return file.read_bytes()
     except FileNotFoundError:
         raise ModelFileError(f"{file}: there is no such file") from None
     except OSError as error:
         raise ModelFileError(f"{file} cannot be read: {error.strerror}") from None
+    if stat.S_ISDIR(found.st_mode):
+        raise ModelFileError(f"{file} cannot be read: {os.strerror(errno.EISDIR)}")
+    if not stat.S_ISREG(found.st_mode):
+        raise ModelFileError(f"{file} is a device or a pipe; needed is a model file")
+    raise ModelFileError(
+        f"{file} has {found.st_size / 2**20:.0f} MB; a model file has at most {MOST_BYTES >> 20} MB"
+    )
 
 
 def _create_session(file: Path, content: bytes) -> tuple[Session, dict[str, str]]:

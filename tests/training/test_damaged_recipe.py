@@ -37,6 +37,10 @@ KINDS = {
     "noise": put("noise", 4),
     "operating": put("operating", None),
     "effect": put("effect", "grousers"),
+    "effect without a name": put("effect", [{"nam": "grousers"}]),
+    "effect with a list as name": put("effect", [{"name": ["a"]}]),
+    "effect with a number as name": put("effect", [{"name": 5}]),
+    "effect with escapes in its name": put("effect", [{"name": "x\n\x1b]0;y\x07"}]),
     "effect of the catalogue": put("effect", [{"name": "grousers", "height": "tall"}]),
 }
 

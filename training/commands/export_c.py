@@ -60,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
     need("onnx", "export-c")
     import onnx
 
-    from soilml.onboard.model_file import find_model, open_model
+    from soilml.onboard.estimator import Estimator
+    from soilml.onboard.model_file import find_model
     from training.export_c.c_file import write_c
 
     out = Path(args.out)
@@ -72,9 +73,8 @@ def run(args: argparse.Namespace) -> int:
     if not 1 <= args.rows <= MOST_ROWS:
         raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
     file = find_model(args.model)
-    _, metadata = open_model(file)
-    origin = file.name
-    written = write_c(onnx.load(str(file)), metadata, out.stem, origin, args.rows)
+    metadata = Estimator.load(file).metadata
+    written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows)
     with atomic_outputs(outputs(args)) as (source, header):
         source.write_text(written.source, encoding="utf-8")
         header.write_text(written.header, encoding="utf-8")

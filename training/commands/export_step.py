@@ -49,14 +49,15 @@ def run(args: argparse.Namespace) -> int:
     need("onnx", "export-step")
     import onnx
 
-    from soilml.onboard.model_file import ONE_STEP, find_model, open_model
+    from soilml.onboard.estimator import Estimator
+    from soilml.onboard.model_file import ONE_STEP, find_model
     from training.export.model_file import write_model
     from training.export.one_step import one_step_graph
 
     if not 1 <= args.rows <= MOST_ROWS:
         raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
     file = find_model(args.model)
-    _, metadata = open_model(file)
+    metadata = Estimator.load(file).metadata
     graph = one_step_graph(onnx.load(str(file)), str(file), args.rows)
     own = {key: value for key, value in metadata.items() if not key.endswith("_sha256")}
     kept = {key: metadata[key] for key in ("recipe_sha256", "data_sha256") if key in metadata}

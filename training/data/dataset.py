@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
+from soilml.config.units import text_in_si
 from soilml.errors import InputError, TableError
 from soilml.identification.compatibility import recipe_content
 from soilml.io.read_table import read_table
@@ -137,7 +138,7 @@ def read_dataset(
     recipe = table.metadata.get("soilml_recipe", "{}")
     content = _checked_recipe(recipe, str(path))
     check_measured(targets, content, str(path))
-    ends = [_ends(prior_of(name, content), truth[:, i]) for i, name in enumerate(targets)]
+    ends = [_ends(prior_of(name, content), truth[:, i], name) for i, name in enumerate(targets)]
     return Dataset(
         measured=measured,
         features=compute_features(features, measured),
@@ -161,20 +162,19 @@ def _checked_recipe(text: str, source: str) -> dict[str, Any]:
     """
     content = recipe_content(text, source)
     if content:
-        effects = content.get("effect", [])
-        if isinstance(effects, list) and all(isinstance(entry, dict) for entry in effects):
-            known = [entry for entry in effects if entry.get("name") in EFFECTS]
-            parse_recipe(json.dumps(json.loads(text) | {"effect": known}), f"recipe of {source}")
-        else:
-            raise InputError(f"{source}: its recipe is damaged; generate it again")
+        known = [entry for entry in content.get("effect", []) if entry["name"] in EFFECTS]
+        parse_recipe(json.dumps(json.loads(text) | {"effect": known}), f"recipe of {source}")
     return content
 
 
-def _ends(prior: object, truth: Floats) -> tuple[float, float]:
+def _ends(prior: object, truth: Floats, name: str) -> tuple[float, float]:
+    """The range of a target's prior in SI units, from its values where the recipe has none."""
     if isinstance(prior, dict):
         prior = prior.get("range")
     if isinstance(prior, list):
-        return float(prior[0]), float(prior[1])
+        unit = QUANTITIES[name].unit
+        low, high = (text_in_si(v, unit, name) if isinstance(v, str) else float(v) for v in prior)
+        return low, high
     return float(truth.min()), float(truth.max())
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from soilml import __version__
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
-from soilml.onboard.model_file import FORMAT, write_pooling
+from soilml.onboard.metadata.pooling_entry import write_pooling
+from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 from training.export.model_file import write_model

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from soilml import __version__
-from soilml.onboard.model_file import FORMAT, write_pooling
+from soilml.config.model_settings import take_gear
+from soilml.io.toml_settings import Settings
+from soilml.onboard.metadata.pooling_entry import write_pooling
+from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES
 from training.data.targets import PER_ROW
@@ -57,7 +60,7 @@ def file_metadata(
         "soilml_version": __version__,
         "inputs": json.dumps(inputs),
         "outputs": json.dumps(outputs),
-        "gear": json.dumps(json.loads(recipe).get("gear", {}), sort_keys=True),
+        "gear": json.dumps(_gear_in_si(json.loads(recipe).get("gear", {})), sort_keys=True),
         "together": json.dumps(write_pooling(trained.pooling)),
         "probe": json.dumps(probe),
         **_set_metadata(trained.set_posterior),
@@ -95,6 +98,17 @@ def file_metadata(
         "parity": f"{parity:.3e}",
         "opset": str(OPSET),
         "ir_version": str(IR_VERSION),
+    }
+
+
+def _gear_in_si(entry: dict[str, Any]) -> dict[str, Any]:
+    """The gear of a recipe, with numbers for values that have a unit, such as "150 mm"."""
+    if not entry:
+        return {}
+    made = take_gear(Settings(dict(entry), "[gear]", Path()))
+    return {
+        name: getattr(made, name, value) if isinstance(value, str) else value
+        for name, value in entry.items()
     }
 
 

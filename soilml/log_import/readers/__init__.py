@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from soilml.errors import InputError
+from soilml.io.devices import refuse_device
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.recording import Recording
 
@@ -60,6 +61,7 @@ def read_log(path: str | Path) -> list[Recording]:
     found = import_module(f"soilml.log_import.readers.{module}")
     read: Callable[[Path], list[Recording]] = getattr(found, function)
     try:
+        refuse_device(file)
         return [without_codes(recording) for recording in read(file)]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

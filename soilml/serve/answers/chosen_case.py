@@ -31,7 +31,7 @@ def whole_case(request: dict[str, Any]) -> Case:
     if isinstance(text, str) and text.strip():
         return case_of_text(text)
     wheel = request.get("wheel", FIRST_WHEEL)
-    if wheel not in WHEELS:
+    if not isinstance(wheel, str) or wheel not in WHEELS:
         raise InputError(f"no wheel {wheel!r}; there are: {', '.join(WHEELS)}")
     name = request.get("soil", FIRST_SOIL)
     if not isinstance(name, str):

@@ -67,7 +67,7 @@ def controls(request: dict[str, Any]) -> dict[str, Any]:
     case = forward_case(request)
     known = case.parameters()
     wheel = request.get("wheel", FIRST_WHEEL)
-    load = WHEELS[wheel].load if wheel in WHEELS and not request.get("model") else 60.0
+    load = 60.0 if request.get("model") else WHEELS[wheel].load
     operating = declared(Operating)
     groups = [
         ("Operating point", [_control(k, s, operating[k], {"slip": 0.3, "load": load}[k])

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from tornado.web import Application, StaticFileHandler, stream_request_body
 
@@ -16,7 +15,7 @@ from soilml.serve.answers.choices import choices
 from soilml.serve.answers.controls import controls
 from soilml.serve.answers.forward import forward
 from soilml.serve.answers.model_text import model_text
-from soilml.serve.web.guarded_handler import GuardedHandler, RefusedError
+from soilml.serve.web.guarded_handler import GuardedHandler, RefusedError, check_parts
 from soilml.serve.web.jobs import Jobs
 from soilml.serve.web.uploads import LARGEST_FILE, Upload, Uploads
 from soilml.serve.worker import KINDS
@@ -119,7 +118,7 @@ class Files(GuardedHandler):
         """Take the store."""
         self.uploads = uploads
         self.upload: Upload | None = None
-        self.taken = 0
+        self.opened: BinaryIO | None = None
 
     def prepare(self) -> None:
         """Refuse what is too large before it is read."""
@@ -137,20 +136,27 @@ class Files(GuardedHandler):
 
     def data_received(self, chunk: bytes) -> None:
         """Write a piece."""
+        assert self.opened is not None
         self.opened.write(chunk)
 
     def put(self) -> None:
         """All pieces are there."""
-        assert self.upload is not None
+        assert self.upload is not None and self.opened is not None
         self.opened.close()
-        self.answer(self.uploads.add(self.upload).as_json())
+        whole, self.upload = self.uploads.add(self.upload), None
+        self.answer(whole.as_json())
+
+    def on_finish(self) -> None:
+        """What was refused after it had a place leaves it."""
+        if self.opened is not None:
+            self.opened.close()
+        if self.upload is not None:
+            self.uploads.drop(self.upload)
+            self.upload = None
 
     def on_connection_close(self) -> None:
         """The page left in the middle of it."""
-        if self.upload is not None:
-            self.opened.close()
-            with contextlib.suppress(OSError):
-                self.upload.path.unlink()
+        self.on_finish()
 
 
 class StartJob(GuardedHandler):
@@ -162,14 +168,17 @@ class StartJob(GuardedHandler):
 
     async def post(self) -> None:
         """Start it on the files that the request names."""
-        request = self.content()
+        request = self.content(model=dict)
         kind = request.pop("kind", None)
         keys = request.pop("files", None)
-        if kind not in KINDS or not isinstance(keys, list) or not keys:
+        known = isinstance(kind, str) and kind in KINDS
+        if not known or not isinstance(keys, list) or not keys:
             raise RefusedError(400, f"needed is a kind ({', '.join(KINDS)}) and a list of files")
         files = [self._file(key) for key in keys]
         if kind in ("estimate", "gap"):
-            request["model"] = model_text(request.get("model") or {})["text"]
+            chosen = request.get("model") or {}
+            check_parts(chosen)
+            request["model"] = model_text(chosen)["text"]
         job = await self.jobs.start(kind, request | {"names": [f.name for f in files]}, files)
         self.answer(job.as_json())
 

@@ -27,12 +27,38 @@ HEADERS = {
 _READING = ("GET", "HEAD")
 
 
+#: What a part of a request must be; each may be missing, or null.
+_PARTS: dict[str, type] = {
+    "wheel": str,
+    "soil": str,
+    "model": str,
+    "values": dict,
+    "run": str,
+    "map": str,
+}
+_KINDS: dict[type, str] = {str: "a text", dict: "an object"}
+#: What is said with a status that the server's library answers; others below 500 have the first.
+_REFUSALS = {
+    400: "the request is malformed",
+    403: "this is no file of the page",
+    404: "there is no such page",
+    405: "this address takes no such request",
+}
+
+
 class RefusedError(HTTPError):
     """A request that is answered with a status and one line."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(status, text.replace("%", "%%"))
         self.text = text
+
+
+def check_parts(request: dict[str, Any], **others: type) -> None:
+    """Refuse a request with a part of another type; `others` replace what a part must be."""
+    for name, kind in (_PARTS | others).items():
+        if not isinstance(request.get(name), kind | None):
+            raise RefusedError(400, f"{name}: needed is {_KINDS[kind]}")
 
 
 class GuardedHandler(RequestHandler):
@@ -69,14 +95,16 @@ class GuardedHandler(RequestHandler):
         ):
             raise RefusedError(415, "a body must be application/json or application/octet-stream")
 
-    def content(self) -> dict[str, Any]:
-        """The request's body, a JSON object."""
+    def content(self, **others: type) -> dict[str, Any]:
+        """The request's body, a JSON object whose parts are what `check_parts` says."""
         try:
-            found = json.loads(self.request.body)
+            found = json.loads(self.request.body, parse_int=float)
+            json.dumps(found, ensure_ascii=False).encode()  # texts that can be written to a file
         except (ValueError, RecursionError):
             found = None
         if not isinstance(found, dict):
             raise RefusedError(400, "the request is no JSON object")
+        check_parts(found, **others)
         return found
 
     def answer(self, content: Any) -> None:
@@ -92,10 +120,10 @@ class GuardedHandler(RequestHandler):
             text = " ".join(str(error).split())
         elif isinstance(error, RefusedError):
             text = error.text
+        elif status_code < 500:
+            text = _REFUSALS.get(status_code, _REFUSALS[400])
         else:
-            text = {404: "there is no such page", 405: "this address takes no such request"}.get(
-                status_code, "the server failed; see where it was started"
-            )
+            text = "the server failed; see where it was started"
         self.set_status(status_code)
         self.answer({"error": text})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import secrets
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from soilml.errors import InputError
 
 #: Largest file, and all files together, bytes.
 LARGEST_FILE, LARGEST_SUM = 256 << 20, 1 << 30
-_LONGEST_NAME = 120
+#: Bytes of a name and of its ending; file systems take 255 in all.
+_LONGEST_NAME, _LONGEST_ENDING = 120, 16
 
 
 @dataclass(frozen=True)
@@ -32,27 +34,38 @@ class Uploads:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._files: dict[str, Upload] = {}
+        self._sizes_to_come: dict[str, int] = {}
 
     def place(self, name: str, size: int) -> Upload:
-        """Where a file of this name and size (bytes) will be written; `InputError` if too large."""
+        """Where a file of this name and size (bytes) will be written; `InputError` if too large.
+
+        Its size counts from now on, until `add` or `drop`: files may come at the same time.
+        """
         if size > LARGEST_FILE:
             raise InputError(
                 f"{plain_name(name)} has {size / 2**20:.0f} MB; at most {LARGEST_FILE >> 20} MB "
                 "are taken here: thin it, or use `soilml import` on the command line"
             )
         held = sum(f.path.stat().st_size for f in self._files.values() if f.path.exists())
-        if held + size > LARGEST_SUM:
+        if held + sum(self._sizes_to_come.values()) + size > LARGEST_SUM:
             raise InputError(
                 f"the files of this page have {LARGEST_SUM >> 20} MB together: restart soilml serve"
             )
         key = secrets.token_hex(16)
         (self.folder / key).mkdir(parents=True)
+        self._sizes_to_come[key] = size
         return Upload(key, self.folder / key / plain_name(name))
 
     def add(self, upload: Upload) -> Upload:
         """Make a file known that has been written to its place."""
+        self._sizes_to_come.pop(upload.key)
         self._files[upload.key] = upload
         return upload
+
+    def drop(self, upload: Upload) -> None:
+        """Remove a file of which not all has come."""
+        self._sizes_to_come.pop(upload.key, None)
+        shutil.rmtree(self.folder / upload.key, ignore_errors=True)
 
     def find(self, key: object) -> Upload:
         """The file of a key; `InputError` where there is none."""
@@ -70,4 +83,10 @@ def plain_name(name: str) -> str:
     base = re.split(r"[/\\]", name)[-1]
     kept = re.sub(r"[^\w .()+-]", "_", base).strip(" .")
     stem, dot, ending = kept.rpartition(".")
-    return f"{stem[:_LONGEST_NAME]}{dot}{ending[:16]}".strip() or "file"
+    named = f"{_first_bytes(stem, _LONGEST_NAME)}{dot}{_first_bytes(ending, _LONGEST_ENDING)}"
+    return named.strip() or "file"
+
+
+def _first_bytes(text: str, most: int) -> str:
+    """The longest beginning of a text that has no more bytes in UTF-8."""
+    return text.encode()[:most].decode(errors="ignore")

@@ -37,7 +37,9 @@ def test_a_recipe_is_nested_dictionaries_or_damaged():
     content = comparing.recipe_content(json.dumps({"gear": {"radius": 1}}), "rows.parquet")
     assert content == {"gear": {"radius": 1.0}} and type(content["gear"]["radius"]) is float
     assert comparing.recipe_case("{}", "rows.parquet") is None
-    for text in ("{", "[1]", "3", "[" * 100_000):
+    names = ({"name": ["a"]}, {"name": 5}, {"name": "\x1b[2J"}, {}, "grousers")
+    unnamed = [json.dumps({"effect": [name]}) for name in names]
+    for text in ("{", "[1]", "3", "[" * 100_000, '{"effect": {}}', *unnamed):
         with pytest.raises(InputError, match=r"rows\.parquet: its recipe is damaged"):
             comparing.recipe_content(text, "rows.parquet")
 

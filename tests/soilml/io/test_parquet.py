@@ -88,6 +88,11 @@ def test_extra_columns_can_be_passed_over_and_a_file_s_own_are_known(tmp_path):
         assert len(read_table(written(tmp_path, {"soilml_units": units}))) == 2
 
 
+def test_a_checksum_without_its_recipe_is_refused(tmp_path):
+    with pytest.raises(TableError, match="the checksum of a recipe and no recipe"):
+        read_table(written(tmp_path, {"soilml_recipe_sha256": "0" * 64}))
+
+
 def test_a_changed_byte_of_a_generated_file_is_found(tmp_path, small_data):
     whole = bytearray(small_data.read_bytes())
     for place in (1000, len(whole) // 2):
@@ -99,6 +104,19 @@ def test_a_changed_byte_of_a_generated_file_is_found(tmp_path, small_data):
     content = pq.ParquetFile(small_data).read()
     pq.write_table(content, tmp_path / "plain.parquet", compression="none")
     assert len(read_table(tmp_path / "plain.parquet")) == len(content)  # none written, none asked
+
+
+def test_no_thread_of_arrow_needs_the_interpreter(tmp_path, monkeypatch):
+    """Else a command that ends right after it has read a file is aborted now and then."""
+    sources, read = [], pq.ParquetFile
+    monkeypatch.setattr(pq, "ParquetFile", lambda s, **o: (sources.append(s), read(s, **o))[1])
+    assert len(read_table(written(tmp_path))) == 2
+    assert [type(source) for source in sources] == [pa.OSFile]
+
+
+def test_a_name_of_any_bytes_is_read(tmp_path):
+    path = written(tmp_path).rename(tmp_path / "x\udcff.parquet")
+    assert len(read_table(path)) == 2
 
 
 def test_a_folder_without_parquet_files_is_no_table(tmp_path):

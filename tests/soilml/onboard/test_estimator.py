@@ -9,12 +9,8 @@ import pytest
 
 from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
-from soilml.onboard.model_file import (
-    find_model,
-    read_pooling,
-    released_models,
-    write_pooling,
-)
+from soilml.onboard.metadata.pooling_entry import read_pooling, write_pooling
+from soilml.onboard.model_file import find_model, released_models
 
 
 @pytest.fixture(scope="module")

@@ -123,6 +123,7 @@ def test_the_text_of_the_sliders_is_a_model_file(tmp_path):
     ("request_", "said"),
     [
         ({"wheel": "square"}, "no wheel 'square'"),
+        ({"wheel": {}}, "no wheel {}"),
         ({"soil": "wong1989/drysand"}, "did you mean 'wong1989/dry_sand'"),
         ({"soil": 3}, "needed is the name of a soil"),
         ({"values": {"cohesion": -1.0}}, "cohesion is -1 Pa"),

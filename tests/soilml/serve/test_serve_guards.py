@@ -61,7 +61,10 @@ def test_a_body_that_a_form_could_send_is_refused(page, kind):
     assert "application/json" in error_of(answer)
 
 
-@pytest.mark.parametrize("body", [b"", b"[]", b"{", b"\xff", b"[" * 100_000], ids=len)
+NO_OBJECTS = [b"", b"[]", b"{", b"\xff", b"[" * 100_000, b'{"soil": "\\ud800"}']
+
+
+@pytest.mark.parametrize("body", NO_OBJECTS, ids=len)
 def test_a_body_that_is_no_object_is_refused(page, body):
     answer = page.request("POST", "/api/forward", body)
     assert answer[0] == 400
@@ -127,6 +130,42 @@ def test_another_large_body_is_refused(page):
         assert opened.recv(1000).startswith(b"HTTP/1.1 400")
 
 
+@pytest.mark.parametrize("path", ["/api/controls", "/api/forward", "/api/model"])
+@pytest.mark.parametrize(
+    ("name", "value"), [("wheel", {}), ("soil", [1]), ("model", 3), ("values", "x")]
+)
+def test_a_part_of_another_type_is_refused(page, path, name, value):
+    answer = page.request("POST", path, {name: value})
+    assert answer[0] == 400
+    assert error_of(answer).startswith(f"{name}: needed is a")
+
+
+def test_a_number_without_end_is_refused(page):
+    for digits in (400, 5000):
+        body = b'{"values": {"cohesion": %s}}' % (b"9" * digits)
+        answer = page.request("POST", "/api/forward", body)
+        assert answer[0] == 422 and error_of(answer) == "cohesion: needed is a number"
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        (("GET", "/static/../../../etc/passwd"), "no file of the page"),
+        (("PUT", "/api/files?name=%FF", b"x"), "the request is malformed"),
+        (("POST", "/api/forward", b"x"), "the request is malformed"),
+        (("POST", "/api/choices", b"{}"), "takes no such request"),
+    ],
+    ids=str,
+)
+def test_what_the_server_s_library_refuses_is_no_failure_of_the_server(page, request_, said):
+    malformed = {"Content_Type": "multipart/form-data"} if request_[-1] == b"x" else {}
+    if request_[0] == "PUT":
+        malformed = {"Content_Type": "application/octet-stream"}
+    answer = page.request(*request_, **malformed)
+    assert 400 <= answer[0] < 500
+    assert said in error_of(answer)
+
+
 def test_it_listens_on_the_loopback_interface_alone(page):
     own = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     for address in own - {"127.0.0.1", "127.0.1.1"}:
@@ -145,6 +184,8 @@ def test_it_listens_on_the_loopback_interface_alone(page):
         (".hidden", "hidden"),
         ("a\x00b\n.csv", "a_b_.csv"),
         ("Räder 3 (late).csv", "Räder 3 (late).csv"),
+        ("漢" * 120 + ".csv", "漢" * 40 + ".csv"),
+        ("a." + "漢" * 120, "a." + "漢" * 5),
     ],
 )
 def test_names_of_files_lead_nowhere(given, kept):

@@ -96,6 +96,12 @@ def test_a_gap_runs_with_progress_and_its_files_are_there(page):
     assert page.request("GET", f"/api/jobs/{job['id']}/MODEL.toml")[0] == 422
 
 
+def test_the_wheel_of_a_job_is_a_text(page):
+    request = {"kind": "gap", "files": [page.put("R.csv", b"x")], "model": {"wheel": {}}}
+    wrong, status = page.ask("/api/jobs", request)
+    assert status == 400 and wrong["error"] == "wheel: needed is a text"
+
+
 def test_a_job_can_be_cancelled_and_the_page_stays_live(page):
     key = page.put("RUNS.csv", runs_text(7))
     job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
@@ -145,6 +151,9 @@ def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp
         ({"kind": "look", "files": []}, "a list of files"),
         ({"kind": "shell", "files": ["x"]}, "needed is a kind"),
         ({"files": "x"}, "needed is a kind"),
+        ({"kind": [], "files": [1]}, "needed is a kind"),
+        ({"kind": "estimate", "files": ["x"], "model": "x"}, "model: needed is an object"),
+        ({"kind": "look", "files": ["x"], "run": {}}, "run: needed is a text"),
     ],
     ids=str,
 )

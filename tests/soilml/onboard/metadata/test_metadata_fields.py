@@ -1,0 +1,122 @@
+"""Metadata that was changed and signed again: every malformed entry is refused in one line."""
+
+import hashlib
+import json
+
+import onnx
+import pytest
+from compiled_c import ROOT
+
+from soilml import Estimator
+from soilml.cli import main
+from soilml.errors import ModelFileError
+from soilml.onboard.metadata.fields import is_plain_name
+from soilml.onboard.model_file import metadata_checksum, released_models, serialise_metadata
+
+RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,60,2.6\n"
+ESCAPES = "\x1b[31mwheel\n"
+
+
+def signed(source, path, **entries):
+    """A file whose metadata have these entries, None for one that is left out."""
+    model = onnx.load(source)
+    metadata = {e.key: e.value for e in model.metadata_props} | entries
+    metadata = {key: value for key, value in metadata.items() if value is not None}
+    del model.metadata_props[:]
+    graph = model.SerializeToString(deterministic=True)
+    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
+    path.write_bytes(graph + serialise_metadata(metadata))
+    return path
+
+
+def edited(key, change):
+    """The entry of the wheel's file with a change."""
+    model = onnx.load(ROOT / "exported" / "wheel.onnx")
+    content = json.loads({e.key: e.value for e in model.metadata_props}[key])
+    change(content)
+    return {key: json.dumps(content)}
+
+
+def of_output(key, value):
+    return edited("outputs", lambda outputs: outputs[0].update({key: value}))
+
+
+def put(key, name, value):
+    return edited(key, lambda content: content.update({name: value}))
+
+
+CHANGES = {
+    "a list as unit": of_output("unit", ["a"]),
+    "another unit": of_output("unit", "furlong"),
+    "a name that is no quantity": of_output("name", "<b>x</b>"),
+    "a list as name": of_output("name", ["a"]),
+    "a name twice": of_output("name", "friction_angle"),
+    "no prior": of_output("prior_std", 0),
+    "a text as prior": of_output("lower", "0"),
+    "a prior upside down": of_output("lower", 1e9),
+    "a prior beyond numbers": of_output("upper", 10**400),
+    "a scale with escapes": of_output("scale", ESCAPES),
+    "a list as scale": of_output("scale", [1]),
+    "an input that cannot be read": edited("inputs", lambda e: e[0].update(name="cohesion")),
+    "no inputs": {"inputs": "null"},
+    "a gear with escapes": put("gear", "type", ESCAPES),
+    "a number as gear": put("gear", "type", 5),
+    "a text as radius": put("gear", "radius", "wide"),
+    "no radius": put("gear", "radius", float("nan")),
+    "a size of the gear with escapes": put("gear", "lug", ESCAPES),
+    "a list as gear": {"gear": "[]"},
+    "null as gear": {"gear": "null"},
+    "a list as recipe": {"recipe": "[]"},
+    "a text as effects": put("recipe", "effect", "x"),
+    "a number as effect": put("recipe", "effect", [{"name": 5}]),
+    "an effect with escapes": put("recipe", "effect", [{"name": ESCAPES}]),
+    "a recipe without end": {"recipe": "[" * 100_000},
+    "a number as spec": {"spec": "5"},
+    "an empty calibration": {"together": "{}"},
+    "a calibration of other outputs": put("together", "alone", [1.0]),
+    "conditions that are not read": put("together", "over", ["a", "b"]),
+    "no kinds of runs": put("together", "kinds", []) | {"set": None},
+    "an empty set": {"set": "{}"},
+    "null as set": {"set": "null"},
+    "negative noise": put("set", "noise", {"torque": [-1.0, 0.0]}),
+    "no number as an error": put("set", "errors", {"slip_bias": float("nan")}),
+    "a context with escapes": put("set", "context", {ESCAPES: [0.0, 1.0]}),
+    "no probe of a set": edited("probe", lambda probe: probe.__delitem__(slice(1, None))),
+    "a number as probe": {"probe": "[5]"},
+    **{f"without {key}": {key: None} for key in ("gear", "inputs", "outputs", "recipe", "together",
+                                                 "probe", "spec")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", CHANGES)
+@pytest.mark.parametrize("command", ["estimate", "export-c", "export-step"])
+def test_a_malformed_entry_is_refused_by_every_command(tmp_path, capsys, what, command):
+    file = signed(ROOT / "exported" / "wheel.onnx", tmp_path / "m.onnx", **CHANGES[what])
+    (tmp_path / "runs.csv").write_text(RUNS)
+    other = {"estimate": "runs.csv", "export-c": "m.c", "export-step": "step.onnx"}[command]
+    assert main([command, str(file), str(tmp_path / other)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1 and "its metadata is damaged" in captured.err
+    assert captured.out == "" and "\x1b" not in captured.err
+    assert {path.name for path in tmp_path.iterdir()} == {"m.onnx", "runs.csv"}
+
+
+def test_a_set_of_a_graph_without_one_is_refused(tmp_path):
+    wheel = onnx.load(ROOT / "exported" / "wheel.onnx")
+    entries = {e.key: e.value for e in wheel.metadata_props if e.key in ("set", "probe")}
+    linear = signed(ROOT / "exported" / "wheel_linear.onnx", tmp_path / "m.onnx", **entries)
+    with pytest.raises(ModelFileError) as caught:
+        Estimator.load(linear)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", released_models())
+def test_released_files_signed_again_are_read(tmp_path, name):
+    assert Estimator.load(signed(released_models()[name], tmp_path / "m.onnx")).names
+
+
+def test_plain_names():
+    assert is_plain_name("grousers") and is_plain_name("Räder 3\u00a0b")
+    for name in ("", "a\nb", "\x1b[2J", "\u202e", "\ud800", 5, ["a"], None):
+        assert not is_plain_name(name)

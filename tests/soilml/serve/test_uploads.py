@@ -1,0 +1,57 @@
+"""The store of dropped files: what it holds, and what it has promised to hold."""
+
+import socket
+import time
+from contextlib import ExitStack
+
+import pytest
+from served_page import page as page
+
+from soilml.errors import InputError
+from soilml.serve.web.uploads import LARGEST_FILE, LARGEST_SUM, Uploads
+
+COUNT = LARGEST_SUM // LARGEST_FILE
+
+
+def test_files_that_are_still_coming_count_with_their_whole_size(tmp_path):
+    uploads = Uploads(tmp_path)
+    coming = [uploads.place("a.csv", LARGEST_FILE) for _ in range(COUNT)]
+    with pytest.raises(InputError, match="1024 MB together"):
+        uploads.place("b.csv", 1)
+    uploads.drop(coming[0])
+    assert not coming[0].path.parent.exists()
+    coming[1].path.write_bytes(b"short")
+    assert uploads.find(uploads.add(coming[1]).key) == coming[1]
+    uploads.place("b.csv", LARGEST_FILE)
+    with pytest.raises(InputError, match="1024 MB together"):
+        uploads.place("c.csv", LARGEST_FILE)  # the short one counts with what it has
+
+
+def test_the_page_takes_no_more_at_a_time_than_in_all(page):
+    def answer(opened):
+        """What is said to the head of a large file, before its content is sent."""
+        opened.sendall(
+            f"PUT /api/files?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{page.port}\r\n"
+            "Content-Type: application/octet-stream\r\nExpect: 100-continue\r\n"
+            f"Content-Length: {LARGEST_FILE}\r\n\r\n".encode()
+        )
+        return opened.recv(12)
+
+    def connection():
+        return socket.create_connection(("127.0.0.1", page.port), timeout=30)
+
+    with ExitStack() as stack:
+        for _ in range(COUNT):
+            assert answer(stack.enter_context(connection())) == b"HTTP/1.1 100"
+        assert answer(stack.enter_context(connection())) == b"HTTP/1.1 413"
+    until = time.monotonic() + 30.0  # files that were begun and left make room again
+    while True:
+        with connection() as opened:
+            if answer(opened) == b"HTTP/1.1 100":
+                break
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def test_a_long_name_in_any_script_is_taken(page):
+    assert page.put("%E6%BC%A2" * 120 + ".csv", b"run,slip\n")
