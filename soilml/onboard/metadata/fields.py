@@ -48,10 +48,10 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     if not scales <= (set() if sets is None else sets.context_ranges.keys()):
         raise ValueError("outputs: a scale that is no context input")
     per_row = tuple(entry["name"] for entry in outputs if entry.get("per_row", False))
-    never_pooled = bool(per_row) or (sets is not None and sets.sets_only)
-    if pooling.single_row_coverage_factor.size != len(outputs):
+    alone = sets is not None and sets.sets_only  # without estimates of single rows
+    if pooling.single_row_coverage_factor.size != len(outputs) and not alone:
         raise ValueError("together: not of these outputs")
-    if not (pooling.patterns or never_pooled):
+    if not (pooling.patterns or per_row or alone):
         raise ValueError("together: no kinds of runs")
     return {
         "inputs": tuple(entry["name"] for entry in inputs),

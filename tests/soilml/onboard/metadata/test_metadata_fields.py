@@ -120,3 +120,11 @@ def test_plain_names():
     assert is_plain_name("grousers") and is_plain_name("Räder 3\u00a0b")
     for name in ("", "a\nb", "\x1b[2J", "\u202e", "\ud800", 5, ["a"], None):
         assert not is_plain_name(name)
+
+
+def test_a_file_of_sets_alone_needs_no_calibration_of_single_rows(tmp_path):
+    """Files for any wheel of the first version have none."""
+    source = released_models()["any_wheel"]
+    entry = json.loads(Estimator.load(source).metadata["together"]) | {"alone": []}
+    old = signed(source, tmp_path / "old.onnx", together=json.dumps(entry))
+    assert Estimator.load(old).sets.sets_only
