@@ -25,6 +25,14 @@ b,0.5,90,5.3,8.0,0.022
 MODEL = THREE_CHANNEL_MODEL
 RECIPE_TEXT = RECIPE.format(rows=50, seed=1)
 
+#: Forty lines of a rig that starts, drives with slip and stops, under a header with units.
+LOG = "Rig 4\nt [s],v [m/s],omega [rad/s],T [Nm],Fz [N],Fx [N],z [mm]\n" + "".join(
+    f"{0.1 * i:.1f},{v:.3f},{0.8 * (i > 8):.2f},{1.5 * (i > 8) + 0.01 * (i % 3):.3f},"
+    f"{60 + i % 2},{4 * (i > 8)},{9 + i % 2}\n"
+    for i in range(40)
+    for v in (0.1 * (i > 8) + 0.001 * (i % 2),)
+)
+
 #: Cells, values and words that are written into valid files at random places.
 TOKENS = [
     *("", " ", "0", "-0", "1", "-1", "0.999999", "1e-300", "1e300", "1e308", "-1e308", "1e999"),

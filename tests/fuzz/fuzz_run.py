@@ -1,4 +1,7 @@
-"""Fuzz every target for a time, print counts, keep what fails: `make fuzz FUZZ_SECONDS=3600`."""
+"""Fuzz every target for a time, print counts, keep what fails: `make fuzz FUZZ_SECONDS=3600`.
+
+Warnings are failures, as they are in the tests.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +58,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=None, help="of the first round; else random")
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
     args = parser.parse_args()
-    warnings.simplefilter("ignore")
+    warnings.simplefilter("error")
     first = random.SystemRandom().randrange(2**31) if args.seed is None else args.seed
     end, rounds = time.monotonic() + args.seconds, 0
     counts = {name: [0, 0, 0] for name in args.targets or TARGETS}

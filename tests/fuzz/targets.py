@@ -10,6 +10,7 @@ import contextlib
 import io
 import json
 import os
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,10 +27,13 @@ from datagen.recipe import parse_recipe, read_recipe
 from soilml import EFFECTS, Estimator, LinearWheel, Model, Operating, Soil, Track, Wheel, identify
 from soilml.cli import main
 from soilml.config.case import read_case
-from soilml.errors import SoilmlError
+from soilml.errors import SoilmlError, TableError
 from soilml.gap import audit, gap
 from soilml.identification import METHODS
 from soilml.io.read_table import read_table
+from soilml.io.rows import as_table
+from soilml.io.table import Table
+from soilml.log_import import import_log, init_map
 from soilml.parameters import declared
 
 EXPORTED = Path(soilml.__file__).parents[1] / "exported"
@@ -61,6 +65,31 @@ def _read_all(file: Path) -> None:
     table = read_table(file, ("run", "slip"), ignore_extra=True)
     for name in ("run", "slip"):
         list(table.groups(name))
+
+
+def _log(content: bytes) -> None:
+    """A map is guessed for a log, and is a map; the log is imported by it."""
+    with TemporaryDirectory() as folder:
+        log, drawn = Path(folder) / "rig.csv", Path(folder) / "map.toml"
+        log.write_bytes(content)
+        text = init_map(log)
+        tomllib.loads(text)
+        drawn.write_text(text.replace("# radius = ", "radius = "), encoding="utf-8")
+        import_log(log, drawn, accept=True)
+
+
+def _rows(content: bytes) -> None:
+    """Columns of Python values, as a mapping and as a table made of them: checked alike."""
+    columns = json.loads(content)
+    found = []
+    for rows in (columns, Table(columns)):
+        with contextlib.suppress(SoilmlError):
+            found.append(as_table(rows))
+    for table in found:
+        assert len({len(column) for column in table.columns.values()}) == 1
+        assert all(np.abs(table["slip"]) < 1.0) if "slip" in table else True
+    if not found:
+        raise TableError("refused")
 
 
 def _model(content: bytes) -> None:
@@ -223,6 +252,16 @@ load_cases = {
     "effects": st.lists(st.integers(0, 40), max_size=2),
 }
 readings = {"file": st.integers(0, 1), "slip": slips, "load": loads, "torque": torques}
+#: Columns of one length mostly, of numbers mostly, some with names that no table has.
+column_values = st.lists(numbers, min_size=2, max_size=2) | st.sampled_from(
+    [[], [1.0], ["a", "b"], ["0.1", "0.2"], [None, 0.2], [True, False], [[0.1], [0.2, 0.3]], 0.1]
+)
+python_columns = st.dictionaries(
+    st.sampled_from(["run", "slip", "load_N", "torque_Nm", "sinkage_m", "status", "load", "5"])
+    | st.text(max_size=4),
+    column_values,
+    max_size=5,
+)
 RECIPE_JSON = json.dumps(read_recipe("wheel").content)
 TARGETS: dict[str, Target] = {
     "csv": Target(
@@ -236,6 +275,8 @@ TARGETS: dict[str, Target] = {
         as_json(files.changed_json(json.loads(RECIPE_JSON))),
         2.0,
     ),
+    "log": Target(_log, files.changed_text(files.LOG) | st.binary(max_size=64), 0.3),
+    "python-rows": Target(_rows, as_json(python_columns), 3.0),
     "onnx": Target(
         _in_file("m.onnx", Estimator.load), files.changed_bytes(ONNX) | changed_metadata(), 0.5
     ),

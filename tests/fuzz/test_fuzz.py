@@ -17,7 +17,7 @@ KEPT = sorted(path for path in CORPUS.rglob("*") if path.is_file())
 @pytest.mark.parametrize("path", KEPT, ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_what_once_failed(path):
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("error")
         check(TARGETS[path.parent.name], path.read_bytes())
 
 
@@ -29,6 +29,6 @@ def test_every_target_has_inputs_that_once_failed_or_none_ever_did():
 @pytest.mark.parametrize("name", TARGETS)
 def test_a_slice_of_the_fuzzing(name):
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+        warnings.simplefilter("error")
         tried, _, failing = fuzz(name, max(1, round(EXAMPLES * TARGETS[name].share)), 0)
     assert failing is None and tried > 0
