@@ -7,8 +7,10 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.fitting.coordinates import linearise
 from soilml.gap.statistics.reml_covariance import (
+    RUN_EFFECT_GRID,
     RUN_EFFECT_UNITS,
     VarianceComponents,
+    _run_effect_grid,
     assemble_covariance,
     estimate_covariance,
     run_effect_columns,
@@ -238,3 +240,10 @@ def test_the_covariance_of_some_readings_is_their_part(rig):
     assert part.components == truth
     inverse = part.whiten.T @ part.whiten
     np.testing.assert_allclose(inverse @ part.matrix, np.eye(chosen.sum()), atol=1e-8)
+
+
+def test_the_scatter_from_run_to_run_that_is_tried_follows_the_number_of_runs():
+    assert _run_effect_grid(1) == (0.0,)
+    for few in (2, 5):
+        assert _run_effect_grid(few) == (0.8, 1.2, 1.8, 3.0, 5.0)
+    assert _run_effect_grid(6) == RUN_EFFECT_GRID == (0.0, 0.25, 0.5, 0.8, 1.2, 1.8, 3.0, 5.0)

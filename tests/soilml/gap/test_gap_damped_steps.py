@@ -52,6 +52,9 @@ def test_steps_end_at_bounds_and_do_not_leave_them():
     steps, jacobian = DampedSteps.of([of]), np.eye(1)
     assert steps.are_held(np.ones(1), np.ones(1), jacobian)
     assert not steps.are_held(np.ones(1), -np.ones(1), jacobian)
+    assert steps.are_held(np.zeros(1), -np.ones(1), jacobian)
+    assert not steps.are_held(np.zeros(1), np.ones(1), jacobian)
+    assert one_step(of, 0.0, -0.5) == 0.0
 
 
 def test_a_step_counts_the_prior():

@@ -77,6 +77,10 @@ def test_the_range_of_a_channel_contains_zero_and_each_channel_counts():
     assert not matters([0.39, 0.39], [-10.0, 10.0])
     assert matters([0.41, 0.41], [-10.0, 10.0])
     assert not matters([0.19, 0.19], [-10.0, -9.0])
+    given = readings([], [9.0, 10.0])  # a channel without a reading does not end the comparison
+    problem = stub(readings=given, covariance=stub(std=np.full(2, 1e-6)))
+    law, own = (stub(fit=stub(prediction=np.full(2, value))) for value in (0.0, 0.21))
+    assert law_matters(problem, stub(catalogue_law=law, free_law=own))
 
 
 def discrepancy(columns, amplitude, std, channel):

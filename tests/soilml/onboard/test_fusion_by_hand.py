@@ -161,6 +161,17 @@ def test_an_interval_holds_its_mean_where_all_errors_of_a_bin_lie_on_one_side():
     rule = _measure(truth, mean, np.full((2, 4000), 0.4))
     assert (rule.low <= 0.0).all() and (rule.high >= 0.0).all()
     assert (rule.low == 0.0).any() and (rule.high == 0.0).any()
+    fused, spread, _ = rule.fuse(mean, np.full((2, 4000), 0.4), np.ones(2))
+    low, high = rule.interval(fused, spread)
+    assert np.mean((low <= truth) & (truth <= high)) == pytest.approx(0.9, abs=0.005)
+
+
+def test_the_interval_of_repeated_readings_is_widened_by_their_number():
+    """By half at the 16 readings that were measured, by a quarter at 4, by no more beyond."""
+    rule = replace(RULE, repeats=16.0, repeat_interval=1.5)
+    mean, std = np.asarray([0.5]), np.asarray([0.4])
+    ends = [rule.interval(mean, std, count)[1][0] - 0.5 for count in (1.0, 4.0, 16.0, 99.0)]
+    assert np.asarray(ends) / ends[0] == pytest.approx([1.0, 1.25, 1.5, 1.5])
 
 
 def test_an_interval_is_widened_until_it_holds_nine_tenths():
