@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,9 +20,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from fault_run import COMMANDS, completed, digests, prepared, started
 
-#: Shares of the output that a full disk holds.
-SHARES = (0.02, 0.3, 0.7, 0.95)
-ROOM, BLOCK = 64 << 20, 4096
+#: Shares of the output that a full disk holds; of none, a file takes all room before.
+SHARES = (0.0, 0.02, 0.3, 0.7, 0.95)
+ROOM, BLOCK, FILLED = 64 << 20, 4096, ".filled"
 
 
 @contextmanager
@@ -64,7 +64,12 @@ def disturbed(folder: Path, words: str) -> tuple[int, list[str]]:
     for share in SHARES:
         size = max(BLOCK * 2, int(share * sum(sizes)) // BLOCK * BLOCK)
         with disk(out, size):
-            faults += [f"full at {share:.0%}: {fault}" for fault in refused(folder, words, {})]
+            if share == 0.0:
+                with suppress(OSError):
+                    (out / FILLED).write_bytes(bytes(size + BLOCK))
+            before = digests(out)
+            faults += [f"full at {share:.0%}: {fault}" for fault in refused(folder, words, before)]
+            (out / FILLED).unlink(missing_ok=True)
             subprocess.run(["mount", "-o", f"remount,size={ROOM}", str(out)], check=True)
             completed(folder, words)
             if digests(out) != right:
