@@ -21,6 +21,8 @@ from soilml.cli.process import StopSignals
 from soilml.io import swap
 from soilml.io.atomic_files import atomic_outputs
 folder, number, after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+if number != signal.SIGKILL:
+    signal.signal(number, signal.SIG_DFL)  # nohup, or a shell's background, ignores some
 replace, done = Path.replace, []
 def replace_and_signal(part, target):
     if len(done) == after:
