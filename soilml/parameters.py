@@ -142,7 +142,7 @@ def check(tree: Any, where: str = "") -> None:
     for path, (parameter, value) in located(tree).items():
         if type(value) is float and parameter.lower <= value <= parameter.upper:
             continue
-        numbers = _numbers(where + path, value)
+        numbers = as_numbers(where + path, value)
         bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
         if np.any(bad):
             worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
@@ -153,7 +153,7 @@ def check(tree: Any, where: str = "") -> None:
             )
 
 
-def _numbers(path: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+def as_numbers(path: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """The value as numbers; raises `InputError` for text, ragged lists and masked arrays."""
     try:
         if not isinstance(value, str | bytes | np.ma.MaskedArray):

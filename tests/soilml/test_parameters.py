@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Model, Operating, Wheel, soil
+from soilml import EFFECTS, Model, Operating, Track, Wheel, soil
 from soilml.errors import InputError
 
 SAND, WHEEL = soil("wong1989/dry_sand"), Model(Wheel(radius=0.15, width=0.12))
@@ -20,6 +20,7 @@ def test_what_is_no_number_is_named_in_one_line(value):
         "cohesion": lambda: WHEEL(replace(SAND, cohesion=value), at),
         "n1": lambda: (WHEEL + EFFECTS["slip-sinkage"](n1=value))(SAND, at),
         "radius": lambda: Model(Wheel(radius=value, width=0.12))(SAND, at),
+        "base": lambda: Model(Track(radius=0.1, width=0.1, base=value))(SAND, at),
     }
     for name, call in tries.items():
         with pytest.raises(InputError, match=f"{name} is .*; needed is a number") as raised:

@@ -223,6 +223,8 @@ def _why_not(
         return rests
     if stop - start < settings.shortest:
         return f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
+    if not rows.any():
+        return "there are no samples"
     for name in ("slip", "load"):
         if name in quantities and np.mean(~np.isfinite(quantities[name][rows])) > _MISSING:
             missing = np.mean(~np.isfinite(quantities[name][rows]))

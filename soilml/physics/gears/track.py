@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, final
 
 import numpy as np
 
-from soilml.arrays import Array, Real, namespace, to_numpy
+from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
-from soilml.parameters import Parameter
+from soilml.parameters import Parameter, as_numbers
 from soilml.physics.contact import Contact
 from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.rigid_wheel import SMALLEST_DIVISOR
@@ -70,12 +70,12 @@ class Track:
     ] = 0.5
 
     def __post_init__(self) -> None:
-        room = to_numpy(self.base) - 2.0 * to_numpy(self.radius)
-        if np.any(room <= 0.0):
+        base, radius = as_numbers("base", self.base), as_numbers("radius", self.radius)
+        if np.any(0.5 * base <= radius):
             raise InputError(
-                f"base is {float(np.min(to_numpy(self.base))):g} m with wheels of radius "
-                f"{float(np.max(to_numpy(self.radius))):g} m; it must be above twice the radius, "
-                "or the wheels touch"
+                f"base is {float(np.min(base)):g} m with wheels of radius "
+                f"{float(np.max(radius)):g} m; it must be above twice the radius, or the wheels "
+                "touch"
             )
 
     def largest_sinkage(self) -> Real:
