@@ -44,9 +44,8 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     sets = SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None
     if sets is not None:
         _check_set(sets)
-    scales = {entry["scale"] for entry in outputs if "scale" in entry}
-    if not scales <= (set() if sets is None else sets.context_ranges.keys()):
-        raise ValueError("outputs: a scale that is no context input")
+    if not all(is_plain_name(entry["scale"]) for entry in outputs if "scale" in entry):
+        raise ValueError("outputs: a scale that is no plain text")
     per_row = tuple(entry["name"] for entry in outputs if entry.get("per_row", False))
     alone = sets is not None and sets.sets_only  # without estimates of single rows
     if pooling.single_row_coverage_factor.size != len(outputs) and not alone:
