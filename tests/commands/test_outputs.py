@@ -237,3 +237,19 @@ def test_a_link_into_a_missing_folder_names_that_folder(folder, capsys):
         main(["simulate", "model.toml", "--slip", "0.3", "--load", "60", "--out", "link.csv"]) == 2
     )
     assert f"the folder {folder / 'nowhere'} does not exist" in capsys.readouterr().err
+
+
+def test_a_column_without_a_name_is_shown_as_such(folder, capsys):
+    refused(["identify", "model.toml", "runs.csv", "--by", ""], capsys, "column '' is missing")
+
+
+def test_a_name_that_is_not_utf_8_is_to_be_renamed(folder, capsys):
+    """No setting of the output helps it."""
+    runs = os.fsdecode(b"bad\xff.csv")
+    try:
+        Path(runs).write_text(RUNS)
+    except OSError:
+        pytest.skip("the file system takes no such name")
+    assert main(["gap", "model.toml", runs, "--out", "found"]) == 2
+    said = capsys.readouterr().err
+    assert "rename it" in said and "PYTHONIOENCODING" not in said
