@@ -12,17 +12,12 @@ from soilml.identification.data.observations import Channel, Observations
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
-from soilml.identification.free_parameters import (
-    FreeParameter,
-    _wide_prior,
-    select_free,
-    values_at,
-)
+from soilml.identification.free_parameters import FreeParameter, select_free, values_at
 from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.numerics.sampling.importance_sampling import ImportanceSample
-from soilml.parameters import Parameter, declared
+from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 
@@ -303,12 +298,3 @@ def test_methods_are_checked_before_anything_is_read(case):
     several = replace(case, gears={"a": case.model})
     with pytest.raises(InputError, match="newton method is for one gear"):
         identify(several, table, method="newton")
-
-
-def test_a_parameter_without_prior_has_its_bounds_or_decades_about_its_value():
-    wide = Parameter("m", 0.0, 1.0, "")
-    found = _wide_prior(wide, 0.005)
-    assert (found.lower, found.upper) == pytest.approx((0.005 / 30.0, 0.15)) and found.log
-    for nominal in (0.0, 0.02):  # within a hundredth of the upper bound
-        found = _wide_prior(wide, nominal)
-        assert (found.lower, found.upper, found.log) == (0.0, 1.0, False)

@@ -7,13 +7,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.features import (
-    as_numbers,
-    compute_features,
-    flatten_readings,
-    parts_of_rows,
-    without_copies,
-)
+from soilml.onboard.features import compute_features, flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
     PoolingRule,
@@ -303,20 +297,3 @@ def test_an_estimate_draws_a_panel_for_each_quantity():
     assert [ax.get_title(loc="left") or ax.get_xlabel() or ax.get_ylabel() for ax in axes]
     words = [" ".join(t.get_text() for t in ax.findobj() if hasattr(t, "get_text")) for ax in axes]
     assert len(axes) == 2 and "a" in words[0].split() and "b" in words[1].split()
-
-
-@pytest.mark.parametrize(("count", "sizes"), [(0, [0]), (4, [4]), (5, [4, 1]), (8, [4, 4])])
-def test_rows_are_fed_in_parts(count, sizes):
-    rows = {"slip": np.arange(count), "load": -np.arange(count)}
-    parts = list(parts_of_rows(rows, 4))
-    assert [len(part["slip"]) for part in parts] == sizes
-    for name, values in rows.items():
-        assert np.concatenate([part[name] for part in parts]).tolist() == values.tolist()
-
-
-def test_a_wrong_argument_is_shown_in_forty_characters():
-    with pytest.raises(InputError, match=r"^slip is 'a{39}\.\.\.; needed is a number") as raised:
-        as_numbers("slip", "a" * 9000)
-    assert len(str(raised.value)) < 100
-    with pytest.raises(InputError, match=r"^slip is 'much'; needed"):
-        as_numbers("slip", "much")
