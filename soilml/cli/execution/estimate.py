@@ -223,7 +223,7 @@ def _estimates_of_runs(
 ) -> tuple[NDArray[np.int64], Estimate]:
     """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
     in_range = np.zeros(len(readings), dtype=np.int64)
-    twice = 2 * sum(len(one["slip"]) for one in readings)
+    twice = 2 * sum(len(next(iter(one.values()))) for one in readings)
     with row_progress(f"estimating by {by}", estimator, twice) as counted:
 
         def estimates() -> Iterator[Estimate]:
