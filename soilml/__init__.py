@@ -6,12 +6,7 @@ Effects of the catalogue (`soilml.physics.effects`) can be imported from here to
 
 from __future__ import annotations
 
-import sys
-import warnings
-from collections.abc import Sequence
 from importlib import import_module
-from importlib.machinery import ModuleSpec
-from types import ModuleType
 
 TYPE_CHECKING = False  # typing takes longer to import than all this; type checkers read it as true
 if TYPE_CHECKING:
@@ -48,47 +43,6 @@ _HOME = {
     "soil_catalogue": "soilml.physics.soils",
     "Status": "soilml.row_status",
 }
-
-#: import path that users of an earlier layout have in their files -> where it is now
-_FORMER_PATHS = {
-    "soilml.case": "soilml.config.case",
-    "soilml.effects": "soilml.physics.effects",
-    "soilml.effects.base": "soilml.physics.effects.base",
-    "soilml.estimate": "soilml.onboard.estimate",
-    "soilml.gears": "soilml.physics.gears",
-    "soilml.model": "soilml.physics.model",
-    "soilml.operating": "soilml.physics.operating_point",
-    "soilml.reading": "soilml.io.read_table",
-    "soilml.soils": "soilml.physics.soils",
-    "soilml.table": "soilml.io.table",
-}
-
-
-class _FormerPaths:
-    """Imports a module by its former path, with a warning that names the present one.
-
-    A finder and loader without the base classes of `importlib.abc`, whose import takes longer than
-    everything else here.
-    """
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        loader: Any = self
-        return ModuleSpec(name, loader) if name in _FORMER_PATHS else None
-
-    def create_module(self, spec: ModuleSpec) -> None:
-        """The module is created as usual."""
-
-    def exec_module(self, module: ModuleType) -> None:
-        former = module.__name__
-        present = _FORMER_PATHS[former]
-        warnings.warn(f"{former} has moved to {present}", DeprecationWarning, stacklevel=2)
-        sys.modules[former] = import_module(present)
-
-
-# before the usual finders, which would load a second copy of a module below a moved package
-sys.meta_path.insert(0, _FormerPaths())
 
 
 def __getattr__(name: str) -> Any:

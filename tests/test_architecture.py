@@ -2,7 +2,6 @@
 
 import ast
 import re
-import statistics
 import subprocess
 import sys
 import tomllib
@@ -82,12 +81,12 @@ def test_what_flies_imports_only_what_the_board_has(file):
     assert at_top - set(sys.stdlib_module_names) - {"soilml"} <= BOARD | server
 
 
-def test_files_are_short_and_say_what_they_are():
-    lengths = {f: len(f.read_text().splitlines()) for f in FILES}
-    assert statistics.median(lengths.values()) <= 120
-    assert max(lengths.values()) <= 300
+def test_files_are_read_at_a_sitting_and_say_what_they_are():
+    """One subject a file: usually 80 to 400 lines."""
     for file in FILES:
-        assert ast.get_docstring(ast.parse(file.read_text())), file
+        text = file.read_text()
+        assert len(text.splitlines()) <= 400, file
+        assert ast.get_docstring(ast.parse(text)), file
         assert file.stem not in ("utils", "common", "helpers", "core", "manager"), file
 
 
@@ -145,37 +144,6 @@ def test_every_public_name_can_be_had():
         _ = soilml.nonsense
 
 
-def test_former_import_paths_lead_to_the_same_module():
-    code = """
-import warnings
-warnings.simplefilter("error")
-import soilml
-warnings.simplefilter("ignore")
-from soilml.effects.base import EffectCard
-from soilml.effects import SlipSinkage
-import soilml.case
-import sys
-assert EffectCard is soilml.EffectCard and SlipSinkage is soilml.SlipSinkage
-for former, present in soilml._FORMER_PATHS.items():
-    __import__(former)
-    __import__(present)
-    assert sys.modules[former] is sys.modules[present], former
-print("same")
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
-    )
-    assert done.stdout == "same\n", done.stderr
-
-
-def test_a_former_import_path_names_the_present_one():
-    code = "import warnings; warnings.simplefilter('error'); import soilml.effects.base"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
-    )
-    assert "has moved to soilml.physics.effects" in done.stderr
-
-
 def test_pinned_versions_cover_every_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     pinned = {
@@ -194,13 +162,6 @@ def test_layout_page_names_every_room():
     page = (ROOT / "ARCHITECTURE.md").read_text()
     for room in sorted({file.parent.relative_to(ROOT) for file in FILES}):
         assert f"{room}/" in page, f"ARCHITECTURE.md does not name {room}/"
-
-
-def test_rooms_hold_a_handful_of_modules():
-    """At most nine at the top of a package, at most fourteen in a room."""
-    for room in {file.parent for file in FILES}:
-        modules = [f for f in room.glob("*.py") if f.name != "__init__.py"]
-        assert len(modules) <= (9 if room.parent == ROOT else 14), room
 
 
 def test_no_two_test_files_share_a_name():
