@@ -18,9 +18,9 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.candidate_rows import SLIPS
-from soilml.identification.data.observations import read_observations
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 
 LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)

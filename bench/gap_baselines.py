@@ -9,10 +9,10 @@ from importlib.util import find_spec
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.fitting.coordinates import linearise, predict_readings, soil_coordinate
+from soilml.fitting.coordinates import linearise, predict_readings, soil_coordinate
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.readings import stack_readings
 from soilml.gap.statistics.signatures import effect_signatures
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import column

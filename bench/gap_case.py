@@ -15,8 +15,8 @@ from gap_separation import separation
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.factorial_plan import Plan
 from soilml.config.case import Case, read_case
+from soilml.fitting.operating_points import operating_points
 from soilml.gap import GapReport, gap
-from soilml.identification.data.operating_points import operating_points
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating

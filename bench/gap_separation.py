@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings, stack_readings
-from soilml.gap.fitting.coordinates import linearise, soil_coordinate
+from soilml.fitting.coordinates import linearise, soil_coordinate
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.readings import Readings, stack_readings
 from soilml.gap.statistics.reml_covariance import RUN_EFFECT_UNITS, run_effect_columns
 from soilml.gap.statistics.signatures import effect_signatures
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.numerics.subspaces import project_out
 from soilml.physics.effects import EFFECTS, Effect
@@ -73,7 +73,7 @@ def _own_signatures(
     causes: dict[str, Any],
     columns: dict[str, np.ndarray],
     truth: dict[str, Any],
-    readings: StackedReadings,
+    readings: Readings,
 ) -> dict[str, np.ndarray]:
     """The change of the readings by each cause: as simulated, or by the effects if several act."""
     if len(causes) == 1:
@@ -88,7 +88,7 @@ def _own_signatures(
     return {name: size * columns.get(name, none) for name in causes}
 
 
-def _covariance(case: Case, truth: dict[str, Any], readings: StackedReadings) -> np.ndarray:
+def _covariance(case: Case, truth: dict[str, Any], readings: Readings) -> np.ndarray:
     """Noise, run-to-run scatter, and a smooth discrepancy of the true size; (m, m)."""
     covariance = np.diag(readings.std**2)
     scatter = truth["scatter_std"]

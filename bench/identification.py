@@ -15,8 +15,8 @@ from datagen.recipe import read_recipe
 from soilml import Operating, identify
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import select_free
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample

@@ -19,7 +19,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
     "soilml/io/table.py": {"pyarrow"},
-    "soilml/identification/descent.py": {"scipy"},
+    "soilml/fitting/descent.py": {"scipy"},
     "soilml/gap/statistics/evidence.py": {"scipy"},
     "soilml/gap/statistics/mixture_interval.py": {"scipy"},
     "soilml/numerics/sobol_points.py": {"scipy"},

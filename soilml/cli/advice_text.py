@@ -22,9 +22,9 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.messages import next_row_messages
-from soilml.identification.data.observations import read_observations
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.physics.operating_point import COVARIATES, Operating

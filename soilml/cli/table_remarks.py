@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from soilml.cli.output import tell
 from soilml.config.case import Case
-from soilml.identification.data.rover_rows import with_rover_columns
+from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_hints
 

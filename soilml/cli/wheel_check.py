@@ -10,8 +10,7 @@ from itertools import chain
 import numpy as np
 
 from soilml.config.case import Case, read_case_of_one_gear
-from soilml.errors import InputError, TableError
-from soilml.identification.compatibility import (
+from soilml.config.compatibility import (
     check_wheel_columns,
     effect_differences,
     gear_differences,
@@ -19,7 +18,8 @@ from soilml.identification.compatibility import (
     recipe_case,
     value_differences,
 )
-from soilml.identification.data.soil_test_remarks import ignored_soil_tests
+from soilml.errors import InputError, TableError
+from soilml.fitting.soil_test_remarks import ignored_soil_tests
 from soilml.identification.trained_estimator import (
     condition_on_case,
     narrower_priors,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.identification.data.levels import rows_driven_alike
+from soilml.fitting.levels import rows_driven_alike
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
 

@@ -11,8 +11,8 @@ from soilml.config.case import Case
 from soilml.config.model_discrepancy import range_with_zero
 from soilml.errors import InputError
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.identification.data.observations import LEAST_RELATIVE_STD
-from soilml.identification.predictions import predict_channels, propagated_input_noise
+from soilml.fitting.channel_predictions import predict_channels, propagated_input_noise
+from soilml.fitting.observations import LEAST_RELATIVE_STD
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 

@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.config.compatibility import check_wheel_size
 from soilml.errors import InputError
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
+from soilml.fitting.readings import (
+    Readings,
+    check_size,
+    stack_readings,
+)
+from soilml.fitting.rover_rows import with_rover_columns
 from soilml.gap.data.candidate_effects import candidate_effects, effect_names
 from soilml.gap.data.checks import (
     DataCheckResult,
@@ -16,13 +25,7 @@ from soilml.gap.data.checks import (
     estimate_repeat_noise,
     without_duplicate_rows,
 )
-from soilml.gap.data.free_soil import fixed_parameters, free_soil_parameters
 from soilml.gap.data.holdout import HoldoutSplit, split_holdout
-from soilml.gap.data.stacked_readings import (
-    StackedReadings,
-    check_size,
-    stack_readings,
-)
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_costs import check_costs, rank_by_cost
 from soilml.gap.messages import unsupported_conclusions, verdict_sentence
@@ -66,9 +69,6 @@ from soilml.gap.verdict.report_entries import (
 )
 from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import updated_case
-from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.rover_rows import with_rover_columns
-from soilml.identification.free_parameters import FreeParameter
 from soilml.io.rows import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.unsolvable import solvable
@@ -207,7 +207,7 @@ def _build_report(
     checks: DataCheckResult,
     free: Sequence[FreeParameter],
     split: HoldoutSplit,
-    held_out: StackedReadings | None,
+    held_out: Readings | None,
     seed: int,
 ) -> GapReport:
     """Decide the status and collect the entries of the report."""

@@ -13,17 +13,17 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
-from soilml.identification.data.observations import Observations, read_observations
-from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
-from soilml.identification.discrepancy import ignored_discrepancy, included_discrepancy
+from soilml.fitting.declared_discrepancy import ignored_discrepancy, included_discrepancy
+from soilml.fitting.free_parameters import FreeParameter, select_free
+from soilml.fitting.observations import Observations, read_observations
+from soilml.fitting.shared_errors_sizes import included_bias, usual_errors
+from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
+from soilml.identification.condensed_rows import condensed
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import FreeParameter, select_free
 from soilml.identification.linear import linear
-from soilml.identification.many_rows.condensed_rows import condensed
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
-from soilml.identification.shared_errors.sizes import included_bias, usual_errors
 from soilml.io.rows import Rows, as_table
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.unsolvable import solvable
@@ -69,7 +69,7 @@ def identify(
         A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
     as_usual
         Whether sensors and model have the errors that they usually have
-        (`soilml.identification.shared_errors.sizes`), beside those that the case declares; for
+        (`soilml.fitting.shared_errors_sizes`), beside those that the case declares; for
         `nonlinear` and `posterior`. Otherwise the model is right, but for its [discrepancy], and
         sensors have the errors of [noise] and [bias] alone.
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.levels import is_one_load
-from soilml.identification.data.observations import Observations
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.levels import is_one_load
+from soilml.fitting.observations import Observations
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import FreeParameter
 from soilml.parameters import unit_text
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, column
 

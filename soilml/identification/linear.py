@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.levels import is_one_load
-from soilml.identification.data.observations import Channel, Observations
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.levels import is_one_load
+from soilml.fitting.observations import Channel, Observations
 from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
-from soilml.identification.free_parameters import FreeParameter
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import LinearWheel

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.observations import Observations
-from soilml.identification.fit_result import Fit
-from soilml.identification.fixed_parameter import with_fixed_parameter
-from soilml.identification.free_parameters import FreeParameter, values_at
-from soilml.identification.predictions import (
+from soilml.fitting.channel_predictions import (
     predict_channels,
     stack_channels,
     stacked_readings,
 )
+from soilml.fitting.free_parameters import FreeParameter, values_at
+from soilml.fitting.observations import Observations
+from soilml.identification.fit_result import Fit
+from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil

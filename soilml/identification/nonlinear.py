@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.observations import Observations
-from soilml.identification.descent import LeastSquaresProblem, Optimum, descend, global_optimum
+from soilml.fitting.channel_predictions import stacked_readings
+from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
+from soilml.fitting.descent import LeastSquaresProblem, Optimum, descend, global_optimum
+from soilml.fitting.free_parameters import FreeParameter, values_at
+from soilml.fitting.observations import Observations
+from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
+from soilml.fitting.shared_errors_sensor_columns import sensor_columns
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
-from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import FreeParameter, values_at
-from soilml.identification.predictions import stacked_readings
-from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
-from soilml.identification.shared_errors.sensor_columns import sensor_columns
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]

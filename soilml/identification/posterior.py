@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.observations import Observations
-from soilml.identification.descent import Optimum
+from soilml.fitting.descent import Optimum
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Observations
 from soilml.identification.diagnostics import with_warnings
 from soilml.identification.fit_result import Fit
-from soilml.identification.free_parameters import FreeParameter
+from soilml.identification.joint_sample import joint_sample, most_probable
 from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.shared_errors.joint_sample import joint_sample, most_probable
 from soilml.numerics.chi_squared import chi_squared_quantile
 from soilml.numerics.sampling.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.observations import Observations
-from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
-from soilml.identification.free_parameters import FreeParameter, soil_test_deviations
-from soilml.identification.predictions import (
+from soilml.fitting.channel_predictions import (
     noise_at_prediction,
     predict_channels,
     propagated_input_noise,
     stack_channels,
     stacked_readings,
 )
-from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
-from soilml.identification.shared_errors.sensor_columns import sensor_columns
-from soilml.numerics.noise_and_process import squared_residuals_and_log_determinant
+from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
+from soilml.fitting.free_parameters import FreeParameter, soil_test_deviations
+from soilml.fitting.noise_and_process import squared_residuals_and_log_determinant
+from soilml.fitting.observations import Observations
+from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
+from soilml.fitting.shared_errors_sensor_columns import sensor_columns
 from soilml.numerics.sampling.importance_sampling import ImportanceSample
 from soilml.quantities import column
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import select_free
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.io.table import Table
 from soilml.numerics.quantile_band import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from soilml.config.case import Case
-from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.observations import read_observations
+from soilml.config.compatibility import check_wheel_size
+from soilml.fitting.free_parameters import FreeParameter, select_free
+from soilml.fitting.observations import read_observations
+from soilml.fitting.shared_errors_sizes import usual_errors
 from soilml.identification.diagnostics import EXCESS_RESIDUALS
-from soilml.identification.free_parameters import FreeParameter, select_free
-from soilml.identification.shared_errors.sizes import usual_errors
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.traction.onboard_draws import onboard_draws

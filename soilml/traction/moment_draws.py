@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.identification.free_parameters import FreeParameter
+from soilml.fitting.free_parameters import FreeParameter
 from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.resampling import systematic_resampling
 from soilml.numerics.sampling.importance_sampling import importance_sample

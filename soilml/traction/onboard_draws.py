@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.errors import FitError, InputError
-from soilml.identification.compatibility import (
+from soilml.config.compatibility import (
     effect_differences,
     gear_differences,
     recipe_case,
     value_differences,
 )
-from soilml.identification.data.soil_test_remarks import ignored_soil_tests
-from soilml.identification.discrepancy import ignored_discrepancy
-from soilml.identification.free_parameters import FreeParameter
+from soilml.errors import FitError, InputError
+from soilml.fitting.declared_discrepancy import ignored_discrepancy
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.soil_test_remarks import ignored_soil_tests
 from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior

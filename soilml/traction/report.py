@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.operating_points import operating_points
+from soilml.fitting.operating_points import operating_points
 from soilml.io.rows import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES

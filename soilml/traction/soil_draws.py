@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.observations import Observations
-from soilml.identification.data.prior_fractions import prior_fractions
-from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.many_rows.condensed_rows import condensed
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Observations
+from soilml.identification.condensed_rows import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
+from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.resampling import systematic_resampling
 
 Floats = NDArray[np.float64]

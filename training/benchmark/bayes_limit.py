@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from datagen.engines.processes import process_map
 from datagen.recipe import Recipe
 from soilml.config.case import Case
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import select_free
+from soilml.fitting.channel_predictions import stacked_readings
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.identification.posterior import misfit_limit
-from soilml.identification.predictions import stacked_readings
 from soilml.io.table import Table
 from soilml.numerics.resampling import systematic_resampling
 from soilml.numerics.sampling.importance_sampling import importance_sample

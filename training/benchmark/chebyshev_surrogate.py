@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.data.observations import Observations
-from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.predictions import predict_channels
+from soilml.fitting.channel_predictions import predict_channels
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Observations
 
 Floats = NDArray[np.float64]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from soilml.config.case import Case
-from soilml.errors import InputError
-from soilml.identification.compatibility import (
+from soilml.config.compatibility import (
     effect_differences,
     gear_differences,
     prior_differences,
     recipe_case,
     value_differences,
 )
+from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 

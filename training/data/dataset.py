@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
+from soilml.config.compatibility import recipe_content
 from soilml.config.units import text_in_si
 from soilml.errors import InputError, TableError
-from soilml.identification.compatibility import recipe_content
 from soilml.io.read_table import read_table
 from soilml.onboard.features import compute_features, inputs_of
 from soilml.physics.effects import EFFECTS

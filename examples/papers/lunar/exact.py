@@ -6,8 +6,8 @@ import numpy as np
 from lunar.sweep import Floats, table
 
 from soilml import Case
+from soilml.fitting.free_parameters import select_free
 from soilml.identification import read_observations
-from soilml.identification.free_parameters import select_free
 from soilml.identification.posterior import sample_posterior
 
 

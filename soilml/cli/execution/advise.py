@@ -29,8 +29,8 @@ from soilml.experiment_design import (
 )
 from soilml.experiment_design.candidate_rows import channel_label
 from soilml.experiment_design.messages import next_row_messages
-from soilml.identification.data.observations import Observations, read_observations
-from soilml.identification.free_parameters import select_free
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import Observations, read_observations
 from soilml.io.read_table import RUNS
 from soilml.optional_imports import need
 from soilml.quantities import column

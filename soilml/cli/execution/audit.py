@@ -11,7 +11,7 @@ from soilml.cli.output import json_text, show, tell
 from soilml.cli.progress import working
 from soilml.cli.table_reading import read_long_table
 from soilml.config.case import read_case
-from soilml.identification.discrepancy import ignored_discrepancy
+from soilml.fitting.declared_discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import save_text
 from soilml.io.text_tables import format_table
 from soilml.report.terminal import shown_unit, significant

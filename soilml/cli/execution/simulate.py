@@ -14,7 +14,7 @@ from soilml.cli.output import write_columns
 from soilml.cli.progress import progress_bar
 from soilml.config.case import Case, read_case_of_one_gear
 from soilml.errors import InputError
-from soilml.identification.discrepancy import ignored_discrepancy
+from soilml.fitting.declared_discrepancy import ignored_discrepancy
 from soilml.io.table import fault_of_text
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating

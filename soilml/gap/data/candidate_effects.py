@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.identification.compatibility import SIZE_TOLERANCE
+from soilml.config.compatibility import SIZE_TOLERANCE
 from soilml.physics.effects.base import Effect
 
 

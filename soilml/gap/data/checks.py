@@ -12,8 +12,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.data.observations import LEAST_RELATIVE_STD
+from soilml.fitting.observations import LEAST_RELATIVE_STD
+from soilml.fitting.readings import Readings
 from soilml.io.table import Table
 from soilml.quantities import column
 
@@ -41,7 +41,7 @@ class DataCheckResult:
 class CheckedData:
     """What the checks look at; `parameters` is the number of free soil parameters."""
 
-    readings: StackedReadings
+    readings: Readings
     rows: int
     duplicate_rows: int
     parameters: int
@@ -59,7 +59,7 @@ Finding = tuple[Severity, str]
 
 
 def check_readings(
-    readings: StackedReadings, table: Table, duplicate_rows: int, parameters: int
+    readings: Readings, table: Table, duplicate_rows: int, parameters: int
 ) -> DataCheckResult:
     """Run all data checks.
 
@@ -154,7 +154,7 @@ def without_duplicate_rows(table: Table) -> tuple[Table, int]:
     return (table, 0) if kept.size == len(table) else (table.rows(kept), len(table) - kept.size)
 
 
-def estimate_repeat_noise(readings: StackedReadings) -> tuple[dict[str, float], list[str]]:
+def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[str]]:
     """Noise of the channels without declared noise, from repeated rows, and notes about it."""
     noise, notes = {}, []
     for i, name in enumerate(readings.channels):

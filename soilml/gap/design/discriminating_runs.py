@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.data.candidate_effects import effect_names
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
-from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
-from soilml.gap.fitting.batched_predictions import (
+from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.fitting.coordinates import EffectCoordinate
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.readings import Readings
+from soilml.gap.data.candidate_effects import effect_names
+from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
+from soilml.gap.design.run_options import RunOption, run_options
+from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.report_parts import NextRun
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.problem import FitProblem
@@ -91,12 +91,12 @@ def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list
     return sorted(useful, key=lambda run: -run.discrimination)
 
 
-def _effects_of(fits: Iterable[GapFit]) -> list[str]:
+def _effects_of(fits: Iterable[Solution]) -> list[str]:
     """The effects of some fits, sorted."""
     return sorted({name for fit in fits for name in effect_names(fit.case)})
 
 
-def _with_gear(fit: GapFit, option: RunOption) -> GapFit:
+def _with_gear(fit: Solution, option: RunOption) -> Solution:
     """The fit on the gear of a run; coordinates of effects that the gear has not are dropped."""
     if option.gear is None:
         return fit
@@ -107,7 +107,7 @@ def _with_gear(fit: GapFit, option: RunOption) -> GapFit:
     return replace(fit, case=case, coordinates=coordinates, x=fit.x[kept])
 
 
-def _all_columns(fit: GapFit, difference: Difference, changed: GapFit) -> Difference:
+def _all_columns(fit: Solution, difference: Difference, changed: Solution) -> Difference:
     """The difference with the Jacobian of all coordinates of a fit: 0 for those dropped."""
     paths = [c.path for c in fit.coordinates]
     jacobian = np.zeros((len(difference[0]), len(paths)))
@@ -115,9 +115,7 @@ def _all_columns(fit: GapFit, difference: Difference, changed: GapFit) -> Differ
     return difference[0], jacobian
 
 
-def _predictions(
-    option: RunOption, readings: StackedReadings, fits: Mapping[str, GapFit]
-) -> Floats:
+def _predictions(option: RunOption, readings: Readings, fits: Mapping[str, Solution]) -> Floats:
     """Predictions (1 or 2, fits, m) of a run, and of the run driven as usual where that differs."""
     ways = [option.at] if option.plain is None else [option.at, option.plain]
     requests = [
@@ -134,7 +132,7 @@ def _predictions(
     return predicted.reshape(len(ways), len(fits), len(readings))
 
 
-def _is_plain_repeat(readings: StackedReadings, y: Floats) -> bool:
+def _is_plain_repeat(readings: Readings, y: Floats) -> bool:
     """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
     return len(y) > 1 and not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
 
@@ -157,7 +155,7 @@ def _without_equal_rows(runs: Sequence[NextRun]) -> list[NextRun]:
 
 
 def _static_proposals(
-    fits: Mapping[str, GapFit], present: Sequence[Difference], effects: Sequence[type[Effect]]
+    fits: Mapping[str, Solution], present: Sequence[Difference], effects: Sequence[type[Effect]]
 ) -> list[NextRun]:
     """Checks of the sensors, and tests of the soil where an explanation concerns the soil."""
     first, *rivals = fits.values()
@@ -187,7 +185,7 @@ def _static_proposals(
 
 
 def _soil_difference(
-    first: GapFit, rival: GapFit, after: Mapping[str, tuple[float, bool]]
+    first: Solution, rival: Solution, after: Mapping[str, tuple[float, bool]]
 ) -> Difference:
     """Whitened difference of two explanations in the soil parameters that a test determines."""
     own, others = first.values(), rival.values()
@@ -207,7 +205,7 @@ def _mean_capped(sigmas: Sequence[float]) -> float:
 
 
 def _differences(
-    fits: Mapping[str, GapFit], readings: StackedReadings, whiten: Floats, expected: Floats
+    fits: Mapping[str, Solution], readings: Readings, whiten: Floats, expected: Floats
 ) -> list[Difference]:
     """How the first explanation, which predicts `expected`, differs from each of the others."""
     _, *rivals = (
@@ -218,13 +216,13 @@ def _differences(
     return [(whiten @ (expected - one.prediction), whiten @ one.jacobian) for one in linear]
 
 
-def _discrimination(rival: GapFit, present: Difference, new: Difference) -> float:
+def _discrimination(rival: Solution, present: Difference, new: Difference) -> float:
     """Sigma that new rows add between an explanation and a rival adapted to all rows."""
     increase = _adapted_misfit(rival, [present, new]) - _adapted_misfit(rival, [present])
     return float(np.sqrt(max(increase, 0.0)))
 
 
-def _adapted_misfit(rival: GapFit, parts: Sequence[Difference]) -> float:
+def _adapted_misfit(rival: Solution, parts: Sequence[Difference]) -> float:
     """Squared sigma that remain after the rival has adapted its parameters.
 
     Priors and tests of the soil are included.
@@ -239,7 +237,7 @@ def _adapted_misfit(rival: GapFit, parts: Sequence[Difference]) -> float:
     return float(np.sum((difference - jacobian @ step) ** 2))
 
 
-def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, float]) -> float:
+def _check_discrimination(first: Solution, rival: Solution, std_after: dict[str, float]) -> float:
     """Sigma by which a check of the sensors would reject one of two explanations."""
     largest = 0.0
     for fit in (first, rival):
@@ -250,7 +248,7 @@ def _check_discrimination(first: GapFit, rival: GapFit, std_after: dict[str, flo
 
 
 def _rows(
-    readings: StackedReadings, predicted: Mapping[str, Floats], option: RunOption
+    readings: Readings, predicted: Mapping[str, Floats], option: RunOption
 ) -> tuple[dict[str, float | str], ...]:
     """Operating points and gear of a run with the prediction of each explanation."""
     rows = len(readings.run)

@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.coordinates import SoilCoordinate, linearise, soil_coordinate
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.readings import Readings
+from soilml.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap.data.candidate_effects import candidate_effects
-from soilml.gap.data.stacked_readings import StackedReadings
 from soilml.gap.design.effect_identifiability import (
     NAMEABLE_SIGMA,
     EffectIdentifiability,
@@ -22,10 +25,7 @@ from soilml.gap.design.effect_identifiability import (
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.fitting.coordinates import SoilCoordinate, linearise, soil_coordinate
-from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap.statistics.signatures import Signature, effect_signatures
-from soilml.identification.free_parameters import select_free
 from soilml.io.rows import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
@@ -212,7 +212,7 @@ def audit(
 
 def _with_added_run(
     case: Case,
-    readings: StackedReadings,
+    readings: Readings,
     option: RunOption,
     coordinates: Sequence[SoilCoordinate],
     x: Floats,

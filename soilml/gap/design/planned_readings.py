@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.compatibility import check_wheel_size
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings, positive_std
-from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.operating_points import operating_points
-from soilml.identification.data.rover_rows import with_rover_columns
-from soilml.identification.predictions import forces
+from soilml.fitting.channel_predictions import forces
+from soilml.fitting.operating_points import operating_points
+from soilml.fitting.readings import Readings, positive_std
+from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 
 
-def planned_readings(case: Case, design: Table) -> StackedReadings:
+def planned_readings(case: Case, design: Table) -> Readings:
     """The readings that a case expects of a design, in the channels with declared noise."""
     design = with_rover_columns(case, design)
     check_wheel_size(case, design)
@@ -48,7 +48,7 @@ def planned_readings(case: Case, design: Table) -> StackedReadings:
         raise InputError("no channel has declared noise: give [noise] in the model file")
     rows, channels = len(design), len(names)
     runs, number = np.unique(design["run"], return_inverse=True)
-    return StackedReadings(
+    return Readings(
         at=at,
         run=number.astype(np.int64),
         runs=tuple(str(r) for r in runs),
@@ -62,9 +62,7 @@ def planned_readings(case: Case, design: Table) -> StackedReadings:
     )
 
 
-def expected_readings(
-    at: Operating, like: StackedReadings, case: Case, run: str = "next"
-) -> StackedReadings:
+def expected_readings(at: Operating, like: Readings, case: Case, run: str = "next") -> Readings:
     """The readings that a case expects of rows, in the channels and with the noise of `like`."""
     rows, channels = np.asarray(at.slip).size, len(like.channels)
     row = np.tile(np.arange(rows), channels)
@@ -80,7 +78,7 @@ def expected_readings(
         present = like.std[like.channel == i]
         typical = float(np.median(present)) if present.size else np.nan
         std[in_channel] = typical if noise is None else noise.std(reading[in_channel])
-    return StackedReadings(
+    return Readings(
         at=at,
         run=np.zeros(rows, dtype=np.int64),
         runs=(run,),
@@ -94,7 +92,7 @@ def expected_readings(
     )
 
 
-def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedReadings:
+def joined_readings(first: Readings, second: Readings) -> Readings:
     """The readings of two sets of rows together; covariates that one of them lacks are usual."""
     sizes = len(first.run), len(second.run)
 
@@ -121,7 +119,7 @@ def joined_readings(first: StackedReadings, second: StackedReadings) -> StackedR
     )
 
 
-def _joined_gears(first: StackedReadings, second: StackedReadings) -> NDArray[np.str_] | None:
+def _joined_gears(first: Readings, second: Readings) -> NDArray[np.str_] | None:
     """The gears of two sets of rows together; None where both name none."""
     if first.at.gear is None and second.at.gear is None:
         return None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.fitting.readings import Readings
 from soilml.gap.design.gear_changes import GearChange, gear_changes
 from soilml.gap.design.planned_readings import USUAL_COVARIATES, carried_rows
 from soilml.physics.effects.base import Effect
@@ -52,7 +52,7 @@ class RunOption:
 
 
 def run_options(
-    readings: StackedReadings, case: Case, effects: Sequence[type[Effect]]
+    readings: Readings, case: Case, effects: Sequence[type[Effect]]
 ) -> Iterator[RunOption]:
     """Runs that differ from those driven, at rows that the soil of the case carries.
 
@@ -146,7 +146,7 @@ def _whole(load: float) -> float:
     return float(np.round(np.round(load / step) * step, 9))
 
 
-def _middle_load(readings: StackedReadings) -> float:
+def _middle_load(readings: Readings) -> float:
     """The driven load level that is closest to the mean in logarithms, N."""
     levels = readings.load_levels
     log_load = np.log(readings.load)
@@ -154,7 +154,7 @@ def _middle_load(readings: StackedReadings) -> float:
     return _whole(float(np.exp(centres[np.argmin(np.abs(centres - np.mean(log_load)))])))
 
 
-def _usual(readings: StackedReadings) -> dict[str, Any]:
+def _usual(readings: Readings) -> dict[str, Any]:
     """The covariates of a plain run as most rows were driven, forward and on the first pass."""
     usual = {}
     for field in USUAL_COVARIATES:

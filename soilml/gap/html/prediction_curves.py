@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.fitting.levels import load_levels
 from soilml.gap.report_parts import ReadingsAndPredictions
-from soilml.identification.data.levels import load_levels
 from soilml.quantities import Z_90
 from soilml.report.figure_style import (
     AFTER,

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.coordinates import EffectCoordinate, shape_coordinates
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.coordinates import EffectCoordinate, shape_coordinates
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
 from soilml.gap.search.problem import FitProblem, StartedFit
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
@@ -31,7 +31,7 @@ class CandidateFit:
     catalogue_law: MarginalFit
     free_law: MarginalFit
     #: where the catalogue's law explains most under noise alone, as another start of the free law
-    noise_only: GapFit | None = None
+    noise_only: Solution | None = None
 
     @property
     def shape_supported(self) -> bool:
@@ -44,7 +44,7 @@ class CandidateFit:
         return self.free_law if self.shape_supported else self.catalogue_law
 
     @property
-    def fit(self) -> GapFit:
+    def fit(self) -> Solution:
         """The optimum of larger evidence."""
         return self.best.fit
 
@@ -146,7 +146,7 @@ def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[
     return fitted
 
 
-def shape_directions(problem: FitProblem, fit: GapFit) -> list[Floats]:
+def shape_directions(problem: FitProblem, fit: Solution) -> list[Floats]:
     """Changes of the readings by second-order terms in the laws of a fit's effects, (m, k) each.
 
     The signature of each size times s^2, s w or w^2, with log slip s and log load w centred, in the

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.coordinates import soil_coordinate
-from soilml.gap.fitting.least_squares import GapFit
-from soilml.gap.fitting.operating_noise import noise_of_operation
+from soilml.fitting.coordinates import soil_coordinate
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.operating_noise import noise_of_operation
+from soilml.fitting.readings import Readings
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.residual_test import ResidualTest
@@ -29,7 +30,6 @@ from soilml.gap.statistics.reml_covariance import (
 from soilml.gap.statistics.score_test import ScoreTest
 from soilml.gap.statistics.signatures import Signature, effect_signatures
 from soilml.gap.statistics.smooth_basis import smooth_basis
-from soilml.identification.free_parameters import FreeParameter
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 
@@ -64,7 +64,7 @@ class Analysis:
 def analyse(
     case: Case,
     free: Sequence[FreeParameter],
-    readings: StackedReadings,
+    readings: Readings,
     effects: Mapping[str, type[Effect]],
     calibration: Mapping[str, float],
     seed: int,
@@ -113,7 +113,7 @@ def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float]
     return lambda share: progress((number + share) / MAX_PASSES)
 
 
-def _declared_covariance(readings: StackedReadings) -> Covariance:
+def _declared_covariance(readings: Readings) -> Covariance:
     """The declared noise alone."""
     components = VarianceComponents(np.ones(len(readings.channels)), 0.0, 0.0, 0.0)
     return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
@@ -133,8 +133,8 @@ def _have_converged(last: VarianceComponents, new: VarianceComponents) -> bool:
 
 def _reestimate_covariance(
     problem: FitProblem,
-    fit: GapFit,
-    readings: StackedReadings,
+    fit: Solution,
+    readings: Readings,
     signatures: Sequence[Signature],
 ) -> tuple[FitProblem, list[tuple[str, int]]]:
     """The problem with covariance estimated from a fit's residuals, outliers excluded.
@@ -188,7 +188,7 @@ def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> 
     return np.asarray(space @ weights)
 
 
-def _no_result(soil: GapFit) -> SearchResult:
+def _no_result(soil: Solution) -> SearchResult:
     """The result before any search: no candidates, and a test without scores."""
     no_test = ResidualTest((), ScoreTest(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0)))
     return SearchResult(soil, no_test, (), (), no_test, {}, Posterior({}))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.problem import FitProblem, StartedFit, fit_many
 from soilml.gap.statistics.evidence import Evidence
 
@@ -33,9 +33,9 @@ class MarginalFit:
     `first` is the fit under the amplitudes of the discrepancy that were started with.
     """
 
-    fit: GapFit
+    fit: Solution
     evidence: Evidence
-    first: GapFit | None = None
+    first: Solution | None = None
 
 
 def fit_marginal(

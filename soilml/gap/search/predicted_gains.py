@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
@@ -15,7 +15,7 @@ from soilml.numerics.subspaces import ROUNDING, project_out
 
 
 def predicted_with_and_without(
-    problem: FitProblem, none: CandidateFit, soil: GapFit, signatures: Sequence[Signature]
+    problem: FitProblem, none: CandidateFit, soil: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
 
@@ -51,7 +51,7 @@ def predicted_gains(
 
 
 def free_law_gains(
-    problem: FitProblem, candidate: CandidateFit, fit: GapFit, signatures: Sequence[Signature]
+    problem: FitProblem, candidate: CandidateFit, fit: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """Decrease of a fit's sum of squares by each effect with free shapes, linearised.
 
@@ -73,7 +73,7 @@ def free_law_gains(
 
 
 def noise_only_gains(
-    problem: FitProblem, fit: GapFit, signatures: Sequence[Signature]
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """Decrease of a fit's sum of squares by each effect under noise alone, linearised."""
     whiten = problem.covariance.whiten

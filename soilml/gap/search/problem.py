@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.coordinates import (
+from soilml.fitting.coordinates import (
+    Coordinate,
     EffectCoordinate,
-    FitCoordinate,
     SoilCoordinate,
     shape_coordinates,
     size_coordinate,
 )
-from soilml.gap.fitting.least_squares import FitRequest, GapFit, descend_together
-from soilml.gap.fitting.whitening import Whitening
-from soilml.gap.statistics.discrepancy_process import discrepancy_process
+from soilml.fitting.discrepancy_process import discrepancy_process
+from soilml.fitting.least_squares import FitRequest, Solution, descend_together
+from soilml.fitting.readings import Readings
+from soilml.fitting.whitening import Whitening
+from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.statistics.evidence import DiscrepancyModel
 from soilml.gap.statistics.reml_covariance import Covariance
 from soilml.gap.statistics.signatures import current_size
@@ -52,7 +52,7 @@ class FitProblem:
 
     case: Case
     soil: tuple[SoilCoordinate, ...]
-    readings: StackedReadings
+    readings: Readings
     covariance: Covariance
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
@@ -70,7 +70,7 @@ class FitProblem:
         declared = [column(name) in self.case.discrepancy for name in self.readings.channels]
         return np.asarray(declared, dtype=np.float64)
 
-    def effects_not_in(self, fit: GapFit) -> dict[str, type[Effect]]:
+    def effects_not_in(self, fit: Solution) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit.
 
         An effect that all gears share and the same effect of one gear exclude each other.
@@ -109,7 +109,7 @@ class FitProblem:
         shapes = [c for name in names for c in shape_coordinates(self.effects[name])]
         return [c for c in shapes if varies[c.name]]
 
-    def fit_soil(self, starts: Sequence[Floats]) -> GapFit:
+    def fit_soil(self, starts: Sequence[Floats]) -> Solution:
         """The best of the fits of the soil alone, one from each start."""
         whiten = self.covariance.whiten
         fits = descend_together(
@@ -118,18 +118,18 @@ class FitProblem:
         return min((_raised(fit) for fit in fits), key=lambda fit: fit.objective)
 
     def fit(
-        self, case: Case, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
-    ) -> GapFit:
+        self, case: Case, coordinates: Sequence[Coordinate], start: Mapping[str, float]
+    ) -> Solution:
         """One fit; see `fit_many`."""
         return _raised(fit_many(self, [StartedFit(case, coordinates, start)])[0])
 
     def first_coordinates(
-        self, coordinates: Sequence[FitCoordinate], start: Mapping[str, float]
+        self, coordinates: Sequence[Coordinate], start: Mapping[str, float]
     ) -> Floats:
         """Where a fit starts: `start` by path, else the case's value or a small one."""
         return np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
 
-    def _default_start(self, coordinate: FitCoordinate) -> float:
+    def _default_start(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
         if isinstance(coordinate, EffectCoordinate) and coordinate.is_shape:
             return 0.0
@@ -146,12 +146,12 @@ class StartedFit:
     """
 
     case: Case
-    coordinates: Sequence[FitCoordinate]
+    coordinates: Sequence[Coordinate]
     start: Mapping[str, float]
     whiten: Whitening | None = None
 
 
-def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[GapFit | InputError]:
+def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution | InputError]:
     """Fits that share each call of the model; their results are those of single fits.
 
     Coordinates without a start begin at the case's value or small. Where the model refuses a trial
@@ -175,14 +175,14 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[GapFit | I
     return found
 
 
-def _without_effects(coordinates: Sequence[FitCoordinate], start: Mapping[str, float]) -> Floats:
+def _without_effects(coordinates: Sequence[Coordinate], start: Mapping[str, float]) -> Floats:
     """The coordinates of the soil at their start, those of effects at zero."""
     return np.asarray(
         [start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0 for c in coordinates]
     )
 
 
-def _raised(fit: GapFit | InputError) -> GapFit:
+def _raised(fit: Solution | InputError) -> Solution:
     """The fit; an `InputError` in its place is raised."""
     if isinstance(fit, InputError):
         raise fit

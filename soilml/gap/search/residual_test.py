@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import shape_directions
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.score_test import ScoreTest, score_test
@@ -29,7 +29,7 @@ class ResidualTest:
 
 
 def residual_test(
-    problem: FitProblem, fit: GapFit, signatures: Sequence[Signature], seed: int
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature], seed: int
 ) -> ResidualTest:
     """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains
 from soilml.gap.search.problem import FitProblem
@@ -30,7 +30,7 @@ Starts = Mapping[tuple[str, ...], CandidateFit]
 def effects_to_fit(
     problem: FitProblem,
     none: CandidateFit,
-    soil: GapFit,
+    soil: Solution,
     signatures: Sequence[Signature],
     gains: Mapping[str, float],
     starts: Starts,
@@ -43,7 +43,7 @@ def effects_to_fit(
 
     Parameters
     ----------
-    none, soil : CandidateFit, GapFit
+    none, soil : CandidateFit, Solution
         The soil alone, beside a discrepancy and under noise alone.
     gains : mapping
         Predicted decrease of the objective by each effect.

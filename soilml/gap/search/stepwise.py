@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import (
     CandidateFit,
     CandidateRequest,
@@ -60,7 +60,7 @@ MIN_IMPROVEMENT = 1.0
 class SearchResult:
     """Result of the search; `final_test` is that of the best explanation, or of the soil alone."""
 
-    soil: GapFit  # the soil alone, under noise and scatter
+    soil: Solution  # the soil alone, under noise and scatter
     soil_test: ResidualTest
     #: explanations that are not rejected against the best one, in order of their objective
     accepted: tuple[CandidateFit, ...]
@@ -95,7 +95,7 @@ class SearchResult:
 
 def search(
     problem: FitProblem,
-    soil: GapFit,
+    soil: Solution,
     seed: int,
     starts: Starts | None = None,
     progress: Callable[[float], None] = lambda _: None,
@@ -108,7 +108,7 @@ def search(
 
     Parameters
     ----------
-    soil : GapFit
+    soil : Solution
         The soil alone, fitted under noise and scatter without discrepancy.
     starts : mapping
         Candidates of an earlier search.
@@ -155,7 +155,7 @@ def search(
     )
 
 
-def _soil_alone(problem: FitProblem, soil: GapFit, starts: Starts) -> CandidateFit:
+def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> CandidateFit:
     """The empty set of effects: the soil alone with a smooth discrepancy."""
     start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
     if () in starts:
@@ -169,7 +169,7 @@ def _soil_alone(problem: FitProblem, soil: GapFit, starts: Starts) -> CandidateF
 
 def _fit_level(
     problem: FitProblem,
-    soil: GapFit,
+    soil: Solution,
     none: CandidateFit,
     sets: Mapping[tuple[str, ...], CandidateFit],
     starts: Starts,
@@ -205,7 +205,7 @@ def _fit_level(
     return [shaped.get(c.names, c) for c in fitted]
 
 
-def _off_bounds(soil: GapFit) -> dict[str, float]:
+def _off_bounds(soil: Solution) -> dict[str, float]:
     """The coordinates of a fit of the soil, nearer to the middle of their priors.
 
     Where an effect is missing, soil parameters are often at a bound, from which the fit with the

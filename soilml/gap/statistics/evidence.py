@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.coordinates import EffectCoordinate, FitCoordinate
-from soilml.gap.fitting.least_squares import GapFit
-from soilml.gap.fitting.whitening import DiscrepancyWhitening
+from soilml.fitting.coordinates import Coordinate, EffectCoordinate
+from soilml.fitting.discrepancy_process import DiscrepancyProcess
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.whitening import DiscrepancyWhitening
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.discrepancy_process import DiscrepancyProcess
 from soilml.gap.statistics.linearised_fit import LinearisedFit, ProcessDivisions
 from soilml.gap.statistics.prior_bounds import outside_bounds
 from soilml.gap.statistics.reml_covariance import Covariance
@@ -105,7 +105,7 @@ class DiscrepancyModel:
         return np.asarray(self.covariance.matrix + scaled @ scaled.T)
 
     def evidence(
-        self, fit: GapFit, start: Floats | None = None, extra: Floats | None = None
+        self, fit: Solution, start: Floats | None = None, extra: Floats | None = None
     ) -> Evidence:
         r"""Evidence of a fit by Laplace's approximation, at the best amplitudes of discrepancy.
 
@@ -148,7 +148,7 @@ class DiscrepancyModel:
         return Evidence(value, amplitude, step, expected)
 
 
-def _linearised(model: DiscrepancyModel, fit: GapFit, extra: Floats | None) -> LinearisedFit:
+def _linearised(model: DiscrepancyModel, fit: Solution, extra: Floats | None) -> LinearisedFit:
     whiten = model.noise_whitening
     added = np.zeros((len(fit.reading), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
@@ -182,7 +182,7 @@ def _expected_amplitude(problem: LinearisedFit, amplitude: Floats) -> Floats:
     return found
 
 
-def _prior(coordinate: FitCoordinate, x: float) -> tuple[float, float, float]:
+def _prior(coordinate: Coordinate, x: float) -> tuple[float, float, float]:
     r"""Precision of a coordinate's prior at x, and half the derivative and the value of -2 ln p.
 
     The value is that of -2 ln p - ln(2 pi), which with ln|H| gives the integral over x. A soil

@@ -7,8 +7,8 @@ from math import erfc, exp, log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.coordinates import SoilCoordinate
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.coordinates import SoilCoordinate
+from soilml.fitting.least_squares import Solution
 from soilml.numerics.prior import UNIFORM_PRECISION
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ FLAT = 1e-3
 FAR = 6.0
 
 
-def outside_bounds(fit: GapFit, gradient: Floats, curvature: Floats) -> float:
+def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
     r"""-2 ln of the factor that the bounds of the soil's priors put on Laplace's approximation.
 
     Laplace's approximation integrates a normal density over the whole line, with the variance of

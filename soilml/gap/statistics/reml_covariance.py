@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.coordinates import SoilCoordinate, linearise
+from soilml.fitting.coordinates import SoilCoordinate, linearise
+from soilml.fitting.readings import Readings
 from soilml.gap.statistics.restricted_likelihood import (
     RestrictedLikelihood,
     restricted_likelihood,
@@ -83,7 +83,7 @@ class Covariance:
         return Covariance(matrix, _whitening_matrix(matrix, run[selected]), self.components)
 
 
-def run_effect_columns(case: Case, readings: StackedReadings) -> Floats:
+def run_effect_columns(case: Case, readings: Readings) -> Floats:
     """Change of each reading by one unit of run-to-run variation, (m, 2).
 
     The columns are those of friction angle and of the bearing moduli, which scale together.
@@ -109,7 +109,7 @@ def _unit_coordinate(name: str, value: float, unit: float) -> SoilCoordinate:
 
 
 def assemble_covariance(
-    readings: StackedReadings, columns: Floats, components: VarianceComponents
+    readings: Readings, columns: Floats, components: VarianceComponents
 ) -> Covariance:
     """The covariance of readings with their declared noise under given variance components."""
     std = readings.std * components.noise_scale[readings.channel]
@@ -137,7 +137,7 @@ def _whitening_matrix(matrix: Floats, run: NDArray[np.int64]) -> Floats:
 
 
 def estimate_covariance(
-    readings: StackedReadings, columns: Floats, residual: Floats, space: Floats
+    readings: Readings, columns: Floats, residual: Floats, space: Floats
 ) -> Covariance:
     r"""Estimate the variance components by restricted maximum likelihood with weak priors.
 
@@ -212,7 +212,7 @@ def _coordinate_search(
     return components, value
 
 
-def _is_autocorrelated(readings: StackedReadings, residual: Floats, basis: Floats) -> bool:
+def _is_autocorrelated(readings: Readings, residual: Floats, basis: Floats) -> bool:
     """Whether neighbouring residuals of a run are more similar than independent noise explains."""
     white, q = residual / readings.std, np.linalg.qr(basis / readings.std[:, None])[0]
     projected = white - q @ (q.T @ white)
@@ -231,13 +231,13 @@ def _is_autocorrelated(readings: StackedReadings, residual: Floats, basis: Float
     return bool(excess > AUTOCORRELATION_SIGMA * std)
 
 
-def _same_run_indicator(readings: StackedReadings) -> Floats:
+def _same_run_indicator(readings: Readings) -> Floats:
     """1 where two readings are of one run, else 0, (m, m)."""
     run = readings.run[readings.row]
     return np.asarray(run[:, None] == run, dtype=np.float64)
 
 
-def _noise_correlation(readings: StackedReadings, autocorrelation: float) -> Floats:
+def _noise_correlation(readings: Readings, autocorrelation: float) -> Floats:
     """First-order autoregressive correlation within each run and channel, (m, m)."""
     if autocorrelation == 0.0:
         return np.eye(len(readings))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.fitting.readings import Readings
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
@@ -70,7 +70,7 @@ class RepeatComparison:
 
 
 def repeat_disagreement(
-    readings: StackedReadings, covariance: Floats | None = None, expected: Floats | None = None
+    readings: Readings, covariance: Floats | None = None, expected: Floats | None = None
 ) -> list[RepeatComparison]:
     r"""Compare the readings of rows that are driven alike, channel by channel.
 
@@ -80,7 +80,7 @@ def repeat_disagreement(
 
     Parameters
     ----------
-    readings : StackedReadings
+    readings : Readings
         m readings.
     covariance : array (m, m), optional
         V, of the readings: declared noise and usual scatter from run to run, as from
@@ -127,7 +127,7 @@ def repeat_disagreement(
     return sorted(found, key=lambda found: (found.p_value, -found.scatter_ratio))
 
 
-def usual_covariance(case: Case, readings: StackedReadings) -> Floats:
+def usual_covariance(case: Case, readings: Readings) -> Floats:
     """Covariance (m, m) of the declared noise and the usual scatter of the soil between runs."""
     usual = VarianceComponents(
         np.ones(len(readings.channels)),
@@ -138,7 +138,7 @@ def usual_covariance(case: Case, readings: StackedReadings) -> Floats:
     return assemble_covariance(readings, run_effect_columns(case, readings), usual).matrix
 
 
-def overstated_noise(readings: StackedReadings) -> dict[str, float]:
+def overstated_noise(readings: Readings) -> dict[str, float]:
     """Channels whose declared noise is far above the scatter of repeated rows.
 
     Returns the ratio of that scatter to the declared noise, by channel, where it is below
@@ -152,7 +152,7 @@ def overstated_noise(readings: StackedReadings) -> dict[str, float]:
     return found
 
 
-def overstated_noise_notes(readings: StackedReadings) -> list[str]:
+def overstated_noise_notes(readings: Readings) -> list[str]:
     """A note on each channel whose declared noise is far above the scatter of repeated rows."""
     return [
         f"repeated rows of {column(name)} scatter by {ratio:.2g} times the declared noise: the "
@@ -185,7 +185,7 @@ def _worst_pair(
     return (int(i[worst]), int(j[worst])), float(sigma[worst])
 
 
-def _pair_sentence(readings: StackedReadings, i: int, j: int) -> str:
+def _pair_sentence(readings: Readings, i: int, j: int) -> str:
     """Two readings in words: where they were taken, their values and their difference."""
     names = [readings.runs[readings.run[readings.row[k]]] for k in (i, j)]
     quantity = QUANTITIES[readings.channels[readings.channel[i]]]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.stacked_readings import StackedReadings
+from soilml.fitting.readings import Readings
 
 Floats = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class RestrictedLikelihood:
 
 
 def restricted_likelihood(
-    readings: StackedReadings,
+    readings: Readings,
     columns: Floats,
     residual: Floats,
     basis: Floats,
@@ -102,7 +102,7 @@ def restricted_likelihood(
 
 
 def whiten_series(
-    readings: StackedReadings, columns: Floats, autocorrelation: float
+    readings: Readings, columns: Floats, autocorrelation: float
 ) -> tuple[Floats, float]:
     r"""Columns (m, k) made independent along each run and channel; log determinant of C.
 

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.candidate_effects import gears_differ, with_effect
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.batched_predictions import (
+from soilml.fitting.coordinates import EffectCoordinate, size_coordinate
+from soilml.fitting.levels import covariate_levels
+from soilml.fitting.predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.fitting.coordinates import EffectCoordinate, size_coordinate
-from soilml.identification.data.levels import covariate_levels
+from soilml.fitting.readings import Readings
+from soilml.gap.data.candidate_effects import gears_differ, with_effect
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 
@@ -57,7 +57,7 @@ def current_size(case: Case, path: str, unit: float) -> float:
 
 
 def effect_signatures(
-    case: Case, readings: StackedReadings, effects: Mapping[str, type[Effect]]
+    case: Case, readings: Readings, effects: Mapping[str, type[Effect]]
 ) -> tuple[list[Signature], list[Untestable]]:
     """Signatures of all effects that these runs can test, and the effects that they cannot.
 
@@ -102,7 +102,7 @@ def effect_signatures(
     return signatures, [Untestable(name, reasons[name]) for name in effects if name in reasons]
 
 
-def _missing_covariate(case: Case, effect: type[Effect], readings: StackedReadings) -> str:
+def _missing_covariate(case: Case, effect: type[Effect], readings: Readings) -> str:
     """What these runs lack to test an effect; empty where they have it."""
     if effect.about.varied and not gears_differ(case, effect.about.varied_dimension):
         return f"needs {effect.about.varied}"

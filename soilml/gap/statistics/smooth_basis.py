@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.data.levels import Levels
+from soilml.fitting.levels import Levels
+from soilml.fitting.readings import Readings
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ READINGS_PER_FUNCTION = 4
 SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
 
 
-def smooth_basis(readings: StackedReadings) -> Floats:
+def smooth_basis(readings: Readings) -> Floats:
     """Products of Legendre polynomials of slip and log load for each channel and gear, (m, q).
 
     Each column is in the unit of its channel's noise. The degree is limited by the number of
@@ -68,7 +68,7 @@ class Region:
     selected: NDArray[np.bool_]  # (m,)
 
 
-def regions(readings: StackedReadings) -> Iterator[Region]:
+def regions(readings: Readings) -> Iterator[Region]:
     """Channel by slip bin by load bin, those with enough readings."""
     slips = _bins(readings.slip, readings.slip_levels, SLIP_BINS)
     loads = _bins(readings.load, readings.load_levels, LOAD_BINS)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.least_squares import Solution
 from soilml.gap.report_parts import Discrepancy, EstimatedValue, NamedEffect
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import Posterior
@@ -24,7 +24,9 @@ from soilml.quantities import column
 Floats = NDArray[np.float64]
 
 
-def soil_estimates(fit: GapFit, spread: EstimateSpread | None = None) -> dict[str, EstimatedValue]:
+def soil_estimates(
+    fit: Solution, spread: EstimateSpread | None = None
+) -> dict[str, EstimatedValue]:
     """The soil parameters of a fit, by name.
 
     With `spread`, each standard deviation is that of the normal distribution whose 90 % interval
@@ -40,7 +42,7 @@ def soil_estimates(fit: GapFit, spread: EstimateSpread | None = None) -> dict[st
     }
 
 
-def effect_estimates(fit: GapFit, effect: str) -> dict[str, EstimatedValue]:
+def effect_estimates(fit: Solution, effect: str) -> dict[str, EstimatedValue]:
     """The parameters of one effect of a fit, by name."""
     values, stds = fit.values(), fit.stds()
     return {
@@ -52,7 +54,7 @@ def effect_estimates(fit: GapFit, effect: str) -> dict[str, EstimatedValue]:
 
 def named_effects(
     accepted: Sequence[CandidateFit],
-    fit: GapFit,
+    fit: Solution,
     similarity: SignatureSimilarity,
     posterior: Posterior,
 ) -> list[NamedEffect]:
@@ -80,7 +82,7 @@ def named_effects(
     return effects
 
 
-def _size(fit: GapFit, effect: str) -> float:
+def _size(fit: Solution, effect: str) -> float:
     """Size of an effect in reference sizes; its coordinate precedes those of its shape."""
     for c, x in zip(fit.coordinates, fit.x, strict=True):
         if isinstance(c, EffectCoordinate) and c.effect == effect:
@@ -118,7 +120,7 @@ class SignatureSimilarity:
 
 
 def signature_similarity(
-    problem: FitProblem, fit: GapFit, amplitude: Floats
+    problem: FitProblem, fit: Solution, amplitude: Floats
 ) -> SignatureSimilarity:
     """Similarity of the catalogue's signatures beside a discrepancy, on the soil of a fit.
 
@@ -138,7 +140,7 @@ def signature_similarity(
     return SignatureSimilarity(tuple(s.name for s in signatures), norm, cosine)
 
 
-def discrepancy_map(problem: FitProblem, fit: GapFit, seed: int) -> list[Discrepancy]:
+def discrepancy_map(problem: FitProblem, fit: Solution, seed: int) -> list[Discrepancy]:
     """Score of each region of the data against the fit of the soil alone, the largest first.
 
     The score is positive where the mean reading is above the prediction.

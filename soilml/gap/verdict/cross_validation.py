@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.coordinates import predict_readings
-from soilml.gap.fitting.least_squares import FitRequest, GapFit, descend_together
+from soilml.fitting.coordinates import predict_readings
+from soilml.fitting.least_squares import FitRequest, Solution, descend_together
+from soilml.fitting.readings import Readings
 from soilml.gap.report_parts import GapReduction
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
@@ -41,7 +41,7 @@ class Folds:
 
 
 def gap_reduction(
-    readings: StackedReadings, std: Floats, before: Floats, after: Floats, description: str
+    readings: Readings, std: Floats, before: Floats, after: Floats, description: str
 ) -> GapReduction:
     """Mean squared standardised residuals of two predictions, in all and by channel.
 
@@ -79,7 +79,7 @@ def held_out(
     return dict(zip(known, _cross_validate(problem, soil, after, [*known.values()]), strict=True))
 
 
-def _run_folds(readings: StackedReadings, seed: int) -> Folds | None:
+def _run_folds(readings: Readings, seed: int) -> Folds | None:
     """The runs in at most `FOLDS` folds at random; None where there are fewer than three."""
     runs = len(readings.runs)
     if runs < 3:
@@ -89,7 +89,7 @@ def _run_folds(readings: StackedReadings, seed: int) -> Folds | None:
     return Folds("every run predicted by fits to the others", fold, np.unique(fold))
 
 
-def held_out_region(readings: StackedReadings) -> tuple[str, NDArray[np.bool_]] | None:
+def held_out_region(readings: Readings) -> tuple[str, NDArray[np.bool_]] | None:
     """The region of the highest loads, or of the highest slips where the load hardly varies.
 
     Its name and its readings (m,); None where fewer than three loads and fewer than three slips
@@ -158,9 +158,9 @@ def _predict_folds(
 
 def predict_held_out(
     problem: FitProblem,
-    soil: GapFit,
-    after: GapFit,
-    readings: StackedReadings,
+    soil: Solution,
+    after: Solution,
+    readings: Readings,
     description: str,
 ) -> GapReduction:
     """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
@@ -170,7 +170,7 @@ def predict_held_out(
     return gap_reduction(readings, std, old, new, description)
 
 
-def covariance_at(problem: FitProblem, fit: GapFit, readings: StackedReadings) -> Covariance:
+def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:
     """The covariance of other readings, by the variance components of the problem."""
     components = problem.covariance.components
     index = {name: i for i, name in enumerate(problem.readings.channels)}

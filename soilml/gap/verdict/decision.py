@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from soilml.gap.fitting.coordinates import EffectCoordinate
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import CandidateFit
 from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.problem import FitProblem
@@ -168,7 +168,7 @@ def _far_from_catalogue(best: CandidateFit) -> bool:
     return best.shape_deviation > most
 
 
-def _implausible(fit: GapFit) -> bool:
+def _implausible(fit: Solution) -> bool:
     """Whether a fault of a sensor or the rig is far larger than its prior allows."""
     sizes = [isinstance(c, EffectCoordinate) and not c.is_shape for c in fit.coordinates]
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)

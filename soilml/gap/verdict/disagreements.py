@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.gap.fitting.coordinates import linearise
-from soilml.gap.fitting.least_squares import GapFit, levenberg_marquardt
+from soilml.fitting.coordinates import linearise
+from soilml.fitting.least_squares import Solution, levenberg_marquardt
+from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_UNITS,
@@ -16,7 +17,6 @@ from soilml.gap.statistics.reml_covariance import (
 )
 from soilml.gap.statistics.repeats import repeat_disagreement
 from soilml.gap.verdict.cross_validation import held_out_region
-from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.report.numbers import decimal
 
@@ -31,7 +31,7 @@ REGION_LEVEL = 0.001
 REPEAT_LEVEL = 0.001
 
 
-def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
+def disagreements(problem: FitProblem, soil: Solution) -> list[str]:
     """What disagrees with what although no smooth gap was found; empty where nothing does."""
     components, readings = problem.covariance.components, problem.readings
     found = repeats_that_disagree(problem, soil)
@@ -57,7 +57,7 @@ def disagreements(problem: FitProblem, soil: GapFit) -> list[str]:
     return found
 
 
-def repeats_that_disagree(problem: FitProblem, fit: GapFit) -> list[str]:
+def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[str]:
     """Rows driven alike that differ by more than declared noise and usual scatter explain.
 
     The predictions of `fit` account for their small differences in slip and load.
@@ -84,7 +84,7 @@ def repeats_that_disagree(problem: FitProblem, fit: GapFit) -> list[str]:
     return [text for channel, text in sentences.items() if channel not in agree]
 
 
-def _region(problem: FitProblem, soil: GapFit) -> list[str]:
+def _region(problem: FitProblem, soil: Solution) -> list[str]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
     from scipy.special import chdtrc
 

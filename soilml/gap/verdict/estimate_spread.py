@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.problem import FitProblem
@@ -39,7 +39,7 @@ class EstimateSpread:
 
 
 def among_candidates(
-    fit: GapFit, candidates: Sequence[CandidateFit], posterior: Posterior
+    fit: Solution, candidates: Sequence[CandidateFit], posterior: Posterior
 ) -> EstimateSpread:
     """The soil by all candidates about that of one fit, by their probabilities.
 
@@ -55,7 +55,7 @@ def among_candidates(
 
 
 def by_undetected_effects(
-    problem: FitProblem, soil: GapFit, signatures: Sequence[Signature]
+    problem: FitProblem, soil: Solution, signatures: Sequence[Signature]
 ) -> EstimateSpread:
     r"""The soil if one of the effects is present, where the soil alone is not rejected.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.report_parts import RemainingDiscrepancy
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.problem import FitProblem
@@ -23,7 +23,7 @@ INTERVAL_FACTOR = 1.65
 LEAST_AMPLITUDE = 0.1
 
 
-def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> GapFit:
+def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Solution:
     """The fit with intervals under the expected amplitudes of the discrepancy.
 
     The estimates are those of the most probable amplitudes. The amplitudes are enlarged by

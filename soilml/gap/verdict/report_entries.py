@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from soilml.gap.fitting.coordinates import (
+from soilml.fitting.coordinates import (
+    Coordinate,
     EffectCoordinate,
-    FitCoordinate,
     SoilCoordinate,
     predict_readings,
 )
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
 from soilml.gap.report_parts import (
     CandidateSummary,
     GapReduction,
@@ -28,7 +29,6 @@ from soilml.gap.statistics.evidence import LARGEST_SIZE, Evidence
 from soilml.gap.statistics.reml_covariance import FEW_RUNS
 from soilml.gap.statistics.repeats import overstated_noise_notes
 from soilml.gap.verdict.cross_validation import gap_reduction, held_out
-from soilml.identification.data.soil_test_remarks import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.report.numbers import format_quantity
 
@@ -138,7 +138,7 @@ def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
 
 
 def analysis_notes(
-    analysis: Analysis, after: GapFit, shown: GapFit, alike: Sequence[str]
+    analysis: Analysis, after: Solution, shown: Solution, alike: Sequence[str]
 ) -> list[str]:
     """Notes on outliers, estimates at a bound, sizes, repeats, noise and run-to-run variation.
 
@@ -186,7 +186,7 @@ def analysis_notes(
     return notes
 
 
-def _bound_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> list[str]:
+def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[str]:
     notes = []
     for c, value in zip(coordinates, x, strict=True):
         if isinstance(c, SoilCoordinate):
@@ -197,7 +197,7 @@ def _bound_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> li
     return notes
 
 
-def size_notes(coordinates: Sequence[FitCoordinate], x: Sequence[float]) -> list[str]:
+def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[str]:
     """Notes on effects that would have to be far larger than they usually are."""
     notes = []
     for c, size in zip(coordinates, x, strict=True):
@@ -226,7 +226,7 @@ def variance_component_entries(analysis: Analysis) -> dict[str, float]:
     }
 
 
-def readings_and_predictions(analysis: Analysis, after: GapFit) -> ReadingsAndPredictions:
+def readings_and_predictions(analysis: Analysis, after: Solution) -> ReadingsAndPredictions:
     """Readings, predictions before and after, and the standard deviations of both."""
     problem, readings = analysis.problem, analysis.problem.readings
     jacobian = after.derivatives

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.least_squares import Solution
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.smooth_basis import smooth_basis
 from soilml.numerics.subspaces import column_space, project_out
@@ -14,7 +14,7 @@ from soilml.quantities import column
 MIN_RELATIVE_SINGULAR_VALUE = 1e-6
 
 
-def residual_trend(problem: FitProblem, fit: GapFit) -> dict[str, float]:
+def residual_trend(problem: FitProblem, fit: Solution) -> dict[str, float]:
     """Root mean square of the smooth trend of a fit's residuals, by channel, in sigma.
 
     The component of the whitened residual that smooth functions of slip and load explain and that

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
-from soilml.gap.fitting.coordinates import EffectCoordinate
-from soilml.gap.fitting.least_squares import GapFit
+from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.least_squares import Solution
 from soilml.numerics.prior import Prior
 from soilml.numerics.rounding import significant
 
@@ -15,7 +15,7 @@ from soilml.numerics.rounding import significant
 PRIOR_HALF_WIDTH = 3.0
 
 
-def updated_case(fit: GapFit, discrepancy: dict[str, float] | None = None) -> Case:
+def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> Case:
     """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
 
     Values are rounded to significant digits.

@@ -16,8 +16,8 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import SoilmlError
 from soilml.experiment_design import Advice
 from soilml.experiment_design.messages import abstention_message, next_row_messages, row_message
+from soilml.fitting.free_parameters import select_free
 from soilml.identification import Fit, identify
-from soilml.identification.free_parameters import select_free
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE

@@ -17,8 +17,8 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.messages import next_row_messages, summary
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import select_free
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 

@@ -10,7 +10,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.experiment_design.expected_variance import expected_variance
 from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_prior
 from soilml.experiment_design.predicted_readings import PredictedReadings, predicted_readings
-from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.fitting.free_parameters import FreeParameter, select_free
 from soilml.numerics.prior import Prior
 
 

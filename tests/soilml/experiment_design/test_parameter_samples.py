@@ -5,8 +5,8 @@ import pytest
 
 from soilml import Operating, identify, read_case
 from soilml.experiment_design import samples_of_moments, samples_of_prior, samples_of_rows
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.fitting.free_parameters import FreeParameter, select_free
+from soilml.fitting.observations import read_observations
 from soilml.io.table import Table
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.prior import Prior

@@ -11,9 +11,10 @@ from conftest import THREE_CHANNEL_MODEL
 
 from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
+from soilml.fitting.coordinates import soil_coordinate
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.fitting.coordinates import soil_coordinate
 from soilml.gap.search.candidate_fits import CandidateRequest, fit_candidates
 from soilml.gap.search.problem import FitProblem
 from soilml.gap.statistics.reml_covariance import (
@@ -22,7 +23,6 @@ from soilml.gap.statistics.reml_covariance import (
     assemble_covariance,
     run_effect_columns,
 )
-from soilml.identification.free_parameters import select_free
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating

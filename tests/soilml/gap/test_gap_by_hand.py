@@ -9,8 +9,8 @@ from gap_sets import candidate, case_of, driven, fit_problem
 from scipy.integrate import quad
 
 from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.design.planned_readings import joined_readings
-from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY
 from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains, predicted_gains
 from soilml.gap.search.problem import FitProblem

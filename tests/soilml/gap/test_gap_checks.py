@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
+from soilml.fitting.readings import stack_readings
 from soilml.gap.data.checks import check_readings, estimate_repeat_noise, without_duplicate_rows
-from soilml.gap.data.stacked_readings import stack_readings
 from soilml.gap.statistics.outliers import outliers
 from soilml.gap.statistics.smooth_basis import smooth_basis
 from soilml.io.table import Table

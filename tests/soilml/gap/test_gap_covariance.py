@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.fitting.coordinates import linearise
+from soilml.fitting.coordinates import linearise
+from soilml.fitting.readings import stack_readings
 from soilml.gap.statistics.reml_covariance import (
     RUN_EFFECT_GRID,
     RUN_EFFECT_UNITS,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
-from soilml.gap.fitting.coordinates import SoilCoordinate
-from soilml.gap.fitting.damped_steps import MOST_LOG_STEP, DampedSteps
+from soilml.fitting.coordinates import SoilCoordinate
+from soilml.fitting.damped_steps import MOST_LOG_STEP, DampedSteps
 from soilml.numerics.prior import Prior
 
 

@@ -7,20 +7,20 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
-from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.fitting.batched_predictions import (
-    PredictionRequest,
-    linearise_many,
-    predict_many,
-)
-from soilml.gap.fitting.coordinates import (
+from soilml.fitting.coordinates import (
     linearise,
     predict_readings,
     shape_coordinates,
     size_coordinate,
 )
-from soilml.gap.fitting.joined_cases import CaseSets, joined_load_case
-from soilml.gap.fitting.least_squares import FitRequest, descend_together
+from soilml.fitting.joined_cases import CaseSets, joined_load_case
+from soilml.fitting.least_squares import FitRequest, descend_together
+from soilml.fitting.predictions import (
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
+from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.search.problem import StartedFit, fit_many
 from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.effects import EFFECTS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of
 
-from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.report_parts import EstimatedValue
 from soilml.gap.search.candidate_fits import (
     EFFECT_PENALTY,

@@ -7,10 +7,10 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
+from soilml.fitting.coordinates import linearise, predict_readings, size_coordinate
+from soilml.fitting.least_squares import levenberg_marquardt
+from soilml.fitting.readings import stack_readings
 from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.fitting.coordinates import linearise, predict_readings, size_coordinate
-from soilml.gap.fitting.least_squares import levenberg_marquardt
 from soilml.gap.search import problem as problem_module
 from soilml.gap.search.problem import StartedFit, fit_many
 from soilml.gap.statistics.signatures import effect_signatures

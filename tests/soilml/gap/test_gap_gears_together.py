@@ -10,21 +10,21 @@ from test_gap_several_gears import LUGS, REST, WHEELS, rows
 from soilml import identify
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import InputError
-from soilml.gap.data.candidate_effects import candidate_effects, with_effect
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.design.planned_readings import expected_readings, joined_readings
-from soilml.gap.design.run_options import run_options
-from soilml.gap.fitting.batched_predictions import (
+from soilml.fitting.coordinates import size_coordinate, soil_coordinate
+from soilml.fitting.declared_discrepancy import discrepancy_columns
+from soilml.fitting.discrepancy_process import discrepancy_process
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
+from soilml.fitting.predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.fitting.coordinates import size_coordinate, soil_coordinate
+from soilml.fitting.readings import stack_readings
+from soilml.gap.data.candidate_effects import candidate_effects, with_effect
+from soilml.gap.design.planned_readings import expected_readings, joined_readings
+from soilml.gap.design.run_options import run_options
 from soilml.gap.search.problem import exclude_each_other
-from soilml.gap.statistics.discrepancy_process import discrepancy_process
-from soilml.identification.data.observations import read_observations
-from soilml.identification.discrepancy import discrepancy_columns
-from soilml.identification.free_parameters import select_free
 from soilml.physics.effects import EFFECTS
 
 WIDTHS = WHEELS.replace("0.12", "0.10", 1)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from gap_sets import analysed, hidden
 
+from soilml.fitting.operating_points import operating_points
 from soilml.gap import STATUSES
-from soilml.identification.data.operating_points import operating_points
 from soilml.quantities import CHANNELS, column
 
 pytestmark = pytest.mark.slow

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError
-from soilml.gap.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.search import marginal_fits
 from soilml.gap.search.marginal_fits import fit_marginal
 from soilml.gap.statistics.amplitude_prior import AMPLITUDES

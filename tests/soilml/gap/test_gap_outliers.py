@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import EffectCoordinate
 from soilml.gap.statistics.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, _is_confirmed, outliers
 from soilml.gap.statistics.repeats import _worst_pair
 from soilml.gap.verdict.claimed_effects import _size

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
+from soilml.fitting.coordinates import SoilCoordinate
+from soilml.fitting.free_soil import free_soil_parameters
+from soilml.fitting.least_squares import Solution
 from soilml.gap import gap
-from soilml.gap.data.free_soil import free_soil_parameters
-from soilml.gap.fitting.coordinates import SoilCoordinate
-from soilml.gap.fitting.least_squares import GapFit
 from soilml.gap.search import iteration
 from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.statistics.reml_covariance import VarianceComponents
@@ -65,7 +65,7 @@ def test_a_second_pass_uses_the_residuals_of_the_best_explanation(passes):
     given.components, given.accepted = [1.0, 1.3], [("a",), ("b",)]
     found, shares = run()
     assert [fit for fit, _, _ in given.seen][1] == ("fit of", ("a",))
-    assert isinstance(given.seen[0][0], GapFit) and given.seen[0][2] == ()
+    assert isinstance(given.seen[0][0], Solution) and given.seen[0][2] == ()
     assert len(given.seen[1][2]) == 1  # the signatures of the last test of residuals
     assert given.starts == [[], [("a",)]]
     assert found.result.accepted[0].names == ("b",) and found.error == ""
@@ -168,7 +168,7 @@ def test_a_fit_states_precision_and_covariance_of_its_parameters():
     jacobian = rng.standard_normal((9, 2))
     angle = SoilCoordinate("friction_angle", "rad", 0.0, 1.0, Prior(0.4, 0.8))
     other = replace(angle, name="cohesion", unit="Pa", prior=Prior(0.0, 2000.0), std=0.25)
-    fit = GapFit(
+    fit = Solution(
         *(CASE, (angle, other), np.asarray([0.25, 0.5]), np.zeros(9), np.zeros(9), jacobian),
         *(0.0, True, np.ones(9), jacobian),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.data.stacked_readings import stack_readings
+from soilml.fitting.readings import stack_readings
 from soilml.gap.statistics.repeats import (
     _pair_sentence,
     overstated_noise,

@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of
 
 from soilml.errors import InputError
-from soilml.gap.data.free_soil import fixed_parameters, free_soil_parameters
+from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
 from soilml.gap.data.holdout import split_holdout
 from soilml.gap.design.gear_changes import LUG_EFFECTS, gear_changes
 from soilml.io.table import Table

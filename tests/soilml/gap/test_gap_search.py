@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.fitting.coordinates import shape_coordinates
+from soilml.fitting.coordinates import shape_coordinates
 from soilml.gap.search.candidate_fits import (
     EFFECT_PENALTY,
     CandidateFit,

@@ -8,20 +8,20 @@ from soilml import Operating, identify
 from soilml.cli.table_remarks import print_table_hints
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
-from soilml.gap import gap
-from soilml.gap.data.candidate_effects import candidate_effects, with_effect
-from soilml.gap.data.stacked_readings import stack_readings
-from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.fitting.coordinates import (
+from soilml.fitting.channel_predictions import forces
+from soilml.fitting.coordinates import (
     linearise,
     predict_readings,
     size_coordinate,
     soil_coordinate,
 )
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.operating_points import operating_points
+from soilml.fitting.readings import stack_readings
+from soilml.gap import gap
+from soilml.gap.data.candidate_effects import candidate_effects, with_effect
+from soilml.gap.design.planned_readings import planned_readings
 from soilml.gap.statistics.signatures import effect_signatures
-from soilml.identification.data.operating_points import operating_points
-from soilml.identification.free_parameters import select_free
-from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column

@@ -7,13 +7,13 @@ import pytest
 
 from soilml import Case, Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
+from soilml.fitting.coordinates import soil_coordinate
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap import audit, gap
-from soilml.gap.fitting.coordinates import soil_coordinate
-from soilml.gap.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap.html.page import page
 from soilml.identification.bevameter import bevameter
 from soilml.identification.bevameter.model_file import updated_soil
-from soilml.identification.free_parameters import select_free
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength

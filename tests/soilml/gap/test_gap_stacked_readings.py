@@ -7,7 +7,7 @@ import pytest
 from gap_sets import MODEL, case_of, driven
 
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import MOST_READINGS, check_size, stack_readings
+from soilml.fitting.readings import MOST_READINGS, check_size, stack_readings
 from soilml.gap.search.marginal_fits import _changed
 from soilml.io.table import Table
 from soilml.physics.effects.slip_load_scaling import REFERENCE_LOAD, log_relative_slip

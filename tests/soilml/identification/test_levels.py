@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.identification.data.levels import (
+from soilml.fitting.levels import (
     covariate_levels,
     is_one_load,
     load_levels,

@@ -10,10 +10,10 @@ from soilml import identification, identify
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.experiment_design import samples_of_rows
-from soilml.identification.data.observations import read_observations
-from soilml.identification.free_parameters import select_free
-from soilml.identification.many_rows import condensed_rows
-from soilml.identification.many_rows.cells import cells_of
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
+from soilml.identification import condensed_rows
+from soilml.identification.cells import cells_of
 from soilml.io.table import Table
 from soilml.traction.soil_draws import posterior_draws
 

@@ -6,7 +6,7 @@ from conftest import MODEL
 
 from soilml import Operating, identify, read_case
 from soilml.errors import FitError, TableError
-from soilml.identification.data.observations import read_observations
+from soilml.fitting.observations import read_observations
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 

@@ -10,21 +10,21 @@ from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
-from soilml.identification.data.observations import Channel, Observations, read_observations
-from soilml.identification.discrepancy import discrepancy_columns, stacked_columns
-from soilml.identification.free_parameters import select_free
-from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.predictions import (
+from soilml.fitting.channel_predictions import (
     _with_input_error,
     linearise,
     noise_at_prediction,
     predict_channels,
     propagated_input_noise,
 )
-from soilml.identification.shared_errors.effect import ModelledErrors
-from soilml.identification.shared_errors.modelled import errors_at, with_modelled_errors
-from soilml.identification.shared_errors.sensor_columns import sensor_columns
-from soilml.identification.shared_errors.sizes import usual_errors, without_errors
+from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import Channel, Observations, read_observations
+from soilml.fitting.shared_errors_effect import ModelledErrors
+from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
+from soilml.fitting.shared_errors_sensor_columns import sensor_columns
+from soilml.fitting.shared_errors_sizes import usual_errors, without_errors
+from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.rigid_wheel import WheelArc

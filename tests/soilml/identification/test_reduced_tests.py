@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from soilml import Operating
+from soilml.fitting import soil_test_remarks
+from soilml.identification import condensed_rows, joint_sample
 from soilml.identification.bevameter import reduced_tests
 from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
-from soilml.identification.data import soil_test_remarks
-from soilml.identification.many_rows import condensed_rows
-from soilml.identification.shared_errors import joint_sample
 from soilml.numerics.sampling.importance_sampling import ImportanceSample
 
 

@@ -8,11 +8,11 @@ import pytest
 from soilml import identify, read_case
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError, InputError
-from soilml.identification.data.observations import Channel, Observations
+from soilml.fitting.free_parameters import FreeParameter, select_free, values_at
+from soilml.fitting.observations import Channel, Observations
 from soilml.identification.diagnostics import at_prior_bound, with_warnings
 from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
-from soilml.identification.free_parameters import FreeParameter, select_free, values_at
 from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior

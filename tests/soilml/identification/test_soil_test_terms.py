@@ -10,14 +10,14 @@ from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.experiment_design import samples_of_prior
-from soilml.identification.data.observations import read_observations
-from soilml.identification.data.prior_fractions import prior_fractions
-from soilml.identification.free_parameters import (
+from soilml.fitting.free_parameters import (
     select_free,
     soil_test_deviations,
     soil_test_rates,
 )
+from soilml.fitting.observations import read_observations
 from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.traction import prior_draws

@@ -9,12 +9,12 @@ import pytest
 
 from soilml import Operating, read_case
 from soilml.errors import FitError
-from soilml.identification import descent
-from soilml.identification.data.observations import Channel, Observations
-from soilml.identification.free_parameters import select_free
-from soilml.identification.many_rows import condensed_rows
+from soilml.fitting import descent
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import Channel, Observations
+from soilml.identification import condensed_rows
+from soilml.identification.joint_sample import normal_start
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.shared_errors.joint_sample import normal_start
 
 # the package has functions of these names
 linear, newton, nonlinear = (

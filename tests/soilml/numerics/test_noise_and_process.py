@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.noise_and_process import Whitener, squared_residuals_and_log_determinant
+from soilml.fitting.noise_and_process import Whitener, squared_residuals_and_log_determinant
 
 RNG = np.random.default_rng(3)
 COLUMNS = RNG.standard_normal((12, 5))

@@ -9,7 +9,6 @@ from pkgutil import walk_packages
 
 import numpy as np
 import pytest
-from stated_constants import differences
 
 import soilml.physics
 from soilml import EFFECTS, Midstance, Operating, Track, Wheel, soil
@@ -133,7 +132,3 @@ def test_what_is_not_given_changes_nothing():
 def test_the_catalogue_of_effects_holds_effects_alone():
     assert EFFECTS and Effect not in EFFECTS.values()
     assert all(issubclass(cls, Effect) and cls.name == name for name, cls in EFFECTS.items())
-
-
-def test_constants_are_those_of_the_page():
-    assert differences("soilml/physics") == [], "renew: python docs/site/constant_listing.py"

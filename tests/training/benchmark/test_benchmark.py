@@ -117,9 +117,9 @@ def test_the_packaged_limit_is_the_exact_posterior(recipe):
 
 def test_the_log_density_at_the_truth_agrees_with_a_grid(recipe):
     """One row: likelihood at the truth over its mean on a grid over the prior."""
-    from soilml.identification.data.observations import read_observations
-    from soilml.identification.free_parameters import select_free
-    from soilml.identification.predictions import predict_channels
+    from soilml.fitting.channel_predictions import predict_channels
+    from soilml.fitting.free_parameters import select_free
+    from soilml.fitting.observations import read_observations
 
     one = benchmark_sets(recipe, SHEAR, 1)[0]
     data = read_observations(recipe.case, select_channels(one.table, ["torque"]))

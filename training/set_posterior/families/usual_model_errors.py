@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from soilml.identification.shared_errors.sizes import USUAL_MODEL_ERRORS, without_errors
+from soilml.fitting.shared_errors_sizes import USUAL_MODEL_ERRORS, without_errors
 from soilml.physics.effects.soil.exit_angle import ExitAngle
 from soilml.physics.model import Model
 

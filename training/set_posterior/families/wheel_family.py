@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.identification.shared_errors.sizes import USUAL_SENSOR_ERRORS
+from soilml.fitting.shared_errors_sizes import USUAL_SENSOR_ERRORS
 from soilml.onboard.set_contract import LEAST_STD
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import Coordinate

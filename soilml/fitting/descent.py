@@ -11,15 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError, MissingLibraryError
-from soilml.identification.data.observations import Observations
-from soilml.identification.data.spread_rows import spread_rows
-from soilml.identification.free_parameters import (
-    FreeParameter,
-    soil_test_deviations,
-    soil_test_rates,
-    values_at,
-)
-from soilml.identification.predictions import (
+from soilml.fitting.channel_predictions import (
     Linearisation,
     linearise,
     noise_at_prediction,
@@ -27,8 +19,16 @@ from soilml.identification.predictions import (
     propagated_input_noise,
     stack_channels,
 )
-from soilml.identification.shared_errors.sensor_columns import sensor_columns
-from soilml.numerics.noise_and_process import Whitener
+from soilml.fitting.free_parameters import (
+    FreeParameter,
+    soil_test_deviations,
+    soil_test_rates,
+    values_at,
+)
+from soilml.fitting.noise_and_process import Whitener
+from soilml.fitting.observations import Observations
+from soilml.fitting.shared_errors_sensor_columns import sensor_columns
+from soilml.fitting.spread_rows import spread_rows
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.sobol_points import sobol_points
 

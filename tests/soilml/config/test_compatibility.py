@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from soilml import EFFECTS, Estimator, LinearWheel, Model, Track, read_case
+from soilml.config import compatibility as comparing
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
-from soilml.identification import compatibility as comparing
+from soilml.fitting.channel_predictions import forces
+from soilml.fitting.observations import read_observations
+from soilml.fitting.operating_points import gear_numbers, operating_points, rows_by_gear
 from soilml.identification import trained_estimator as trained
-from soilml.identification.data.observations import read_observations
-from soilml.identification.data.operating_points import gear_numbers, operating_points, rows_by_gear
-from soilml.identification.predictions import forces
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 

@@ -120,7 +120,7 @@ def find_levels(values: Floats, rule: LevelRule, run: Integers | None = None) ->
     Examples
     --------
     >>> import numpy as np
-    >>> from soilml.identification.data.levels import LOG_LOAD_RULE, find_levels
+    >>> from soilml.fitting.levels import LOG_LOAD_RULE, find_levels
     >>> find_levels(np.log([19.1, 19.6, 20.4, 21.2]), LOG_LOAD_RULE).count
     1
     >>> found = find_levels(np.log([40.3, 88.0, 60.2, 39.2, 91.0, 61.1]), LOG_LOAD_RULE)

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.observations import Channel, Condensed, Observations
-from soilml.identification.data.operating_points import gear_numbers, operating_points_of_rows
-from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.many_rows.cells import cells_of
-from soilml.identification.nonlinear import nonlinear
-from soilml.identification.predictions import (
+from soilml.fitting.channel_predictions import (
     forces,
     noise_at_prediction,
     propagated_input_noise,
 )
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Channel, Condensed, Observations
+from soilml.fitting.operating_points import gear_numbers, operating_points_of_rows
+from soilml.identification.cells import cells_of
+from soilml.identification.nonlinear import nonlinear
 from soilml.physics.operating_point import COVARIATES, Operating
 
 Floats = NDArray[np.float64]

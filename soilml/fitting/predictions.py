@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.joined_cases import CaseSets, join_key, joined_load_case
-from soilml.gap.fitting.readings_by_gear import GearReadings, readings_by_gear
+from soilml.fitting.joined_cases import CaseSets, join_key, joined_load_case
+from soilml.fitting.readings import Readings
+from soilml.fitting.readings_by_gear import GearReadings, readings_by_gear
 from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
@@ -22,7 +22,7 @@ from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
 
 if TYPE_CHECKING:
-    from soilml.gap.fitting.coordinates import FitCoordinate
+    from soilml.fitting.coordinates import Coordinate
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -42,9 +42,9 @@ class PredictionRequest:
     """
 
     case: Case
-    coordinates: Sequence[FitCoordinate]
+    coordinates: Sequence[Coordinate]
     x: Floats
-    readings: StackedReadings
+    readings: Readings
     estimate: SinkageEstimate | None = None
     gears: Sequence[GearReadings] | None = None
 
@@ -258,7 +258,7 @@ def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate |
     )
 
 
-def _stacked(readings: StackedReadings, force: Force, rows: slice) -> Floats:
+def _stacked(readings: Readings, force: Force, rows: slice) -> Floats:
     """Readings (sets, m) from the forces of these rows."""
     points = np.size(readings.at.slip)
     channels = {

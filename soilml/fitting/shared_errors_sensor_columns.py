@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.identification.data.observations import Observations
+from soilml.fitting.observations import Observations
 
 Floats = NDArray[np.float64]
 

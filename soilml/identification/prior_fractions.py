@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.free_parameters import FreeParameter, soil_test_deviations
+from soilml.fitting.free_parameters import FreeParameter, soil_test_deviations
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 
 Floats = NDArray[np.float64]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.observations import Observations
-from soilml.identification.data.operating_points import rows_by_gear
-from soilml.identification.free_parameters import FreeParameter
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Observations
+from soilml.fitting.operating_points import rows_by_gear
 from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.linear_response import linear_response

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.compatibility import check_wheel_size
 from soilml.errors import FitError
-from soilml.identification.compatibility import check_wheel_size
-from soilml.identification.data.operating_points import operating_points, operating_points_of_rows
-from soilml.identification.data.rover_rows import with_rover_columns
-from soilml.identification.shared_errors.sizes import declared_errors
+from soilml.fitting.operating_points import operating_points, operating_points_of_rows
+from soilml.fitting.rover_rows import with_rover_columns
+from soilml.fitting.shared_errors_sizes import declared_errors
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column

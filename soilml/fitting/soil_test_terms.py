@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.fitting.coordinates import FitCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.physics.soils.soil_tests import deviation_rates, deviations
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ class SoilTestTerms:
     """
 
     case: Case | None = None
-    coordinates: Sequence[FitCoordinate] = ()
+    coordinates: Sequence[Coordinate] = ()
 
     def deviation(self, x: Floats) -> Floats:
         """Deviations (..., t) at coordinates x (..., p), in standard deviations."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.fitting.coordinates import FitCoordinate
-from soilml.gap.fitting.soil_test_terms import SoilTestTerms
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.soil_test_terms import SoilTestTerms
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class DampedSteps:
     tests: SoilTestTerms = field(default_factory=SoilTestTerms)
 
     @staticmethod
-    def of(coordinates: Sequence[FitCoordinate], case: Case | None = None) -> DampedSteps:
+    def of(coordinates: Sequence[Coordinate], case: Case | None = None) -> DampedSteps:
         """The steps in these coordinates, with the tests of a case's soil."""
         return DampedSteps(
             np.asarray([c.lower for c in coordinates]),
@@ -122,7 +122,7 @@ class DampedSteps:
             return np.where(np.isfinite(multiple), x + multiple * growth, x + step)
 
 
-def _offset(coordinate: FitCoordinate) -> float:
+def _offset(coordinate: Coordinate) -> float:
     prior = coordinate.prior
     positive = prior.lower > 0.0 and prior.upper > RATIO_OF_BOUNDS * prior.lower
     if prior.log or prior.normal_std is not None or not positive:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.identification.free_parameters import FreeParameter, select_free
+from soilml.fitting.free_parameters import FreeParameter, select_free
 from soilml.quantities import SHEAR
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.data.operating_points import rows_by_gear
+from soilml.fitting.operating_points import rows_by_gear
+from soilml.fitting.readings import Readings
 
 if TYPE_CHECKING:
-    from soilml.gap.fitting.coordinates import FitCoordinate
+    from soilml.fitting.coordinates import Coordinate
 
 Integers = NDArray[np.int64]
 
@@ -28,15 +28,15 @@ class GearReadings:
     """
 
     case: Case
-    coordinates: list[FitCoordinate]
+    coordinates: list[Coordinate]
     kept: Integers
-    readings: StackedReadings
+    readings: Readings
     rows: Integers
     selected: Integers
 
 
 def readings_by_gear(
-    case: Case, coordinates: Sequence[FitCoordinate], readings: StackedReadings
+    case: Case, coordinates: Sequence[Coordinate], readings: Readings
 ) -> list[GearReadings]:
     """The readings of each gear of a case with several; none where there is one gear.
 
@@ -63,7 +63,7 @@ def readings_by_gear(
     return parts
 
 
-def _at_path(coordinate: FitCoordinate, path: str) -> FitCoordinate:
+def _at_path(coordinate: Coordinate, path: str) -> Coordinate:
     """The coordinate of an effect by the name that the effect has in the case of one gear."""
     if coordinate.path == path:
         return coordinate

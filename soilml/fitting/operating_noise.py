@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.coordinates import predict_readings
+from soilml.fitting.coordinates import predict_readings
+from soilml.fitting.readings import Readings
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ STEP = 0.5
 MOST_SLIP = 0.99
 
 
-def noise_of_operation(case: Case, readings: StackedReadings) -> Floats:
+def noise_of_operation(case: Case, readings: Readings) -> Floats:
     r"""Standard deviation (m,) of readings by the declared noise of slip s and load W.
 
     .. math:: \sigma^2 = \left(\frac{\partial y}{\partial s} \sigma_s\right)^2
@@ -47,6 +47,6 @@ def noise_of_operation(case: Case, readings: StackedReadings) -> Floats:
     return np.asarray(np.sqrt(square))
 
 
-def _moved(readings: StackedReadings, name: str, values: Floats) -> StackedReadings:
+def _moved(readings: Readings, name: str, values: Floats) -> Readings:
     at = replace(readings.at, slip=values) if name == "slip" else replace(readings.at, load=values)
     return replace(readings, at=at)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.identification.data.operating_points import gear_numbers
+from soilml.fitting.operating_points import gear_numbers
+from soilml.fitting.readings import Readings
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import column
 
@@ -54,7 +54,7 @@ class DiscrepancyProcess:
 
 
 def discrepancy_process(
-    readings: StackedReadings, declared: Mapping[str, Discrepancy] | None = None
+    readings: Readings, declared: Mapping[str, Discrepancy] | None = None
 ) -> DiscrepancyProcess:
     """The process of these readings.
 

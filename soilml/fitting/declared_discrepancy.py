@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
-from soilml.identification.data.observations import Observations
-from soilml.identification.data.operating_points import gear_numbers
+from soilml.fitting.observations import Observations
+from soilml.fitting.operating_points import gear_numbers
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import QUANTITIES, column
 

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.batched_predictions import (
+from soilml.fitting.coordinates import Coordinate, SoilCoordinate
+from soilml.fitting.damped_steps import DampedSteps
+from soilml.fitting.predictions import (
     Linearisation,
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.gap.fitting.coordinates import FitCoordinate, SoilCoordinate
-from soilml.gap.fitting.damped_steps import DampedSteps
-from soilml.gap.fitting.readings_by_gear import readings_by_gear
-from soilml.gap.fitting.soil_test_terms import SoilTestTerms
-from soilml.gap.fitting.whitening import Whitening
+from soilml.fitting.readings import Readings
+from soilml.fitting.readings_by_gear import readings_by_gear
+from soilml.fitting.soil_test_terms import SoilTestTerms
+from soilml.fitting.whitening import Whitening
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.coarse_search import SinkageEstimate
 
@@ -44,7 +44,7 @@ MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 
 
 @dataclass(frozen=True)
-class GapFit:
+class Solution:
     """An optimum of generalised least squares: coordinates, residuals, Jacobian and objective.
 
     `objective` is the sum of squared whitened residuals, of squared coordinates over their prior
@@ -53,7 +53,7 @@ class GapFit:
     """
 
     case: Case
-    coordinates: tuple[FitCoordinate, ...]
+    coordinates: tuple[Coordinate, ...]
     x: Floats  # (p,)
     prediction: Floats  # (m,)
     residual: Floats  # (m,) whitened
@@ -63,7 +63,7 @@ class GapFit:
     reading: Floats  # (m,)
     derivatives: Floats  # (m, p) Jacobian in the readings' unit
 
-    def whitened_by(self, whiten: Whitening) -> GapFit:
+    def whitened_by(self, whiten: Whitening) -> Solution:
         """The same optimum with residuals and Jacobian whitened by another matrix (m, m)."""
         residual = whiten @ (self.reading - self.prediction)
         return replace(self, residual=residual, jacobian=whiten @ self.derivatives)
@@ -126,19 +126,19 @@ class FitRequest:
     """
 
     case: Case
-    coordinates: Sequence[FitCoordinate]
-    readings: StackedReadings
+    coordinates: Sequence[Coordinate]
+    readings: Readings
     whiten: Whitening
     start: Floats
 
 
 def levenberg_marquardt(
     case: Case,
-    coordinates: Sequence[FitCoordinate],
-    readings: StackedReadings,
+    coordinates: Sequence[Coordinate],
+    readings: Readings,
     whiten: Whitening,
     start: Floats,
-) -> GapFit:
+) -> Solution:
     """Bounded Levenberg-Marquardt descent from one start; see `descend_together`.
 
     Raises
@@ -152,7 +152,7 @@ def levenberg_marquardt(
     return fit
 
 
-def descend_together(requests: Sequence[FitRequest]) -> list[GapFit | InputError]:
+def descend_together(requests: Sequence[FitRequest]) -> list[Solution | InputError]:
     r"""Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
 
     .. math:: \min_x \|L^{-1} (y - f(x))\|^2 + \sum_k (x_k / \sigma_k)^2 + \sum_i z_i(x)^2
@@ -165,7 +165,7 @@ def descend_together(requests: Sequence[FitRequest]) -> list[GapFit | InputError
     ----------
     Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
-    results: dict[int, GapFit | InputError] = {}
+    results: dict[int, Solution | InputError] = {}
     descents = [_descent(request) for request in requests]
     asked = {i: next(descent) for i, descent in enumerate(descents)}
     while asked:
@@ -191,7 +191,7 @@ class _Question:
 
 
 #: A descent: asks questions, is sent the answers, and returns its fit.
-_Descent: TypeAlias = Generator[_Question, Any, GapFit]
+_Descent: TypeAlias = Generator[_Question, Any, Solution]
 
 
 def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation | InputError]:
@@ -279,7 +279,7 @@ def _descent(request: FitRequest) -> _Descent:
         if improvement < max(ENOUGH, SHARE * (last.objective - len(readings))):
             converged = True
             break
-    return GapFit(
+    return Solution(
         request.case,
         coordinates,
         last.x,

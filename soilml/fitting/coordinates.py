@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.gap.data.stacked_readings import StackedReadings
-from soilml.gap.fitting.batched_predictions import (
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.identification.free_parameters import FreeParameter
+from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.effects.base import Effect
@@ -30,7 +30,7 @@ SHAPE_STD = {"slip_power": 1.0, "by_slip": 3.0, "by_load": 1.0}
 
 
 @dataclass(frozen=True)
-class FitCoordinate(ABC):
+class Coordinate(ABC):
     """One coordinate x of a fit: its bounds, and how it maps to the value of a parameter.
 
     `name` is the parameter's name within its soil or effect. `prior` maps x to the value. `std`
@@ -59,7 +59,7 @@ class FitCoordinate(ABC):
 
 
 @dataclass(frozen=True)
-class SoilCoordinate(FitCoordinate):
+class SoilCoordinate(Coordinate):
     """A soil parameter: x is its cumulative probability under the prior, from 0 to 1."""
 
     @property
@@ -69,7 +69,7 @@ class SoilCoordinate(FitCoordinate):
 
 
 @dataclass(frozen=True, kw_only=True)
-class EffectCoordinate(FitCoordinate):
+class EffectCoordinate(Coordinate):
     """The size of an effect, x being in reference sizes, or one of its shape coefficients."""
 
     effect: str
@@ -128,7 +128,7 @@ def shape_coordinates(effect: type[Effect]) -> list[EffectCoordinate]:
 
 
 def predict_readings(
-    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
+    case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings
 ) -> Floats:
     """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
     (prediction,) = predict_many([PredictionRequest(case, coordinates, x, readings)])
@@ -138,7 +138,7 @@ def predict_readings(
 
 
 def linearise(
-    case: Case, coordinates: Sequence[FitCoordinate], x: Floats, readings: StackedReadings
+    case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings
 ) -> tuple[Floats, Floats]:
     """Predictions (m,) at `x` (p,) and their Jacobian (m, p); see `linearise_many`."""
     (found,) = linearise_many([PredictionRequest(case, coordinates, x[None, :], readings)])

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.identification.data.observations import Observations
-from soilml.identification.free_parameters import FreeParameter
-from soilml.identification.shared_errors.effect import ModelledErrors
+from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.observations import Observations
+from soilml.fitting.shared_errors_effect import ModelledErrors
 from soilml.numerics.prior import Prior
 
 Floats = NDArray[np.float64]

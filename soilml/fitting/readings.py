@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.identification.data.levels import Levels, load_levels, rows_driven_alike, slip_levels
-from soilml.identification.data.observations import declared_std
-from soilml.identification.data.operating_points import gear_numbers, operating_points
-from soilml.identification.data.rover_rows import with_rover_columns
+from soilml.fitting.levels import Levels, load_levels, rows_driven_alike, slip_levels
+from soilml.fitting.observations import declared_std
+from soilml.fitting.operating_points import gear_numbers, operating_points
+from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects.slip_load_scaling import REFERENCE_LOAD, log_relative_slip
 from soilml.physics.operating_point import Operating
@@ -29,7 +29,7 @@ MOST_READINGS = 3600
 
 
 @dataclass(frozen=True)
-class StackedReadings:
+class Readings:
     """Operating points of n rows, and the m readings of all channels in one vector.
 
     `row` and `channel` are the row and the index in `channels` of each reading; `std` is its
@@ -96,7 +96,7 @@ class StackedReadings:
         """Number of the gear that drove each reading, (m,); 0 where none is named."""
         return gear_numbers(self.at)[self.row]
 
-    def of_rows(self, rows: Integers, at: Operating) -> tuple[NDArray[np.bool_], StackedReadings]:
+    def of_rows(self, rows: Integers, at: Operating) -> tuple[NDArray[np.bool_], Readings]:
         """The readings of some rows, whose operating points are `at`, and which they are, (m,)."""
         position = np.full(len(self.run), -1)
         position[rows] = np.arange(rows.size)
@@ -111,7 +111,7 @@ class StackedReadings:
         stacked = np.stack([force[name] for name in self.channels], axis=-1)
         return np.asarray(stacked[..., self.row, self.channel])
 
-    def subset(self, selected: NDArray[np.bool_]) -> StackedReadings:
+    def subset(self, selected: NDArray[np.bool_]) -> Readings:
         """The selected readings; all rows are retained."""
         return replace(
             self,
@@ -122,7 +122,7 @@ class StackedReadings:
             sensor_std=None if self.sensor_std is None else self.sensor_std[selected],
         )
 
-    def with_noise_at(self, expected: Floats) -> StackedReadings:
+    def with_noise_at(self, expected: Floats) -> Readings:
         """The readings with the noise that is declared for the expected values (m,).
 
         Noise that is a fraction of the reading itself would give low readings too much weight. A
@@ -137,11 +137,11 @@ class StackedReadings:
         floor = np.asarray([1e-3 * np.median(own[self.channel == i]) for i in self.channel])
         return replace(self, std=np.maximum(std, floor), sensor_std=None)
 
-    def with_noise_of_operation(self, std: Floats) -> StackedReadings:
+    def with_noise_of_operation(self, std: Floats) -> Readings:
         """The readings with noise (m,) in addition that their slip and load cause."""
         return replace(self, std=np.hypot(self.std, std), sensor_std=self.std)
 
-    def with_known_noise(self) -> tuple[StackedReadings, list[str]]:
+    def with_known_noise(self) -> tuple[Readings, list[str]]:
         """The channels with known noise, if there are any, and notes about the excluded ones."""
         unknown = {int(i) for i in self.channel[~np.isfinite(self.std)]}
         if not unknown or len(unknown) == len(self.channels):
@@ -162,13 +162,13 @@ class StackedReadings:
             channel=np.asarray([index[int(i)] for i in readings.channel], dtype=np.int64),
         ), notes
 
-    def with_default_std(self, std: dict[str, float]) -> StackedReadings:
+    def with_default_std(self, std: dict[str, float]) -> Readings:
         """The readings with these standard deviations, by channel, where none is declared."""
         default = np.asarray([std.get(self.channels[i], np.nan) for i in self.channel])
         return replace(self, std=np.where(np.isfinite(self.std), self.std, default))
 
 
-def stack_readings(case: Case, table: Table) -> StackedReadings:
+def stack_readings(case: Case, table: Table) -> Readings:
     """All finite readings of the channels that the model predicts, with their declared noise.
 
     Noise is that of `<column>_std`, else of [noise] in the case; a standard deviation that is not
@@ -194,7 +194,7 @@ def stack_readings(case: Case, table: Table) -> StackedReadings:
         channel.append(np.full(kept.size, i))
         reading.append(values[kept])
         std.append(positive_std(case, table, column(name))[kept])
-    return StackedReadings(
+    return Readings(
         at=operating_points(table),
         run=number.astype(np.int64),
         runs=tuple(str(name) for name in runs),

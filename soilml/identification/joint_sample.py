@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.identification.descent import (
+from soilml.fitting.descent import (
     LeastSquaresProblem,
     Optimum,
     descend,
     global_optimum,
 )
-from soilml.identification.free_parameters import soil_test_rates
+from soilml.fitting.free_parameters import soil_test_rates
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.sampling.surface_sampling import MOST_ROUNDS, surface_sample

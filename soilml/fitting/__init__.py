@@ -1,0 +1,1 @@
+"""What every fit shares: readings, coordinates, predictions, covariance and least squares."""

@@ -1,1 +1,0 @@
-"""Bounded least-squares fits of cases to readings, many in step."""

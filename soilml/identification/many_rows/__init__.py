@@ -1,1 +1,0 @@
-"""Tables of more rows than a fit holds: rows that were driven alike become one."""

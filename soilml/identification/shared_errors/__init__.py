@@ -1,1 +1,0 @@
-"""Errors that all rows of a set share: their sizes, and how they change the readings."""
