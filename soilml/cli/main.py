@@ -21,8 +21,7 @@ from soilml.cli.process import (
     silence_stdout,
 )
 from soilml.errors import InputError, SoilmlError, did_you_mean
-from soilml.io.atomic_files import check_outputs
-from soilml.io.swap import clear_interrupted, replaced
+from soilml.io.atomic_files import check_outputs, clear_interrupted, replaced
 
 DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.io.number_text import read_number, read_whole_number
+from soilml.io.cell_text import read_number, read_whole_number
 from soilml.physics.effects import EFFECTS, Effect
 
 #: Rows beyond which a table would not fit into the memory of a small machine.

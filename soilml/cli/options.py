@@ -12,7 +12,7 @@ from pathlib import Path
 
 from soilml.cli.output_names import REPORT_FILES
 from soilml.errors import InputError
-from soilml.io.number_text import read_number, read_whole_number
+from soilml.io.cell_text import read_number, read_whole_number
 
 
 class InputFile(str):

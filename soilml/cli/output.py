@@ -15,7 +15,7 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
-from soilml.io.plain_text import escaped
+from soilml.io.cell_text import escaped
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
 from soilml.report.terminal import rounded, shown_column
 

@@ -69,7 +69,7 @@ class StopSignals:
 
 def _is_importing(frame: FrameType | None) -> bool:
     """Whether a module is being imported, and no output is being written."""
-    swap = sys.modules.get("soilml.io.swap")
+    swap = sys.modules.get("soilml.io.atomic_files")
     if getattr(swap, "is_writing", bool)() or getattr(swap, "replaced", ()):
         return False
     while frame is not None:
@@ -83,7 +83,7 @@ def fail(text: str, status: int, program: str = "soilml") -> int:
     """Print `text` as one line on standard error; returns the exit status."""
     from contextlib import suppress
 
-    from soilml.io.plain_text import escaped
+    from soilml.io.cell_text import escaped
 
     try:
         print(f"{program}: {' '.join(escaped(text).split())}", file=sys.stderr)

@@ -69,7 +69,7 @@ from soilml.gap.verdict.report_entries import (
 )
 from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import updated_case
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.unsolvable import solvable
 

@@ -24,7 +24,7 @@ from soilml.identification.linear import linear
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.unsolvable import solvable
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
-from soilml.io.number_text import read_number, read_numbers
-from soilml.io.plain_text import cell_as_text
-from soilml.io.table import TEXT, Column, fault_of_text
+from soilml.io.cell_text import cell_as_text, read_number, read_numbers
+from soilml.io.table import TEXT, Column, text_column
 
 #: Rows that a table may have: more do not fit into the memory of a usual machine.
 MOST_ROWS = 10_000_000
@@ -125,10 +124,8 @@ def _blocks(
 def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -> Column:
     """Cells as text or as numbers, NaN where blank."""
     if name in TEXT:
-        for line, cell in zip(lines, cells, strict=True):
-            if fault := fault_of_text(cell):
-                raise TableError(f"{file} line {line}, column {name}: {fault}")
-        return np.asarray([cell_as_text(cell) for cell in cells], dtype=np.str_)
+        texts = [cell_as_text(cell) for cell in cells]
+        return text_column(texts, lambda i: f"{file} line {lines[i]}, column {name}")
     filled = [i for i, cell in enumerate(cells) if cell]
     values = np.full(len(cells), np.nan)
     try:

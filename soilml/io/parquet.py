@@ -12,7 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from soilml.errors import MissingLibraryError, TableError
-from soilml.io.table import TEXT, Column, fault_of_text
+from soilml.io.table import TEXT, Column, text_column
 
 
 def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -147,8 +147,4 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
         cells = column.to_pylist()
     except UnicodeDecodeError as error:
         raise TableError(f"{file}, column {name}: has text that is not UTF-8: {error}") from None
-    names = ["" if c is None else str(c).strip() for c in cells]
-    for i, cell in enumerate(names):
-        if fault := fault_of_text(cell):
-            raise TableError(f"{file} line {i + 1}, column {name}: {fault}")
-    return np.asarray(names, dtype=np.str_)
+    return text_column(cells, lambda i: f"{file} line {i + 1}, column {name}")

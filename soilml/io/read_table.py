@@ -1,4 +1,4 @@
-"""Tables from CSV and Parquet files; every error names file, line and column."""
+"""Tables from CSV and Parquet files, data frames and columns; errors name file, line and column."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from soilml.errors import TableError
 from soilml.io.csv_file import read_csv
@@ -19,7 +20,7 @@ from soilml.io.parquet import (
     plain_column,
     read_parquet,
 )
-from soilml.io.table import TEXT, Table
+from soilml.io.table import TEXT, Column, Table, text_column
 from soilml.quantities import COLUMNS
 
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
@@ -51,6 +52,8 @@ _LIMITS: dict[str, Limits] = {
 }
 #: Magnitude of any other number; squares and products of such are finite.
 _MOST = 1e30
+#: What the analyses take as rows.
+Rows = Table | ArrowStream | Mapping[str, ArrayLike]
 
 
 def read_table(
@@ -250,3 +253,76 @@ def _read_parquet(file: Path, ignore_extra: bool) -> Table:
     columns = {name: plain_column(file, name, found[name]) for name in kept}
     rows = len(next(iter(found.values()))) if found else 0
     return Table(columns, str(file), np.arange(1, rows + 1), metadata)
+
+
+def as_table(rows: Rows) -> Table:
+    """The table of rows; data frames, columns and tables made of them are checked as files are.
+
+    Parameters
+    ----------
+    rows
+        A `Table`; a data frame of pandas, polars or pyarrow; or a mapping of columns (rows,) by
+        names such as load_N, numbers and, for runs, text.
+
+    Raises
+    ------
+    TableError
+        For another object, columns of different lengths, and what `read_table` refuses.
+
+    Examples
+    --------
+    >>> len(as_table({"slip": [0.1, 0.2], "load_N": [60, 60], "torque_Nm": [1.5, 2.0]}))
+    2
+    """
+    if isinstance(rows, Table):
+        # the rows of files have been checked, and have the lines of their file
+        return rows if len(rows.line) else _checked(rows.columns, rows.source, rows.metadata)
+    if isinstance(rows, ArrowStream):
+        return read_table(rows)
+    if not isinstance(rows, Mapping):
+        raise TableError(
+            f"rows are {type(rows).__name__}; needed is a Table, as read_table returns it, a data "
+            "frame, or a mapping of columns by name"
+        )
+    return _checked(rows, "rows", {})
+
+
+def _checked(rows: Mapping[str, ArrayLike], source: str, metadata: Mapping[str, str]) -> Table:
+    """A table of columns by name; `source` is what messages call it."""
+    odd = next((name for name in rows if not isinstance(name, str)), None)
+    if odd is not None:
+        raise TableError(f"{source}: a column is named {odd!r}; needed is a text such as 'load_N'")
+    file = Path(source)
+    names = known_columns(file, list(rows), False, own_columns(metadata))
+    columns = {name: _column(source, name, rows[name]) for name in names}
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise TableError(f"{source}: columns differ in length: {listed}")
+    table = Table(columns, source, metadata=dict(metadata))
+    return check_table(table, file, (), FILLED, None)
+
+
+def _column(source: str, name: str, values: ArrayLike) -> Column:
+    """A column (rows,) of text or of numbers; a single value is a column of one row."""
+    try:
+        given = np.atleast_1d(np.asarray(values))
+    except ValueError:  # lists of different lengths
+        raise TableError(f"{source}, column {name}: needed is one value a row") from None
+    if given.ndim != 1:
+        shape = given.shape
+        raise TableError(f"{source}, column {name}: has shape {shape}; needed is one value a row")
+    if name in TEXT:
+        return text_column(given.tolist(), lambda i: f"{source}, row {i + 1}, column {name}")
+    if given.dtype.kind in "iuf":
+        return given.astype(np.float64)
+    cells = given.tolist()
+    if given.dtype.kind != "O" or not all(c is None or _is_number(c) for c in cells):
+        raise TableError(
+            f"{source}, column {name}: needed are numbers, and None where one is missing"
+        )
+    return np.asarray([np.nan if c is None else c for c in cells], dtype=np.float64)
+
+
+def _is_number(cell: object) -> bool:
+    return isinstance(cell, int | float | np.number) and not isinstance(cell, bool)

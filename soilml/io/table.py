@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import MissingLibraryError, TableError
-from soilml.io.number_text import read_number
-from soilml.io.plain_text import is_plain
+from soilml.io.cell_text import is_plain, read_number
 from soilml.row_status import Status
 
 Column = NDArray[Any]
@@ -27,6 +26,18 @@ def fault_of_text(text: str) -> str:
     if len(text) > MOST_TEXT:
         return f"the text has {len(text)} characters; at most {MOST_TEXT} are read"
     return "" if is_plain(text) else f"{text!a} has control characters; needed is plain text"
+
+
+def text_column(cells: Iterable[Any], place: Callable[[int], str]) -> Column:
+    """A column of text (rows,), "" where blank; `place` names the place of a row in messages.
+
+    Raises `TableError` for a cell that is too long, and for one with control characters.
+    """
+    texts = ["" if cell is None else str(cell).strip() for cell in cells]
+    for i, text in enumerate(texts):
+        if fault := fault_of_text(text):
+            raise TableError(f"{place(i)}: {fault}")
+    return np.asarray(texts, dtype=np.str_)
 
 
 #: Name of the group of all rows; see `Table.groups`.

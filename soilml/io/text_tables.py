@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.io.plain_text import text_as_cell
+from soilml.io.cell_text import text_as_cell
 
 Columns = Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.errors import InputError, SoilmlError
-from soilml.io.table import Table, fault_of_text
+from soilml.io.table import Table, text_column
 from soilml.log_import.guesses.columns.column_words import words_of
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
@@ -102,10 +102,8 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         found["plate_radius_m"] = found.pop("plate_diameter") / 2.0
     if "displacement" in found:
         found[_our_name("displacement", own)] = found.pop("displacement")
-    for row, name in enumerate(names):
-        if fault := fault_of_text(name):
-            raise InputError(f"{path}, row {row + 1} of the tests, column {label!r}: {fault}")
-    columns = {"test": np.asarray(names), **found}
+    tests = text_column(names, lambda i: f"{path}, row {i + 1} of the tests, column {label!r}")
+    columns = {"test": tests, **found}
     lines = np.arange(1, len(own) + 1)
     return SoilTests(Table(columns, str(path), lines), tuple(taken), tuple(left_out))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from soilml.optional_imports import need
 from soilml.report import numbers
 from soilml.report.figure_style import SvgImage
-from soilml.report.origin import Origin, report_entry
+from soilml.report.page import Origin, report_entry
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.fitting.operating_points import operating_points
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column

@@ -11,7 +11,7 @@ from conftest import MODEL
 
 from soilml.cli import main
 from soilml.errors import InputError
-from soilml.io.swap import Swap
+from soilml.io.atomic_files import Swap
 
 #: Runs the command line; SIGINT arrives when the named module is imported.
 INTERRUPTED = """
@@ -61,7 +61,7 @@ def test_what_was_written_before_is_said(tmp_path):
     (tmp_path / "model.toml").write_text(MODEL)
     code = """
 import os, signal, sys
-import soilml.io.swap as swap
+import soilml.io.atomic_files as swap
 signal.signal(signal.SIGINT, signal.default_int_handler)
 class Written(list):
     def append(self, names):

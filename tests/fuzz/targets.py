@@ -30,8 +30,7 @@ from soilml.config.case import read_case
 from soilml.errors import SoilmlError, TableError
 from soilml.gap import audit, gap
 from soilml.identification import METHODS
-from soilml.io.read_table import read_table
-from soilml.io.rows import as_table
+from soilml.io.read_table import as_table, read_table
 from soilml.io.table import Table
 from soilml.log_import import import_log, init_map
 from soilml.parameters import declared

@@ -18,13 +18,13 @@ from soilml.config.case import read_case
 from soilml.config.sensor_bias import checked_sensors
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
-from soilml.io.number_text import read_number
+from soilml.io.cell_text import read_number
 from soilml.io.read_table import RUNS
 from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
 from soilml.report.numbers import format_residual
-from soilml.report.origin import Origin
+from soilml.report.page import Origin
 from soilml.report.terminal import rounded, shown_unit, significant
 
 if TYPE_CHECKING:

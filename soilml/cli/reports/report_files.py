@@ -11,8 +11,7 @@ from soilml.cli.options import input_files
 from soilml.cli.output import json_text
 from soilml.cli.output_names import REPORT_FILES
 from soilml.io.atomic_files import write_files
-from soilml.report.origin import Origin
-from soilml.report.page import Report, page
+from soilml.report.page import Origin, Report, page
 
 #: What is written to a file: its text, or a function of the path.
 Content = str | Callable[[Path], object]

@@ -26,7 +26,7 @@ from soilml.gap.design.planned_readings import expected_readings, joined_reading
 from soilml.gap.design.run_costs import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.statistics.signatures import Signature, effect_signatures
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
 from soilml.unsolvable import solvable

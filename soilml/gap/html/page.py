@@ -24,8 +24,7 @@ from soilml.gap.html.verdict_section import (
 from soilml.gap.results import STATUSES, GapReport
 from soilml.optional_imports import need
 from soilml.report import numbers
-from soilml.report.origin import Origin
-from soilml.report.page import Report, render
+from soilml.report.page import Origin, Report, render
 
 
 def page(report: GapReport, model: str, runs: str, origin: Origin | None = None) -> str:

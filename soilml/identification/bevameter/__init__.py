@@ -19,7 +19,7 @@ from soilml.identification.bevameter.soil_section import (
     shear_section,
     within_bounds,
 )
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.numerics.prior import Prior
 from soilml.numerics.rounding import significant
 from soilml.physics.soils.soil_tests import SoilTest

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.io.number_text import read_number
+from soilml.io.cell_text import read_number
 from soilml.log_import.channels.resampling import (
     derivative,
     on_grid,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from soilml.errors import InputError
-from soilml.io.plain_text import escaped
+from soilml.io.cell_text import escaped
 from soilml.log_import.channels.runs import matched_files, run_names, runs_of
 from soilml.log_import.guesses.clocks import (
     guess_clock,

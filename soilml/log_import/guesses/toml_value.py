@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.io.plain_text import is_plain
+from soilml.io.cell_text import is_plain
 
 
 def toml_value(value: Any) -> str:

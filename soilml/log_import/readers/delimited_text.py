@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.io.number_text import read_number, read_numbers
+from soilml.io.cell_text import read_number, read_numbers
 from soilml.log_import.readers.long_table import signals_of
 from soilml.log_import.readers.text_blocks import BLOCK, find_blocks
 from soilml.log_import.readers.text_encoding import decode_text

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.io.number_text import read_number
+from soilml.io.cell_text import read_number
 from soilml.log_import.recording import Floats, Recording
 from soilml.optional_imports import need
 

@@ -11,8 +11,7 @@ from soilml.log_import.report.figures import run_figure, slip_figures
 from soilml.log_import.result import ImportedLog
 from soilml.optional_imports import need
 from soilml.report.numbers import format_number, format_with_std
-from soilml.report.origin import Origin
-from soilml.report.page import Report, render
+from soilml.report.page import Origin, Report, render
 
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24

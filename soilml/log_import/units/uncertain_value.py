@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from soilml.io.number_text import read_number
+from soilml.io.cell_text import read_number
 from soilml.io.toml_settings import Settings
 from soilml.log_import.units.conversion import factor
 

@@ -13,7 +13,7 @@ from soilml.config.case import Case
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.fitting.rover_rows import with_rover_columns
-from soilml.io.rows import Rows, as_table
+from soilml.io.read_table import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.traction.by_load import slip_grid

@@ -11,7 +11,7 @@ from soilml.config.case import read_case
 from soilml.config.units import text_in_si
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
-from soilml.io.number_text import read_number
+from soilml.io.cell_text import read_number
 from soilml.physics.soils import soil_catalogue
 
 #: The question for each option that is asked for, and the default answer.

@@ -1,4 +1,4 @@
-"""The one reader of numbers that are written as text: cells, options and settings in quotes.
+"""Text of cells, options and settings: numbers, plain text, no spreadsheet formulas.
 
 Python's own `float` also takes underscores, digits of other scripts, "nan" and "infinity": a cell
 `1_000`, damaged from `1.000`, would be read as a thousand.
@@ -7,11 +7,17 @@ Python's own `float` also takes underscores, digits of other scripts, "nan" and 
 from __future__ import annotations
 
 import math
+import unicodedata
 from collections.abc import Sequence
 
 _CHARACTERS = frozenset("0123456789+-.eE")
 #: Digits of a whole number; more do not fit into 64 bits.
 _MOST_DIGITS = 18
+#: Unicode categories that a terminal may obey or that reorder what is read: control, format,
+#: surrogate, private use, not assigned; and separators of lines and paragraphs.
+_NOT_PLAIN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
+#: First characters of a cell that spreadsheet programs calculate.
+_FORMULA = ("=", "+", "-", "@")
 
 
 def read_number(text: str) -> float:
@@ -40,3 +46,25 @@ def read_whole_number(text: str) -> int:
     if not (digits.isascii() and digits.isdecimal() and len(digits) <= _MOST_DIGITS):
         raise ValueError(f"{text!r} is not a whole number")
     return int(text)
+
+
+def is_plain(text: str) -> bool:
+    """Whether every character of the text is shown as itself."""
+    return text.isprintable() or all(unicodedata.category(c) not in _NOT_PLAIN for c in text)
+
+
+def escaped(text: str) -> str:
+    r"""The text with escapes such as \x1b for characters that are not plain; newlines stay."""
+    if text.isprintable():
+        return text
+    return "".join(c if c == "\n" or is_plain(c) else ascii(c)[1:-1] for c in text)
+
+
+def text_as_cell(text: str) -> str:
+    """A text as the cell of a CSV file; one that a spreadsheet would calculate gets a quote."""
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
+def cell_as_text(cell: str) -> str:
+    """The text of a cell that `text_as_cell` may have written."""
+    return cell[1:] if cell.startswith("'") and cell[1:].startswith(_FORMULA) else cell

@@ -8,7 +8,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.errors import TableError
 from soilml.gap import audit, gap
 from soilml.identification.bevameter import bevameter
-from soilml.io.rows import as_table
+from soilml.io.read_table import as_table
 from soilml.numerics.prior import Prior
 from soilml.traction.report import pull_report
 

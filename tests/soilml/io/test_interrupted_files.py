@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from soilml.errors import InputError
-from soilml.io import swap
+from soilml.io import atomic_files
 from soilml.io.atomic_files import atomic_outputs, save_text
 
 #: Writes two files; the named moment of the exchange then sends the named signal to the process.
@@ -18,7 +18,7 @@ WRITER = """
 import os, signal, sys
 from pathlib import Path
 from soilml.cli.process import StopSignals
-from soilml.io import swap
+from soilml.io import atomic_files
 from soilml.io.atomic_files import atomic_outputs
 folder, number, after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 if number != signal.SIGKILL:
@@ -116,10 +116,10 @@ def test_permissions_are_kept_and_a_read_only_file_is_not_replaced(folder):
 
 
 def test_this_process_remembers_what_it_replaced(folder):
-    before = len(swap.replaced)
+    before = len(atomic_files.replaced)
     save_text(folder / "one", "new")
-    assert swap.replaced[before:] == [str(folder / "one")]
-    assert not swap.is_writing()
+    assert atomic_files.replaced[before:] == [str(folder / "one")]
+    assert not atomic_files.is_writing()
 
 
 def test_a_disk_without_room_for_a_line_keeps_no_journal(folder, monkeypatch):
@@ -127,8 +127,8 @@ def test_a_disk_without_room_for_a_line_keeps_no_journal(folder, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     before = sorted(path.name for path in folder.iterdir())
-    monkeypatch.setattr(swap.Swap, "_write", full)
+    monkeypatch.setattr(atomic_files.Swap, "_write", full)
     with pytest.raises(InputError, match="No space left on device"):
         save_text(folder / "new.txt", "new")
     assert sorted(path.name for path in folder.iterdir()) == before
-    assert not swap.is_writing()
+    assert not atomic_files.is_writing()
