@@ -2,20 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import hashlib
+import os
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.optional_imports import need
+from soilml.remarks import Remark
 from soilml.report import numbers
 from soilml.report.figure_style import SvgImage
-from soilml.report.page import Origin, report_entry
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+#: Version of the entry `report` in the JSON files: raised where a key changes its meaning or goes.
+FORMAT_VERSION = 1
+_BLOCK = 1 << 20
 #: Most rows of a table on a page; the JSON file has all.
 MOST_ROWS = 200
+
+
+@dataclass(frozen=True)
+class InputRecord:
+    """A file that was read: its name as given, its size in bytes and its SHA-256 checksum.
+
+    Size and checksum are None for what is no regular file, such as a pipe or a folder.
+    """
+
+    name: str
+    size: int | None = None
+    sha256: str | None = None
+
+    @staticmethod
+    def of(path: str | os.PathLike[str]) -> InputRecord:
+        """The record of a file as it is now."""
+        file = Path(path)
+        try:
+            if not file.is_file():
+                return InputRecord(os.fspath(path))
+            total, found = 0, hashlib.sha256()
+            with file.open("rb") as opened:
+                while block := opened.read(_BLOCK):
+                    total += len(block)
+                    found.update(block)
+        except OSError:
+            return InputRecord(os.fspath(path))
+        return InputRecord(os.fspath(path), total, found.hexdigest())
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Command line, version of soilml, and input files."""
+
+    command: str
+    version: str
+    files: tuple[InputRecord, ...] = ()
+
+    @staticmethod
+    def of(words: Sequence[str], files: Iterable[str | os.PathLike[str]]) -> Provenance:
+        """The origin of a report that the words after `soilml` asked for."""
+        from soilml import __version__
+
+        names = [name for name in dict.fromkeys(os.fspath(f) for f in files) if Path(name).exists()]
+        records = tuple(InputRecord.of(name) for name in names)
+        return Provenance(shlex.join(["soilml", *words]), __version__, records)
+
+
+def _plain(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 @dataclass(frozen=True)
@@ -75,16 +132,32 @@ class Report:
     tone: str = "named"
     pictures: Sequence[ReportPicture] = ()
     tables: Sequence[ReportTable] = ()
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Remark | str] = ()
     next_steps: Sequence[str] = ()
     notation: Sequence[tuple[str, str]] = field(default_factory=tuple)
 
-    def as_json(self, origin: Origin) -> dict[str, Any]:
+    def as_json(self, origin: Provenance) -> dict[str, Any]:
         """The entry `report` of the JSON file beside the page."""
-        return report_entry(self.kind, origin, self.answer, self.warnings, self.next_steps)
+        warnings = [
+            replace(given, text=_plain(given.text)).as_json()
+            if isinstance(given, Remark)
+            else _plain(given)
+            for given in self.warnings
+        ]
+        return {
+            "format": "soilml-report",
+            "version": FORMAT_VERSION,
+            "kind": self.kind,
+            "command": origin.command,
+            "soilml_version": origin.version,
+            "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+            "answer": [_plain(text) for text in self.answer],
+            "warnings": warnings,
+            "next": [_plain(text) for text in self.next_steps],
+        }
 
 
-def page(report: Report, origin: Origin) -> str:
+def page(report: Report, origin: Provenance) -> str:
     """The report as HTML."""
     return render("report.html.j2", "soilml.report", report.kind, page=report, origin=origin)
 
@@ -97,7 +170,7 @@ def render(template: str, package: str, command: str, **content: Any) -> str:
     command
         The command that is named where jinja2 is missing.
     content
-        Variables of the template; `page` is a `Report`, `origin` an `Origin`.
+        Variables of the template; `page` is a `Report`, `origin` a `Provenance`.
     """
     need("jinja2", command)
     return _environment(package).get_template(template).render(**content)
@@ -120,6 +193,6 @@ def _environment(package: str) -> Environment:
         "channel": numbers.channel_name,
         "gain": numbers.format_gain,
         "quantity": numbers.format_quantity,
-        "sentence": numbers.capitalised,
+        "sentence": lambda text: numbers.capitalised(str(text)),
     }
     return environment

@@ -24,7 +24,7 @@ from soilml.io.text_tables import csv_text, format_table
 from soilml.optional_imports import need
 from soilml.physics.effects.base import Effect
 from soilml.report.numbers import format_residual
-from soilml.report.page import Origin
+from soilml.report.page import Provenance
 from soilml.report.terminal import rounded, shown_unit, significant
 
 if TYPE_CHECKING:
@@ -68,14 +68,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def gap_files(
-    report: GapReport, model: str, runs: str, origin: Origin | None = None
+    report: GapReport, model: str, runs: str, origin: Provenance | None = None
 ) -> dict[str, str]:
     """The content of the files of a report by their names; `model` and `runs` were analysed."""
     from soilml.config.write_case import case_as_toml
     from soilml.gap.html.page import page, summary
 
     if origin is None:
-        origin = Origin.of(["gap", model, runs], [])
+        origin = Provenance.of(["gap", model, runs], [])
     entry = {"report": summary(report, model, runs).as_json(origin)}
     texts = {
         "report.html": page(report, model, runs, origin),

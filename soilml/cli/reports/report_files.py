@@ -11,19 +11,23 @@ from soilml.cli.options import input_files
 from soilml.cli.output import json_text
 from soilml.cli.output_names import REPORT_FILES
 from soilml.io.atomic_files import write_files
-from soilml.report.page import Origin, Report, page
+from soilml.report.page import Provenance, Report, page
 
 #: What is written to a file: its text, or a function of the path.
 Content = str | Callable[[Path], object]
 
 
-def origin_of(args: argparse.Namespace, files: Iterable[str] = ()) -> Origin:
+def origin_of(args: argparse.Namespace, files: Iterable[str] = ()) -> Provenance:
     """The command and its input files, of which `files` are some that no argument names."""
-    return Origin.of(getattr(args, "command_line", []), [*input_files(args), *files])
+    return Provenance.of(getattr(args, "command_line", []), [*input_files(args), *files])
 
 
 def report_texts(
-    report: Report, origin: Origin, content: Mapping[str, Any], names: tuple[str, str], folder: Path
+    report: Report,
+    origin: Provenance,
+    content: Mapping[str, Any],
+    names: tuple[str, str],
+    folder: Path,
 ) -> dict[Path, Content]:
     """The page and the JSON file, by their paths; `content` is the result in SI units."""
     html, json_name = names

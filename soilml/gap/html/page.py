@@ -24,23 +24,23 @@ from soilml.gap.html.verdict_section import (
 from soilml.gap.results import STATUSES, GapReport
 from soilml.optional_imports import need
 from soilml.report import numbers
-from soilml.report.page import Origin, Report, render
+from soilml.report.page import Provenance, Report, render
 
 
-def page(report: GapReport, model: str, runs: str, origin: Origin | None = None) -> str:
+def page(report: GapReport, model: str, runs: str, origin: Provenance | None = None) -> str:
     """The report as HTML.
 
     Parameters
     ----------
     model, runs : str
         Names of the analysed files.
-    origin : Origin, optional
+    origin : Provenance, optional
         The command and its files; by default the call of `soilml.gap.gap` in Python.
     """
     for library in ("jinja2", "matplotlib"):
         need(library, "gap")
     if origin is None:
-        origin = Origin.of(["gap", model, runs], [])
+        origin = Provenance.of(["gap", model, runs], [])
     content = {"page": summary(report, model, runs), "origin": origin, **_content(report)}
     return render("gap_page.html.j2", "soilml.gap.html", "gap", **content)
 

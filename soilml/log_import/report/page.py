@@ -11,7 +11,7 @@ from soilml.log_import.report.figures import run_figure, slip_figures
 from soilml.log_import.result import ImportedLog
 from soilml.optional_imports import need
 from soilml.report.numbers import format_number, format_with_std
-from soilml.report.page import Origin, Report, render
+from soilml.report.page import Provenance, Report, render
 
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24
@@ -40,7 +40,7 @@ _UNITS = {"slip": "", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkag
 def page(
     imported: ImportedLog,
     progress: Callable[[str, int, int], None] | None = None,
-    origin: Origin | None = None,
+    origin: Provenance | None = None,
 ) -> str:
     """The report as HTML.
 
@@ -54,7 +54,7 @@ def page(
     for library in ("jinja2", "matplotlib"):
         need(library, "import")
     if origin is None:
-        origin = Origin.of(["import", *imported.sources, "--map", imported.map_name], [])
+        origin = Provenance.of(["import", *imported.sources, "--map", imported.map_name], [])
     shown = imported.series[:MOST_RUNS]
     pictures = []
     for i, series in enumerate(shown):
