@@ -68,7 +68,7 @@ kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to
 gap-real: $(VENV)/.ready ## run the gap workflow on published tests: make gap-real SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/gap/real.py
 
-bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md
+bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md and docs/benchmarks/
 	@$(BIN)/python bench/run.py
 
 bench-gap: $(VENV)/.ready ## 364 sets with hidden effects against gates and baselines, half an hour on two cores
@@ -90,12 +90,12 @@ coverage: $(VENV)/.ready ## statements and branches that `make test` reaches, by
 	  --disable-pip-version-check --editable '.[coverage]'
 	@mkdir -p build
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not long" --cov --cov-report=json:build/coverage.json
-	@$(BIN)/python bench/reached.py
+	@$(BIN)/python tools/reached.py
 
 mutation: $(VENV)/.ready ## change the source at random places and see whether a test fails: make mutation MUTANTS=12
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[mutation]'
-	@$(BIN)/python bench/mutation.py --mutants $(or $(MUTANTS),12)
+	@$(BIN)/python tools/mutation.py --mutants $(or $(MUTANTS),12)
 
 # what the tests need beside the libraries that users install, and the tests that tell versions apart
 TEST_LIBRARIES := '.[ground,logs,cluster,serve]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
@@ -104,7 +104,7 @@ TEST_VERSIONS := -m pytest -q -n auto -p no:cacheprovider \
 
 test-oldest: ## quick tests with the oldest libraries that are allowed, twenty minutes on two cores
 	@$(PYTHON) -m venv .venv-oldest
-	@mkdir -p build && $(PYTHON) bench/oldest.py > build/oldest.txt
+	@mkdir -p build && $(PYTHON) tools/oldest.py > build/oldest.txt
 	@PIP_CONSTRAINT=build/oldest.txt .venv-oldest/bin/python -m pip install --quiet \
 	  --disable-pip-version-check $(TEST_LIBRARIES)
 	@SCIPY_ARRAY_API=1 .venv-oldest/bin/python $(TEST_VERSIONS)
@@ -119,7 +119,7 @@ endurance: $(VENV)/.ready ## a day at 10 Hz through the estimator on board, an h
 	@$(BIN)/python tests/endurance/endurance_run.py
 
 bounds: $(VENV)/.ready ## peak memory and time of commands at their largest tables, ten minutes
-	@$(BIN)/python bench/bounds.py
+	@$(BIN)/python tools/bounds.py
 
 docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/docs/index.html, two minutes
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
@@ -134,19 +134,19 @@ docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/d
 	@touch $@
 
 release: $(VENV)/.ready ## build wheel and source archive twice, compare, install and measure them: dist/
-	@$(BIN)/python bench/release.py
+	@$(BIN)/python tools/release.py
 
 lock: .venv-supply/.ready ## write the packages with their hashes: onboard-hashes.txt, ground-hashes.txt
-	@$(PYTHON) bench/packages.py lock
+	@$(PYTHON) tools/packages.py lock
 
 sbom: .venv-supply/.ready ## write bills of materials (CycloneDX) into build/
-	@$(PYTHON) bench/packages.py sbom
+	@$(PYTHON) tools/packages.py sbom
 
 licences: $(VENV)/.ready ## print the licences of the installed packages
-	@$(BIN)/python bench/packages.py licences
+	@$(BIN)/python tools/packages.py licences
 
 audit-packages: .venv-supply/.ready ## compare the packages with known faults, by pip-audit
-	@$(PYTHON) bench/packages.py audit
+	@$(PYTHON) tools/packages.py audit
 
 clean: ## remove the environment and what demo and tests made
 	rm -rf $(VENV) .venv-supply .venv-oldest .venv-newest demo build dist .mypy_cache .ruff_cache .pytest_cache

@@ -130,7 +130,7 @@ def _measured(
 
 
 def next_rows(soils: int = SOILS) -> str:
-    """The section of BENCHMARKS.md: width and error that each next row leaves."""
+    """The section of the page: width and error that each next row leaves."""
     case = read_case(ROOT / "examples" / "wheel" / "model.toml")
     lines = [
         "| rows at one slip and load | then one row | std left c | phi | K | all "
@@ -149,7 +149,7 @@ def next_rows(soils: int = SOILS) -> str:
 
 
 def plans(soils: int = SOILS) -> str:
-    """The section of BENCHMARKS.md: rows planned at once against rows drawn at random."""
+    """The section of the page: rows planned at once against rows drawn at random."""
     case = read_case(ROOT / "examples" / "wheel" / "model.toml")
     lines = ["| rows | chosen | std left c | phi | K | all |", "|---|---|---:|---:|---:|---:|"]
     for rows in (2, 3):

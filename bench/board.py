@@ -30,6 +30,11 @@ print(t, int(status["VmRSS"].split()[0]) / 1024)
 """
 
 
+def section(folder: Path) -> str:
+    """All tables of the latency on board."""
+    return "\n\n".join([latency(), steps(), cold_start()])
+
+
 def latency() -> str:
     """Median and 99th percentile (us): onnxruntime, and through `Estimator`; sets of 16."""
     lines = [

@@ -1,4 +1,4 @@
-"""Measure the gap workflow on hidden effects, and write its part of BENCHMARKS.md.
+"""Measure the gap workflow on hidden effects, and write docs/benchmarks/gap.md.
 
 python bench/gap.py --every 20                 a quick look at the sealed sets
 python bench/gap.py --seed 1 --keep dev.json   sets to tune on; the records are kept
@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
 import gap_reliability
-from benchmarks_file import FILE, MARK, ROOT
+from benchmarks_file import ROOT, TITLES, machine, page_file
 from gap_case import judged
 from gap_records import Judged, from_json
 
@@ -45,8 +45,7 @@ def run() -> None:
     print(text)
     if args.write:
         gap_reliability.save_picture(sets, ROOT / gap_pages.PICTURE)
-        before = FILE.read_text().partition(MARK)[0].rstrip() + "\n" if FILE.exists() else ""
-        save_text(FILE, before + MARK + "\n" + text)
+        save_text(page_file("gap"), f"# {TITLES['gap']}\n\n**Machine.** {machine()}\n\n{text}")
 
 
 def _arguments() -> argparse.Namespace:
@@ -68,7 +67,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--table", nargs="+", metavar="FILE.json", help="print the pages of kept records"
     )
-    parser.add_argument("--write", action="store_true", help="write BENCHMARKS.md and its picture")
+    parser.add_argument(
+        "--write", action="store_true", help="write docs/benchmarks/gap.md and its picture"
+    )
     return parser.parse_args()
 
 

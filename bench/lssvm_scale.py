@@ -34,7 +34,7 @@ PROTOTYPES = (50, 150, 500)
 #: Rows of another seed that hyperparameters are selected on, that are calibrated on, and scored.
 VALIDATION, CALIBRATION, SCORED = 4000, 4000, 20_000
 ABOUT = (
-    "![Error and time against the number of rows](docs/lssvm.png)\n\n"
+    "![Error and time against the number of rows](../lssvm.png)\n\n"
     "Rows with a soil of their own each; hyperparameters from "
     f"{VALIDATION} validation rows, intervals recalibrated on {CALIBRATION} others. *Memory*: of "
     "the fit beyond its data, as it is stated before, and the largest resident size measured."

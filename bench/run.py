@@ -1,8 +1,7 @@
-"""Measure the figures of BENCHMARKS.md and write the file: `make bench`."""
+"""Measure the figures of BENCHMARKS.md and docs/benchmarks/, and write them: `make bench`."""
 
 from __future__ import annotations
 
-import re
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -10,16 +9,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 
 import advice
+import benchmarks_file
+import board
 import c_export
+import code_paths
 import generation
 import identification
-import latency_floor
 import learning
 import lssvm_scale
 import model_errors
-import peers
 import physics
 import prospects
 import slip
@@ -30,19 +31,19 @@ import systems
 import training_time
 import wall_time
 import wrong_worlds_identified
-from benchmarks_file import FILE, MARK, ROOT, machine
-
-from soilml.io.atomic_files import save_text
+from benchmarks_file import ROOT, SUMMARY
 
 
 @dataclass(frozen=True)
 class Part:
-    """A section of BENCHMARKS.md: name on the command line, title, introduction, measurement.
+    """A section: its name on the command line, page, title, introduction and measurement.
 
-    `text` gets a temporary folder and returns Markdown.
+    The part without a page is the summary of BENCHMARKS.md. `text` gets a temporary folder and
+    returns Markdown.
     """
 
     name: str
+    page: str
     title: str
     about: str
     text: Callable[[Path], str]
@@ -51,12 +52,14 @@ class Part:
 PARTS = (
     Part(
         "summary",
-        "At a glance",
+        "",
+        SUMMARY,
         "The best of several calls in one run, on the machine named above; details stand below.",
         lambda folder: summary.text(),
     ),
     Part(
         "accuracy",
+        "forward-model",
         "Accuracy of the rigid wheel",
         "Relative error against adaptive quadrature and bracketing (`tests/reference.py`), over "
         "c 0 to 6 kPa, phi 15 to 50 deg, K 2 to 60 mm, n 0.4 to 1.6, k 4e4 to 1e7 N/m^(n+2), load "
@@ -65,16 +68,23 @@ PARTS = (
     ),
     Part(
         "speed",
+        "forward-model",
         "Speed of the forward model",
         "200 000 operating points in a call, where nothing else is said; the best of three runs, "
         "all cases in turn. The wheel has r 0.15 m and b 0.12 m and stands on soils of the recipe "
         "`wheel`; it drives where nothing else is said.",
         lambda folder: physics.speed(),
     ),
-    Part("peers", "The forward model beside other ways", peers.ABOUT, peers.tables),
-    Part("generation", "Synthetic data on all cores", generation.ABOUT, generation.section),
+    Part(
+        "generation",
+        "forward-model",
+        "Synthetic data on all cores",
+        generation.ABOUT,
+        generation.section,
+    ),
     Part(
         "comparison",
+        "identification",
         "Estimators and analytic methods relative to the Bayes limit",
         "Written by `soilml compare`; docs/benchmark.md explains the benchmark. Reference wheel, "
         "recipe `benchmark`: c 0 to 3 kPa, phi 25 to 45 deg, K 5 to 30 mm, slip 0.05 to 0.6, load "
@@ -84,6 +94,7 @@ PARTS = (
         lambda folder: learning.comparison(),
     ),
     Part(
+        "identification",
         "identification",
         "Analytic identification",
         "Three unknown parameters of the recipe `wheel`; torque (2 % noise) and sinkage (0.5 mm) "
@@ -95,8 +106,15 @@ PARTS = (
         "are left out; `identify` samples the model for them.",
         lambda folder: identification.text(),
     ),
-    Part("soil-tests", "Plate and shear tests beside a wheel", soil_tests.ABOUT, soil_tests.text),
     Part(
+        "soil-tests",
+        "identification",
+        "Plate and shear tests beside a wheel",
+        soil_tests.ABOUT,
+        soil_tests.text,
+    ),
+    Part(
+        "sets",
         "sets",
         "Set posterior",
         "Estimates of the released files against the exact posteriors of the same simulated "
@@ -109,12 +127,14 @@ PARTS = (
     ),
     Part(
         "flags",
+        "faults",
         "Detection of faulty readings and wrong models",
         "",
         lambda folder: learning.flagged(),
     ),
     Part(
         "model-errors",
+        "faults",
         "Wrong sensors and wrong models",
         f"`wheel.onnx` on {model_errors.SETS} soils a line, {model_errors.ROWS} rows each at three "
         "loads, 2 % torque noise (`python bench/model_errors.py`). Sets are simulated by the "
@@ -129,6 +149,7 @@ PARTS = (
     ),
     Part(
         "rules",
+        "sets",
         "Fusion rules for regressors of the same reading",
         "LS-SVM, MLP and linear regression read the same three numbers, so that their errors are "
         "strongly correlated. The inverse-variance and the pairwise rule assume independence, and "
@@ -140,14 +161,16 @@ PARTS = (
     ),
     Part(
         "parity",
+        "sets",
         "Parity of the exported files",
         "Largest difference between the float32 file and the float64 estimator. Goal: 1e-4.",
         lambda folder: learning.parity(),
     ),
-    Part("lssvm", "LS-SVM against size", lssvm_scale.ABOUT, lssvm_scale.tables),
-    Part("training", "Time of training", training_time.ABOUT, training_time.table),
+    Part("lssvm", "training", "LS-SVM against size", lssvm_scale.ABOUT, lssvm_scale.tables),
+    Part("training", "training", "Time of training", training_time.ABOUT, training_time.table),
     Part(
         "streams",
+        "driving",
         "A day of driving",
         f"{streams.DAYS} simulated days of docs/driving.md on each line, by the reference wheel of "
         "`datagen/blind_sets`: three soils of 100 rows, 2 % torque noise, slip with a standard "
@@ -166,17 +189,21 @@ PARTS = (
         "and contact for each soil.",
         lambda folder: streams.table(ROOT / "exported" / "wheel.onnx"),
     ),
-    Part("loo", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()),
     Part(
+        "loo", "training", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()
+    ),
+    Part(
+        "board",
         "board",
         "Latency on board",
         "Median and 99th percentile (p99) in microseconds, one thread. Goals: 60 us for one "
         "reading, 150 us for a set of 16 (`any_wheel.onnx`: 350 us), 0.2 s to the first estimate, "
         "0.5 MB per file.",
-        latency_floor.section,
+        board.section,
     ),
     Part(
         "c",
+        "board",
         "Exported C files",
         "`soilml export-c` (docs/c-export.md) beside onnxruntime, one thread. Goals: half of the "
         "latency of onnxruntime, differences as small as those of rounding.",
@@ -184,6 +211,7 @@ PARTS = (
     ),
     Part(
         "pull",
+        "prospects",
         "Bands of drawbar pull and slope",
         "Coverage of 90 % bands of drawbar pull and of the steepest slope (docs/pull.md), over "
         "simulated soils.",
@@ -191,6 +219,7 @@ PARTS = (
     ),
     Part(
         "advice",
+        "prospects",
         "Experimental design: benefit of the advised reading",
         "Remaining fraction of the prior width after one more reading, where that is the advised "
         "one, a repetition, or a random one (docs/advice.md).",
@@ -198,12 +227,14 @@ PARTS = (
     ),
     Part(
         "gears",
+        "forward-model",
         "Other gears",
         "50 000 operating points each, at typical loads of the gear.",
         lambda folder: systems.gears(),
     ),
     Part(
         "slip",
+        "systems",
         "Slip of a wheel-leg",
         "Slip from torque and from vibration (Comin and Saaj 2017, eqs. 18 and 24): the released "
         "linear files, and LS-SVM variants trained on the same data, on strides that no file was "
@@ -215,6 +246,7 @@ PARTS = (
     ),
     Part(
         "walking",
+        "systems",
         "Walking wheel-legs",
         "Feet none, LTF, SRF and CIF on five legs, and 2, 3 and 6 legs without feet. Goal: one "
         "turn in less than 5 s. Differences are from a solution with the paper's step of 1e-4 s, "
@@ -223,6 +255,7 @@ PARTS = (
     ),
     Part(
         "climbing",
+        "prospects",
         "Bands of climbing ability",
         "60 simulated rovers per line on known ground, each slope driven four times: coverage of "
         "the 90 % band, and rms of error over reported standard deviation (1 is calibrated). Pull "
@@ -231,63 +264,34 @@ PARTS = (
     ),
     Part(
         "time",
+        "software",
         "Wall time",
         "In an environment that is installed already.",
         lambda folder: wall_time.table(),
     ),
+    Part("code", "software", "Paths through the code", code_paths.ABOUT, code_paths.section),
 )
 
 
-def existing_sections() -> dict[str, str]:
-    """Sections of the present file, by title."""
-    before = FILE.read_text().partition(MARK)[0] if FILE.exists() else ""
-    sections = (section.partition("\n") for section in before.split("\n## ")[1:])
-    return {title: body.strip("\n") for title, _, body in sections}
-
-
-def preamble(titles: Sequence[str], environment: str) -> str:
-    """What is measured, how, on which machine, and the table of contents."""
-    names = ", ".join(part.name for part in PARTS)
-    links = "\n".join(f"- [{title}](#{anchor(title)})" for title in titles)
-    return (
-        "# Benchmarks\n\n"
-        "Measured figures of soilml: accuracy and speed of the physics, error and calibration of "
-        "the estimators relative to the Bayes limit, detection of faults, latency on board, and "
-        "the workflow that finds missing effects. Goals are targets; a goal that is not reached is "
-        "marked as missed.\n\n"
-        "**Command.** `make bench` writes all sections but the last; `python bench/run.py NAME ...`"
-        f" replaces some of them ({names}). `make bench-gap` writes the last. No figure is typed "
-        "by hand.\n\n"
-        f"**Machine.** {environment}\n\n"
-        f"**Contents**\n\n{links}\n"
-    )
-
-
-def anchor(title: str) -> str:
-    """The fragment that a Markdown renderer gives a heading."""
-    return re.sub(r"[^a-z0-9 _-]", "", title.lower()).replace(" ", "-")
-
-
 def run(names: Sequence[str]) -> None:
-    """Measure all parts, or replace the sections of those named; and write the file."""
-    unknown = set(names) - {part.name for part in PARTS}
-    if unknown:
-        known = ", ".join(part.name for part in PARTS)
-        sys.exit(f"no section {', '.join(sorted(unknown))}; there are: {known}")
-    texts = existing_sections() if names else {}
+    """Measure all parts, or replace the sections of those named; and write their pages."""
+    known = [part.name for part in PARTS]
+    if unknown := set(names) - set(known):
+        sys.exit(f"no section {', '.join(sorted(unknown))}; there are: {', '.join(known)}")
+    measured = [part for part in PARTS if not names or part.name in names]
+    summary = ""
     with tempfile.TemporaryDirectory() as folder:
-        for part in PARTS:
-            if not names or part.name in names:
-                about = f"{part.about}\n\n" if part.about else ""
-                texts[part.title] = about + part.text(Path(folder))
-                print(f"{part.title} ... done", file=sys.stderr, flush=True)
-    _, mark, gap = FILE.read_text().partition(MARK) if FILE.exists() else ("", "", "")
-    titles = [part.title for part in PARTS if part.title in texts]
-    gap_titles = [line[3:] for line in gap.splitlines() if line.startswith("## ")]
-    text = preamble([*titles, *gap_titles], machine())
-    text += "".join(f"\n## {title}\n\n{texts[title]}\n" for title in titles)
-    save_text(FILE, text + mark + gap)
-    print("written: BENCHMARKS.md", file=sys.stderr)
+        for part in measured:
+            text = f"{part.about}\n\n{part.text(Path(folder))}".strip()
+            print(f"{part.title} ... done", file=sys.stderr, flush=True)
+            if part.page:
+                order = [other.title for other in PARTS if other.page == part.page]
+                benchmarks_file.write_page(part.page, order, {part.title: text})
+            else:
+                summary = text
+    benchmarks_file.write_first_page(known, summary)
+    written = dict.fromkeys(benchmarks_file.page_file(part.page) for part in measured)
+    print(f"written: {', '.join(str(file.relative_to(ROOT)) for file in written)}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -148,7 +148,7 @@ def _line(name: str, tally: Tally) -> str:
 
 
 def table(file: Path, days: int = DAYS) -> str:
-    """The table of BENCHMARKS.md."""
+    """The table of its page."""
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
     estimator = Estimator.load(file).on(noise=noise)
     usual = estimator.on(model_error=1.0)

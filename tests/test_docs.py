@@ -144,7 +144,7 @@ def test_links_lead_to_files(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_named_files_exist(page):
-    named = r"`((?:soilml|datagen|training|tests|bench|docs|examples|exported)/[\w/.]+)`"
+    named = r"`((?:soilml|datagen|training|tests|bench|tools|docs|examples|exported)/[\w/.]+)`"
     for path in re.findall(named, page.read_text()):
         assert (ROOT / path).exists(), f"{name_of(page)} names {path}"
 

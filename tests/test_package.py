@@ -64,7 +64,7 @@ def test_the_wheel_holds_the_packages_and_their_data(wheel):
         "soilml/released/any_wheel.onnx",
     ):
         assert needed in names
-    assert not [n for n in names if n.startswith(("tests/", "bench/", "exported/"))]
+    assert not [n for n in names if n.startswith(("tests/", "bench/", "tools/", "exported/"))]
 
 
 @pytest.mark.network

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 
 
 from packages import LOCKED, TOOLS, audited, licence, lock_command, without_accelerators

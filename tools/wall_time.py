@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import time
+from pathlib import Path
 
-from benchmarks_file import ROOT
+ROOT = Path(__file__).parents[1]
 
 
 def wall_time(target: str) -> str:
