@@ -11,8 +11,7 @@ from rig import write_logs
 
 from soilml.cli import main
 from soilml.log_import import import_log
-from soilml.log_import.report.figures import draw_run
-from soilml.log_import.rows_figure import draw_over_slip, panels_over_slip
+from soilml.log_import.figures import draw_over_slip, draw_run, panels_over_slip
 from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")
@@ -34,8 +33,8 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
     with report_style():
         figure = plt.figure(figsize=(15.2, 4.8))
         first, second, third = figure.subfigures(1, 3)
-        draw_run(first, imported.series[0], imported)
-        draw_run(second, imported.series[3], imported)
+        draw_run(first, imported.series[0], imported.table)
+        draw_run(second, imported.series[3], imported.table)
         shown = panels_over_slip(imported.table, imported.radius)[:2]
         for axes, panel in zip(third.subplots(2, 1, sharex=True), shown, strict=True):
             draw_over_slip(axes, imported.table, panel)

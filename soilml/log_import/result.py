@@ -11,36 +11,8 @@ from numpy.typing import NDArray
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.log_import.channels.shared_errors import SharedError
-from soilml.log_import.recording import Floats
+from soilml.log_import.rows import WheelSeries
 from soilml.log_import.windows.steady import Stretch
-
-
-@dataclass(frozen=True)
-class WheelSeries:
-    """The quantities of one wheel in one run over time, and the stretches of the run.
-
-    Attributes
-    ----------
-    run
-        Name of the run in the table.
-    drive
-        Name of the run in the log; several wheels share it.
-    time
-        Grid (n,), s.
-    quantities
-        Samples (n,) by name.
-    stretches
-        Steady windows and what is left out.
-    notes
-        What was repaired, tared or doubted in this run.
-    """
-
-    run: str
-    drive: str
-    time: Floats
-    quantities: dict[str, Floats]
-    stretches: tuple[Stretch, ...]
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,7 +89,7 @@ class ImportedLog:
         InputError
             For another number of axes.
         """
-        from soilml.log_import.rows_figure import plot_rows
+        from soilml.log_import.figures import plot_rows
 
         return plot_rows(self.table, self.radius, ax)
 

@@ -11,16 +11,22 @@ from soilml.io.table import Table
 from soilml.log_import.channels.inputs import channel_constant, our_slip
 from soilml.log_import.channels.runs import Run, run_names
 from soilml.log_import.channels.shared_errors import shared_errors
-from soilml.log_import.channels.slopes import slope_of
-from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.channels.wheel_quantities import constants_of, slope_of
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.mapping.channel import Channel
+from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.result import ImportedLog
-from soilml.log_import.row_table import rows_as_table, unusable, without_torque
-from soilml.log_import.window_rows import AVERAGED, WindowRow, plain_constants, quantities_of
+from soilml.log_import.rows import (
+    AVERAGED,
+    WindowRow,
+    plain_constants,
+    quantities_of,
+    rows_as_table,
+    unusable,
+    without_torque,
+)
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 
@@ -130,7 +136,7 @@ def _rows(run: Run, wheel: WheelMap, log_map: LogMap) -> list[WindowRow]:
     ]  # fmt: skip
 
 
-def _channel(run: Run, channel: Channel, count: int) -> tuple[Floats, Floats]:
+def _channel(run: Run, channel: ChannelMap, count: int) -> tuple[Floats, Floats]:
     """Readings (rows,) in the units of soilml, and their standard errors, 0 where not known."""
     if not channel.columns:
         return np.full(count, channel_constant(run, channel)), np.zeros(count)

@@ -10,11 +10,10 @@ import numpy as np
 
 from soilml.errors import InputError, SoilmlError
 from soilml.io.table import Table, text_column
-from soilml.log_import.guesses.columns.column_words import words_of
+from soilml.log_import.guesses.columns import words_of
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
-from soilml.log_import.units.conversion import dimension, factor
-from soilml.log_import.units.unit_names import unit_in_name
+from soilml.log_import.units import dimension, factor, unit_in_name
 from soilml.quantities import COLUMNS
 
 #: Words of the columns of a table of shear tests, and of a ring.

@@ -16,24 +16,31 @@ from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run, runs_of
 from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of
-from soilml.log_import.checks.irregular import irregular_windows
-from soilml.log_import.checks.lifted_wheel import lifted_at_the_end
 from soilml.log_import.checks.map_hints import map_hints
-from soilml.log_import.checks.sensors import dead_sensors, untared_load, untared_sensors
+from soilml.log_import.checks.sensors import (
+    dead_sensors,
+    lifted_at_the_end,
+    untared_load,
+    untared_sensors,
+)
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Floats
-from soilml.log_import.result import ImportedLog, WheelSeries
+from soilml.log_import.result import ImportedLog
 from soilml.log_import.row_import import import_rows
-from soilml.log_import.row_table import rows_as_table, unusable, without_torque
-from soilml.log_import.window_rows import (
+from soilml.log_import.rows import (
+    WheelSeries,
     WindowRow,
     add_stated_errors,
+    irregular_windows,
     plain_constants,
     pool_errors,
     quantities_of,
+    rows_as_table,
+    unusable,
     window_row,
+    without_torque,
 )
 from soilml.log_import.windows.steady import Stretch, steady_windows
 

@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         found = import_log(args.files, args.map, accept=args.accept, progress=progress)
         html, entry = "", {}
         if args.out is not None:
-            from soilml.log_import.report.page import page, summary
+            from soilml.log_import.page import page, summary
 
             origin = origin_of(args)
             html = page(found, progress, origin)

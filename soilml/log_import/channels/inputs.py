@@ -17,8 +17,8 @@ from soilml.log_import.channels.resampling import (
     unwrapped,
 )
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.slopes import slope_of
-from soilml.log_import.mapping.channel import Channel
+from soilml.log_import.channels.wheel_quantities import slope_of
+from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.recording import Floats
 from soilml.log_import.windows.mean_errors import mean_error
@@ -117,7 +117,7 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
     return inputs
 
 
-def _add(inputs: Inputs, channel: Channel, sampled: list[Floats]) -> None:
+def _add(inputs: Inputs, channel: ChannelMap, sampled: list[Floats]) -> None:
     """Add a channel in the units of soilml; places are added with their rate."""
     role, grid = channel.role, inputs.time
     if role == "slope":
@@ -162,7 +162,7 @@ def along_path(sampled: list[Floats]) -> Floats:
     return np.asarray(place if way[-1] >= way[0] else -place)
 
 
-def channel_constant(run: Run, channel: Channel) -> float:
+def channel_constant(run: Run, channel: ChannelMap) -> float:
     """A channel that no column is: a value, or a number that the log or its name states."""
     if channel.value is not None:
         return channel.value.value

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.config.measurement_noise import Noise
+from soilml.log_import.mapping.uncertain_value import Uncertain
 from soilml.log_import.recording import Floats
-from soilml.log_import.units.uncertain_value import Uncertain
 from soilml.quantities import column
 
 #: What [bias] of a model file can say of a quantity: an offset, a share, or both.

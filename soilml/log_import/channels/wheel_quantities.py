@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from soilml.log_import.channels.wheel_load import vehicle_load
-from soilml.log_import.channels.wheel_torque import through_gearbox, torque_from_current
-from soilml.log_import.mapping.channel import GEARED
+from soilml.log_import.mapping.channel_map import GEARED
 from soilml.log_import.mapping.log_map import Vehicle, WheelMap
-from soilml.log_import.units.uncertain_value import Uncertain
+from soilml.log_import.mapping.uncertain_value import Uncertain
+
+#: Value of a constant of the map by name, such as "vehicle.mass".
+Constants = Callable[[str], float]
+Floats = NDArray[np.float64]
 
 
 def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:
@@ -107,3 +110,65 @@ def slip_ratio(rim: Any, ground: Any) -> Any:
     rim, ground = np.asarray(rim), np.asarray(ground)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(rim >= ground, 1.0 - ground / rim, rim / ground - 1.0)
+
+
+def torque_from_current(current: Any, turning: Any, constant: Constants) -> Any:
+    r"""Torque (...) at the wheel from the current of its motor (...), A.
+
+    .. math:: T = \eta G k_t (I - I_0)
+
+    while the motor drives. While the wheel drives the motor, the losses of the gearbox come in
+    addition: :math:`T = G k_t (I - I_0) / \eta`. `turning` is the sign of the rotation; the idle
+    current I_0 opposes it.
+    """
+    motor = constant("motor_current.torque_constant") * (
+        current - np.sign(turning) * constant("motor_current.idle_current")
+    )
+    return through_gearbox(motor, turning, "motor_current", constant)
+
+
+def through_gearbox(motor: Any, turning: Any, role: str, constant: Constants) -> Any:
+    """Torque (...) at the wheel of a torque at the motor (...), N m."""
+    ratio, efficiency = constant(f"{role}.gear_ratio"), constant(f"{role}.efficiency")
+    drives = np.asarray(motor) * np.sign(turning) >= 0.0
+    return ratio * np.where(drives, efficiency, 1.0 / efficiency) * motor
+
+
+def vehicle_load(vehicle: Vehicle, axle: str, slope: Any, constant: Constants) -> Any:
+    r"""Load (...) of one wheel at slopes (...), rad, positive uphill, N.
+
+    With two axles at a distance L, and the centre of mass d behind the front axle and h above the
+    ground, the front axle carries
+
+    .. math:: m g ((L - d) \cos\alpha - h \sin\alpha) / L
+
+    and the rear axle the rest of :math:`m g \cos\alpha`, half on each side where there are four
+    wheels. Without `wheelbase` or without axles, all wheels carry the same. Static: pull and
+    acceleration shift no load.
+    """
+    normal = constant("vehicle.mass") * vehicle.gravity * np.cos(slope)
+    length = constant("vehicle.wheelbase")
+    if axle not in ("front", "rear") or not length > 0.0:
+        return normal / vehicle.wheels
+    weight = constant("vehicle.mass") * vehicle.gravity
+    behind, height = constant("vehicle.behind_front"), constant("vehicle.height")
+    front = weight * ((length - behind) * np.cos(slope) - height * np.sin(slope)) / length
+    return (front if axle == "front" else normal - front) / max(1.0, vehicle.wheels / 2.0)
+
+
+def slope_of(columns: Sequence[Floats]) -> Floats:
+    """Slope (n,), rad, positive uphill, from one, three or four columns (n,) of an IMU.
+
+    One is the angle itself. Three are accelerations forward, to the left and up, of a vehicle at
+    rest or in steady motion, in any unit. Four are a quaternion x, y, z, w of any length, which
+    turns axes forward, left and up (REP 103) into those of the world.
+    """
+    if len(columns) == 1:
+        return columns[0]
+    if len(columns) == 3:
+        forward, left, up = columns
+        return np.asarray(np.arctan2(forward, np.hypot(left, up)))
+    x, y, z, w = columns
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rise = 2.0 * (x * z - w * y) / (x**2 + y**2 + z**2 + w**2)
+    return np.arcsin(np.clip(rise, -1.0, 1.0))

@@ -10,7 +10,7 @@ import numpy as np
 from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip, traction_cause
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats
-from soilml.log_import.units.unit_names import spelling
+from soilml.log_import.units import spelling
 
 #: Ratio of what was read to what is meant, for rotations; and for travel.
 _ROTATION = (

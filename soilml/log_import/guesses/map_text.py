@@ -10,48 +10,65 @@ from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.io.cell_text import escaped
-from soilml.log_import.channels.runs import matched_files, run_names, runs_of
-from soilml.log_import.guesses.clocks import (
+from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
+from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
+from soilml.log_import.guesses.clocks_and_runs import (
+    clocks_differ,
     guess_clock,
+    guess_file_kinds,
     guess_run_column,
     guess_wheel_column,
     lines_of_first,
     pauses,
     refuse_a_table_of_runs,
     restarts,
+    rows_are_runs,
+    run_of_rows,
     structs_are_runs,
 )
-from soilml.log_import.guesses.columns.assignment import Assignment, assign, axle_of
-from soilml.log_import.guesses.columns.candidates import (
+from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
     describe_texts,
     liveliest,
+    words_of,
 )
-from soilml.log_import.guesses.columns.column_words import words_of
-from soilml.log_import.guesses.drafts.draft import Draft, keys_alike
-from soilml.log_import.guesses.drafts.draft_channels import draft_channels
-from soilml.log_import.guesses.drafts.draft_inputs import fastest_ratio, inputs_of
-from soilml.log_import.guesses.file_kinds import clocks_differ, guess_file_kinds
+from soilml.log_import.guesses.constants import agreed_constants
+from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, keys_alike, toml_value
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
-from soilml.log_import.guesses.stated_constants import agreed_constants
-from soilml.log_import.guesses.steady_rows import (
-    add_errors,
-    is_error,
-    rows_are_runs,
-    run_of_rows,
-)
-from soilml.log_import.guesses.toml_value import toml_value
-from soilml.log_import.guesses.windows_guess import guess_windows
-from soilml.log_import.mapping.channel import ROLES
+from soilml.log_import.guesses.roles import Assignment, assign, axle_of
+from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 
+#: Shortest window for long runs, s, and its share of short ones.
+_USUAL, _SHARE = 2.0, 0.15
 #: Most columns that are listed, and runs that are looked at.
 _MOST_LISTED, _LOOKED = 40, 8
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
+
+
+def guess_windows(runs: Sequence[Run], drafts: dict[str, Draft]) -> list[str]:
+    """Lines of the table; short runs get shorter windows."""
+    lengths = sorted(times[-1] - times[0] for run in runs for times in run.times)
+    middle = lengths[len(lengths) // 2] if lengths else 0.0
+    shortest = min(_USUAL, float(f"{max(_SHARE * middle, 0.05):.1g}"))
+    settle = min(0.5, shortest / 4.0)
+    return [
+        "",
+        "[windows]  # steady windows: each becomes a row",
+        f'shortest = "{shortest:g} s"',
+        f'settle = "{settle:g} s"  # left out after each change',
+        "sensitivity = 1  # 2 finds smaller changes, 0.5 only larger ones",
+        "# within = [5, 60]  # s after the start: only this part of each run",
+        "",
+        "# [[leave_out]]  # a stretch that somebody disturbed",
+        f'# run = "{runs[0].name}"',
+        "# from = 12.0  # s",
+        '# why = "the carriage was pulled"',
+    ]
 
 
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from soilml.log_import.guesses.columns.assignment import Assignment
-from soilml.log_import.guesses.columns.candidates import Candidate
-from soilml.log_import.guesses.columns.column_words import words_of
-from soilml.log_import.guesses.stated_constants import number_in_names
-from soilml.log_import.guesses.toml_value import toml_value
-from soilml.log_import.mapping.channel import ROLES
+from soilml.log_import.guesses.columns import Candidate, words_of
+from soilml.log_import.guesses.constants import number_in_names
+from soilml.log_import.guesses.draft import toml_value
+from soilml.log_import.guesses.roles import Assignment
+from soilml.log_import.mapping.channel_map import ROLES
 
 #: Words of a place in degrees.
 _GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}

@@ -9,17 +9,105 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from soilml.io.toml_settings import Settings, read_settings
-from soilml.log_import.mapping.channel import ROLES, Channel, take_channel
-from soilml.log_import.mapping.wheel_tables import shared_keys, with_shared_keys
-from soilml.log_import.mapping.window_tables import (
-    LeaveOut,
-    WindowSettings,
-    take_left_out,
-    take_windows,
-)
-from soilml.log_import.units.uncertain_value import Uncertain, take_uncertain
+from soilml.log_import.mapping.channel_map import ROLES, ChannelMap, take_channel
+from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
 
+#: Keys that say where samples come from, of which a table has one.
+_SOURCES = ("column", "value", "file_name")
 _ZERO = Uncertain(0.0)
+
+
+@dataclass(frozen=True)
+class WindowSettings:
+    """How steady windows are found; times in s."""
+
+    shortest: float = 2.0
+    settle: float = 0.5
+    sensitivity: float = 1.0
+    largest_slip_change: float = 0.05
+    largest_torque_change: float = 0.15
+    within: tuple[float, float] = (-float("inf"), float("inf"))
+
+
+@dataclass(frozen=True)
+class LeaveOut:
+    """A stretch of a run that the user leaves out, in s after the start of the run."""
+
+    run: str
+    start: float
+    stop: float
+    why: str
+
+
+def take_windows(settings: Settings) -> WindowSettings:
+    """Read [windows]; raises `InputError` for what is wrong."""
+    usual = WindowSettings()
+    within = usual.within
+    if "within" in settings:
+        needed = "two times in s after the start of a run, such as [5, 20]"
+        given = settings.take("within", list, needed)
+        if len(given) != 2 or not all(isinstance(x, int | float) for x in given):
+            settings.fail(f"within is {given!r}; needed is {needed}")
+        within = (float(given[0]), float(given[1]))
+    found = WindowSettings(
+        take_uncertain(settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0).value,
+        take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
+        settings.number("sensitivity", usual.sensitivity),
+        take_uncertain(
+            settings, "largest_slip_change", "1", Uncertain(usual.largest_slip_change)
+        ).value,
+        take_uncertain(
+            settings, "largest_torque_change", "1", Uncertain(usual.largest_torque_change)
+        ).value,
+        within,
+    )
+    if not found.sensitivity > 0.0:
+        settings.fail("sensitivity must be above zero; 1 is usual, 2 finds smaller changes")
+    settings.finish()
+    return found
+
+
+def take_left_out(settings: Settings) -> LeaveOut:
+    """Read an entry of [[leave_out]]; raises `InputError` for what is wrong."""
+    found = LeaveOut(
+        settings.text("run", ""),
+        settings.number("from", 0.0),
+        settings.number("until", float("inf")),
+        settings.text("why", "left out by the map"),
+    )
+    settings.finish()
+    return found
+
+
+def shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """ChannelMap tables outside of the wheels, by role, of roles that some wheel has of its own.
+
+    A table that names no source of samples is taken out of `settings`: it serves the wheels only.
+    """
+    own = {role for wheel in wheels.values() if isinstance(wheel, dict) for role in wheel}
+    found = {}
+    for role in ROLES:
+        if role in own and role in settings:
+            content = settings.content[role]
+            if isinstance(content, dict):
+                found[role] = content
+                if not {*_SOURCES} & content.keys():
+                    settings.take(role, dict, f"a table [{role}]")
+    return found
+
+
+def with_shared_keys(
+    wheel: Mapping[str, Any], shared: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """The table of a wheel, whose channels have the shared keys that they do not state."""
+    content = dict(wheel)
+    for role, keys in shared.items():
+        own = content.get(role)
+        if isinstance(own, dict):
+            sourced = {*_SOURCES} & own.keys()
+            kept = {k: v for k, v in keys.items() if not (sourced and k in _SOURCES)}
+            content[role] = kept | own
+    return content
 
 
 @dataclass(frozen=True)
@@ -58,7 +146,7 @@ class WheelMap:
 
     name: str
     radius: Uncertain | None
-    channels: dict[str, Channel]
+    channels: dict[str, ChannelMap]
     gear: str = ""
     axle: str = ""
 
@@ -167,7 +255,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     )
 
 
-def _take_channels(settings: Settings) -> dict[str, Channel]:
+def _take_channels(settings: Settings) -> dict[str, ChannelMap]:
     settings.permit(ROLES)
     return {role: take_channel(settings.table(role), role) for role in ROLES if role in settings}
 

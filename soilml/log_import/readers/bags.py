@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError, MissingLibraryError
-from soilml.log_import.readers.message_fields import TopicColumns
-from soilml.log_import.readers.protobuf_messages import protobuf_fields
+from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.errors import InputError
 from soilml.log_import.readers.message_fields import TopicColumns
-from soilml.log_import.readers.text_encoding import decode_text
+from soilml.log_import.readers.text_layout import decode_text
 from soilml.log_import.recording import Recording
 
 #: Fewer samples are none, as in text logs.

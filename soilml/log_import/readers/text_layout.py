@@ -1,15 +1,27 @@
-"""The layout of a text log: separator, decimal mark, header, units, where the samples begin."""
+"""The layout of a text log: encoding, separator, header, units, blocks, where samples begin."""
 
 from __future__ import annotations
 
+import codecs
 import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
-from soilml.log_import.units.unit_names import known_unit
+from soilml.errors import InputError
+from soilml.log_import.units import known_unit
 
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+#: Share of zero bytes at odd or even places from which text counts as UTF-16 without a mark.
+_ZERO_SHARE = 0.3
+#: Bytes above ASCII in a row, and the share of those in pairs or more that says Chinese.
+_HIGH, _PAIRED = re.compile(rb"[\x80-\xff]+"), 0.8
 #: Cells that stand for a missing number.
 MISSING = frozenset(
     (
@@ -50,6 +62,42 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
+#: Name of the column that tells the blocks apart.
+BLOCK = "block"
+#: Fewest samples of a block, and most blocks.
+_SHORTEST, _MOST = 20, 1000
+
+
+def decode_text(data: bytes, file: Path) -> tuple[str, str]:
+    """The text and its encoding: UTF-8, UTF-16 with or without a mark, GB 18030 or Windows-1252.
+
+    Raises `InputError` for a file that is not text.
+    """
+    for mark, name in _MARKS:
+        if data.startswith(mark):
+            return data.decode(name, errors="replace"), name
+    head = data[:4096]
+    for first, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        part = head[first::2]
+        if part and part.count(0) > _ZERO_SHARE * len(part):
+            return data.decode(name, errors="replace"), name
+    if b"\0" in head:
+        raise InputError(
+            f"{file} is not a text file, and its name has no ending of another format; known are "
+            ".csv, .txt, .tsv, .dat, .json, .parquet, .mat, .h5, .mcap and .bag"
+        )
+    try:
+        return data.decode("utf-8"), "utf-8"
+    except UnicodeDecodeError:
+        pass
+    # letters with accents stand alone among ASCII, Chinese characters are two bytes each
+    runs = _HIGH.findall(data)
+    if sum(len(run) for run in runs if len(run) >= 2) > _PAIRED * sum(map(len, runs)):
+        try:
+            return data.decode("gb18030"), "gb18030"
+        except UnicodeDecodeError:
+            pass
+    return data.decode("cp1252", errors="replace"), "cp1252"
 
 
 @dataclass(frozen=True)
@@ -239,3 +287,63 @@ def _plain(line: str) -> str:
     for mark in COMMENTS:
         text = text.removeprefix(mark)
     return text.strip()
+
+
+def find_blocks(lines: Sequence[str], layout: TextLayout) -> tuple[list[str], list[str]]:
+    """The lines of samples (n,) of lines after the first header, and the name of their block (n,).
+
+    A new block begins where the header stands again. The line before it is its name, where these
+    lines differ; otherwise blocks are numbered. Names are empty where there is one block.
+    """
+    samples: list[str] = []
+    starts, titles = [0], [layout.about[-1] if layout.about else ""]
+    before = ""
+    for line in lines:
+        if not line or line.isspace():
+            continue
+        if _is_header(line, layout):
+            if len(samples) > starts[-1]:
+                starts.append(len(samples))
+                titles.append("")
+            titles[-1] = before or titles[-1]
+            before = ""
+            continue
+        if _is_title(line, layout):
+            before = line.strip().strip(layout.separator + "#%").strip()
+            continue
+        samples.append(line)
+    sizes = [b - a for a, b in zip(starts, [*starts[1:], len(samples)], strict=True)]
+    if not 1 < len(sizes) <= _MOST or min(sizes) < _SHORTEST:
+        return samples, []
+    if len(set(titles)) < len(titles) or not all(titles):
+        titles = [f"{i + 1:02d}" for i in range(len(sizes))]
+    return samples, [title for title, size in zip(titles, sizes, strict=True) for _ in range(size)]
+
+
+def _cells(line: str, layout: TextLayout) -> list[str]:
+    """The cells of a line; none where it cannot be divided, as damaged samples."""
+    try:
+        return split_line(line, layout.separator)
+    except csv.Error:
+        return []
+
+
+def _is_header(line: str, layout: TextLayout) -> bool:
+    """Whether a line has the names of the columns, or their units."""
+    first = line.lstrip()[:1]
+    if not (first.isalpha() or first in "#%\"'[(" or first == layout.separator):
+        return False
+    cells = [cell.strip("# %\"'") for cell in _cells(line, layout)]
+    known = [cell for cell in cells if cell]
+    if len(known) < max(2, len(layout.names) / 2):
+        return False
+    same = [any(name and cell.startswith(name.split("#")[0]) for name in layout.names)
+            for cell in known]  # fmt: skip
+    units = [cell.strip("[]()") in layout.units for cell in known]
+    return sum(same) > len(known) / 2 or sum(units) > len(known) / 2
+
+
+def _is_title(line: str, layout: TextLayout) -> bool:
+    """Whether a line has one text and no numbers beside it."""
+    cells = [cell for cell in _cells(line, layout) if cell]
+    return len(cells) == 1 < len(layout.names) and not is_number(cells[0], layout.decimal_comma)

@@ -9,12 +9,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.log_import.mapping.window_tables import LeaveOut, WindowSettings
+from soilml.log_import.mapping.log_map import LeaveOut, WindowSettings
 from soilml.log_import.recording import Floats
-from soilml.log_import.windows.change_points import steady_pieces
+from soilml.log_import.windows.change_points import steady_pieces, without_transients
 from soilml.log_import.windows.mean_errors import mean_error
-from soilml.log_import.windows.resting_wheel import why_at_rest
-from soilml.log_import.windows.transients import without_transients
 
 #: Quantities whose changes end a window, and the least change that counts, as a share of the
 #: quantity's usual size in the run.
@@ -28,6 +26,10 @@ _MISSING = 0.2
 _SIGNIFICANT = 4.0
 #: How much more sensitive the second search is, in a piece that drifts.
 _FINER = 3.0
+#: Share of the usual speed of the rim, or of the usual torque, below which a wheel is at rest.
+_AT_REST = 0.1
+#: Beginning of a log in which the wheel may rest, s, and a slip that is another than there.
+_FIRST, _OTHER_SLIP = 0.4, 0.03
 
 
 @dataclass(frozen=True)
@@ -271,3 +273,41 @@ def _shortened(
             if long_enough and not _drifts(step, quantities, _inside(time, a, b), settings):
                 return a, b, ""
     return start, stop, why
+
+
+def why_at_rest(step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_]) -> str:
+    """By what the wheel is at rest in a window; "" where it turns, or nothing says it.
+
+    `quantities` are samples (n,) of a run, `rows` (n,) those of the window.
+    """
+    rim = quantities.get("rim_speed", quantities.get("speed"))
+    if rim is not None and np.isfinite(rim[rows]).any():
+        usual = float(np.nanpercentile(np.abs(rim), 90))
+        rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
+        return "the wheel is at rest" if rests else ""
+    torque = quantities.get("torque")
+    if torque is None or not np.isfinite(torque[rows]).any():
+        return ""
+    near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
+    if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
+        return ""
+    if _slips(step, quantities, rows, near_zero):
+        return ""
+    return "the torque is near zero: the wheel is probably at rest"
+
+
+def _slips(
+    step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_], near_zero: float
+) -> bool:
+    """Whether a window without torque has a slip of its own: where a wheel begins to brake.
+
+    It is one that varies little and is not that of the rest with which the log begins.
+    """
+    slip, torque = quantities.get("slip"), quantities["torque"]
+    first = max(3, round(_FIRST / step))
+    if slip is None or not (np.isfinite(slip[:first]).any() and np.isfinite(slip[rows]).any()):
+        return False
+    middle = float(np.nanmedian(slip[rows]))
+    steady = float(np.nanstd(slip[rows])) < 0.5 * abs(middle)
+    rests = np.isfinite(torque[:first]).any() and abs(np.nanmedian(torque[:first])) < near_zero
+    return bool(steady and rests and abs(middle - float(np.nanmedian(slip[:first]))) > _OTHER_SLIP)

@@ -6,7 +6,7 @@ from typing import Any
 
 from soilml.cli.output import json_text
 from soilml.io.text_tables import csv_text
-from soilml.log_import.report.page import page
+from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.serve.answers.dropped_file import table_summary
 from soilml.serve.answers.job_output import Tell, setting_file, write_files

@@ -8,10 +8,9 @@ from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
-from soilml.log_import.channels.whole_seconds import spread_over_seconds
-from soilml.log_import.guesses.columns.behaviour import time_unit
-from soilml.log_import.guesses.stated_constants import stated_constants
-from soilml.log_import.guesses.stated_scales import stated_scale
+from soilml.log_import.channels.runs import spread_over_seconds
+from soilml.log_import.guesses.behaviour import time_unit
+from soilml.log_import.guesses.constants import stated_constants, stated_scale
 from soilml.log_import.readers.text_layout import find_layout
 
 SLIPS = (0.1, 0.25, 0.45)

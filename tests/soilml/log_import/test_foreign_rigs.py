@@ -5,7 +5,7 @@ import pytest
 from foreign_rigs import RADIUS_EDIT, WRITERS, drive, law, nearest_stage, table
 
 from soilml.log_import import import_log, init_map
-from soilml.log_import.guesses.columns.column_words import words_of
+from soilml.log_import.guesses.columns import words_of
 from soilml.log_import.readers import read_log
 
 #: Error of the zero of a sinkage: the wheel had sunk in before it started.

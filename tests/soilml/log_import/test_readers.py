@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, MissingLibraryError, SoilmlError
+from soilml.log_import.mapping.uncertain_value import parse_uncertain
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.delimited_text import time_of_day
-from soilml.log_import.units.conversion import dimension, factor
-from soilml.log_import.units.uncertain_value import parse_uncertain
-from soilml.log_import.units.unit_names import unit_in_name
+from soilml.log_import.units import dimension, factor, unit_in_name
 
 PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
 SEMICOLON = PLAIN.replace(",", ";").replace(".", ",")

@@ -11,9 +11,9 @@ from soilml.errors import InputError
 from soilml.io.text_tables import csv_text
 from soilml.log_import import import_log, init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns.assignment import assign, axle_of
-from soilml.log_import.guesses.columns.candidates import candidates_of
-from soilml.log_import.readers.protobuf_messages import protobuf_fields
+from soilml.log_import.guesses.columns import candidates_of
+from soilml.log_import.guesses.roles import assign, axle_of
+from soilml.log_import.readers.message_fields import protobuf_fields
 from soilml.log_import.recording import Recording
 
 SLIPS = (0.1, 0.3, 0.5)

@@ -8,7 +8,7 @@ from foreign_rigs import drive, law, nearest_stage, table
 from stated_rigs import WRITERS, a_lever
 
 from soilml.log_import import import_log, init_map
-from soilml.log_import.channels.slopes import slope_of
+from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.text_layout import name_and_unit

@@ -7,9 +7,9 @@ from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns.assignment import assign
-from soilml.log_import.guesses.columns.candidates import candidates_of
-from soilml.log_import.guesses.stated_constants import stated_constants
+from soilml.log_import.guesses.columns import candidates_of
+from soilml.log_import.guesses.constants import stated_constants
+from soilml.log_import.guesses.roles import assign
 from soilml.log_import.recording import Recording
 
 SLIPS = (0.1, 0.3, 0.5)

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from simulated_rig import wandering
 
-from soilml.log_import.checks.irregular import irregular_windows
-from soilml.log_import.mapping.window_tables import WindowSettings
-from soilml.log_import.window_rows import WindowRow
-from soilml.log_import.windows.change_points import change_points, steady_pieces
-from soilml.log_import.windows.mean_errors import autocorrelation_time, mean_error
-from soilml.log_import.windows.pooled_errors import pooled_errors
+from soilml.log_import.mapping.log_map import WindowSettings
+from soilml.log_import.rows import WindowRow, irregular_windows
+from soilml.log_import.windows.change_points import change_points, steady_pieces, without_transients
+from soilml.log_import.windows.mean_errors import autocorrelation_time, mean_error, pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
 from soilml.log_import.windows.steady import Stretch, steady_windows
-from soilml.log_import.windows.transients import without_transients
 
 
 def test_change_points_are_the_exact_optimum():

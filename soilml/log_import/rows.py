@@ -4,21 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.io.table import Table
 from soilml.log_import.channels.inputs import Inputs
+from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import constants_of, wheel_quantities
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats
-from soilml.log_import.windows.mean_errors import mean_error
-from soilml.log_import.windows.pooled_errors import pooled_errors
+from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
 from soilml.log_import.windows.steady import Stretch
+from soilml.quantities import column
 
 #: Quantities of a row that are means of samples.
 AVERAGED = ("torque", "load", "drawbar_pull", "sinkage")
+#: How many times the usual wandering, and how large a standard error of slip, a window may have.
+_TIMES, _LEAST_ERROR = 6.0, 0.01
+#: Fewest windows that tell what is usual.
+_FEWEST = 4
+#: Largest slip of a row: at 1 the wheel spins on the spot, and r omega and v say no more.
+_MOST_SLIP = 0.995
 
 
 @dataclass(frozen=True)
@@ -38,6 +47,34 @@ class WindowRow:
     means: dict[str, float]
     values: dict[str, float]
     std: dict[str, float]
+
+
+@dataclass(frozen=True)
+class WheelSeries:
+    """The quantities of one wheel in one run over time, and the stretches of the run.
+
+    Attributes
+    ----------
+    run
+        Name of the run in the table.
+    drive
+        Name of the run in the log; several wheels share it.
+    time
+        Grid (n,), s.
+    quantities
+        Samples (n,) by name.
+    stretches
+        Steady windows and what is left out.
+    notes
+        What was repaired, tared or doubted in this run.
+    """
+
+    run: str
+    drive: str
+    time: Floats
+    quantities: dict[str, Floats]
+    stretches: tuple[Stretch, ...]
+    notes: tuple[str, ...] = ()
 
 
 def plain_constants(log_map: LogMap, wheel: WheelMap) -> dict[str, float]:
@@ -158,3 +195,99 @@ def add_stated_errors(row: WindowRow, inputs: Inputs, log_map: LogMap, wheel: Wh
                 change = float(moved[name]) - row.values[name]
                 if change:
                     row.std[name] = float(np.hypot(row.std.get(name, 0.0), change))
+
+
+def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, int], str]:
+    """Reasons by (run, window) for windows that are irregular in slip or in drawbar pull.
+
+    The wandering of a window is the standard error of its mean times the square root of its
+    length, which does not depend on the length. Hands on the carriage, a cable that tightens or a
+    wheel that meets a stone raise it.
+    """
+    found: dict[tuple[int, int], str] = {}
+    for name, least in (("drawbar_pull", 0.0), ("slip", _LEAST_ERROR)):
+        places = [(i, k) for i, rows in enumerate(runs) for k in range(len(rows))]
+        errors = np.asarray([runs[i][k].std.get(name, np.nan) for i, k in places])
+        lengths = np.asarray([runs[i][k].window.stop - runs[i][k].window.start for i, k in places])
+        known = np.isfinite(errors)
+        if known.sum() < _FEWEST:
+            continue
+        wandering = errors * np.sqrt(lengths)
+        usual = float(np.median(wandering[known]))
+        for place, size, error in zip(places, wandering, errors, strict=True):
+            if size > _TIMES * usual and error > least:
+                words = name.replace("_", " ")
+                found[place] = (
+                    f"it is irregular: the {words} wanders {size / usual:.2g} times as much as "
+                    "in the middle of the windows, as if someone had touched the rig"
+                )
+    return found
+
+
+def unusable(row: WindowRow, dead: Mapping[str, str]) -> str:
+    """Why a window cannot be a row; "" where it can."""
+    for name in ("slip", "load"):
+        if not np.isfinite(row.values.get(name, np.nan)):
+            role = next((r for r in dead if r == name), "")
+            return f"its {name} is not known{f': {dead[role]}' if role else ''}"
+    if not abs(row.values["slip"]) < _MOST_SLIP:
+        return f"its slip is {row.values['slip']:.3g}: the wheel spins on the spot, or locks"
+    if row.values["load"] <= 0.0:
+        return f"its load is {row.values['load']:.3g} N"
+    measured = [row.values.get(n, np.nan) for n in ("torque", "drawbar_pull", "sinkage")]
+    if not np.isfinite(measured).any() and dead:
+        role, why = next(iter(dead.items()))
+        return f"the sensor of [{role}] is dead: {why}"
+    return ""
+
+
+def without_torque(table: Table) -> list[str]:
+    """A remark where no row has a torque, without which there is no estimate on board."""
+    if np.isfinite(table[column("torque")]).any():
+        return []
+    return [
+        "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
+        "identify a torque, a drawbar pull or a sinkage"
+    ]
+
+
+def rows_as_table(
+    groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]], log_map: LogMap
+) -> Table:
+    """The table of all windows, in order of runs, wheels and time."""
+    lines: list[dict[str, Any]] = []
+    for wheel, run, rows in groups:
+        for row in rows:
+            line: dict[str, Any] = {"run": f"{run.name}_{wheel.name}" if wheel.name else run.name}
+            if wheel.name:
+                line["wheel"] = wheel.name
+            if wheel.gear:
+                line["gear"] = wheel.gear
+            for name in ("slip", "load", "torque", "drawbar_pull", "sinkage"):
+                if name in row.values:
+                    line[column(name)] = row.values[name]
+                    line[f"{column(name)}_std"] = row.std.get(name, float("nan"))
+            if "speed" in row.values:
+                line[column("speed")] = row.values["speed"]
+            line[column("time")] = (row.window.start + row.window.stop) / 2.0
+            if wheel.radius is not None:
+                # a model file of another wheel is refused, since slip is that of this radius
+                line[column("wheel_radius")] = wheel.radius.value
+            line["source"] = run.recordings[0].file.name
+            lines.append(line)
+    names = list(dict.fromkeys(name for line in lines for name in line))
+    text = ("run", "wheel", "gear", "source")
+    columns: dict[str, Any] = {}
+    for name in names:
+        if name in text:
+            columns[name] = np.asarray([line.get(name, "") for line in lines], dtype=np.str_)
+        else:
+            columns[name] = np.asarray([line.get(name, np.nan) for line in lines], dtype=float)
+    if lines and "torque_Nm" not in columns:
+        columns["torque_Nm"] = np.full(len(lines), np.nan)
+    columns = {
+        name: values
+        for name, values in columns.items()
+        if name == "torque_Nm" or name in text or np.isfinite(values).any()
+    }
+    return Table(columns, log_map.source)

@@ -1,4 +1,4 @@
-"""Values of a map with unit and standard deviation: `"38.5 mN m/A +- 3 %"`."""
+"""Values of a map with unit and standard deviation: `\"38.5 mN m/A +- 3 %\"`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from soilml.io.cell_text import read_number
 from soilml.io.toml_settings import Settings
-from soilml.log_import.units.conversion import factor
+from soilml.log_import.units import factor
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FORM = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER})\s*(.*?))?\s*")

@@ -1,4 +1,4 @@
-"""Which column is the clock of a log, and what divides the log into runs."""
+"""Which column is the clock of a log, what divides it into runs, which files make up one run."""
 
 from __future__ import annotations
 
@@ -9,12 +9,17 @@ from itertools import pairwise
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.log_import.channels.runs import alike_structs
-from soilml.log_import.guesses.columns.behaviour import time_unit
-from soilml.log_import.guesses.columns.candidates import candidates_of
-from soilml.log_import.guesses.columns.column_words import WHEEL_WORDS, name_scores, words_of
+from soilml.log_import.channels.runs import alike_structs, key_words, matched_files, run_names
+from soilml.log_import.guesses.behaviour import time_unit
+from soilml.log_import.guesses.columns import (
+    WHEEL_WORDS,
+    candidates_of,
+    name_scores,
+    words_of,
+)
+from soilml.log_import.mapping.log_map import FileKind
 from soilml.log_import.recording import Recording
-from soilml.log_import.units.conversion import factor
+from soilml.log_import.units import factor
 
 #: Lowest score of a clock, and most runs of one file.
 _LEAST, _MOST_RUNS = 0.5, 1000
@@ -24,6 +29,9 @@ _PAUSE = 5.0
 _OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "rad", "actuator"}
 _NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
 _MOST_WHEELS, _TURNS = 12, 0.2
+Log = Sequence[Recording]
+#: Most rows of a table that somebody has made of runs.
+_MOST = 400
 
 
 def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:
@@ -137,3 +145,71 @@ def refuse_a_table_of_runs(log: Sequence[Recording]) -> None:
                 f"{recording.file} is a table of runs already, with one row for each operating "
                 "point: give it to `soilml identify`, `estimate` or `gap` as it is"
             )
+
+
+def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
+    """Kinds of files with different columns that have one run in common; empty for one kind.
+
+    The word that the names of all files of a kind share, and no other file has, is its pattern.
+    """
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, log in enumerate(logs):
+        signature = tuple((r.name, *sorted((*r.columns, *r.texts))) for r in log)
+        groups.setdefault(signature, []).append(i)
+    if len(groups) < 2:
+        return ()
+    names = run_names([log[0].file for log in logs])
+    words = [set(key_words(name, set())) for name in names]
+    kinds = []
+    for members in groups.values():
+        others = [i for i in range(len(logs)) if i not in members]
+        own = set.intersection(*(words[i] for i in members))
+        own -= {word for i in others for word in words[i]}
+        if not own:
+            return ()
+        word = max(sorted(own), key=len)
+        # a dot in the name of a table of TOML would begin another one
+        kinds.append(FileKind(word.replace(".", "_"), f"*{word}*"))
+    try:
+        runs = matched_files(logs, kinds)
+    except InputError:
+        return ()
+    return tuple(kinds) if len(runs) < len(logs) else ()
+
+
+def clocks_differ(clocks: Sequence[tuple[float, float]]) -> bool:
+    """Whether the ranges of time (from, until) of the kinds do not overlap."""
+    return max(start for start, _ in clocks) >= min(stop for _, stop in clocks)
+
+
+def rows_are_runs(logs: Sequence[Sequence[Recording]]) -> int:
+    """How many rows the tables have, where each row is a steady run; 0 for logs over time.
+
+    Such tables are short and have no column whose name or unit is a time.
+    """
+    count = 0
+    for log in logs:
+        for recording in log:
+            if recording.clock is not None or not 0 < len(recording) <= _MOST:
+                return 0
+            if any(line for line in recording.about if "rate" in line.lower()):
+                return 0
+            if any("time" in name_scores(name) for name in recording.texts):
+                return 0
+            for c in candidates_of([recording]):
+                # the torque T is no time, and a number of the row has no name of one
+                if c.kind == "s" or ("time" in c.scores and "time" in name_scores(c.name)):
+                    return 0
+            count += len(recording)
+    return count
+
+
+def run_of_rows(recordings: Sequence[Recording]) -> str:
+    """The column that names the run of each row; "" where none does."""
+    for recording in recordings:
+        for name in (*recording.texts, *recording.columns):
+            if "run" in name_scores(name):
+                return name
+        for name in recording.texts:
+            return name
+    return ""

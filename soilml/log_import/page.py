@@ -1,4 +1,4 @@
-"""The page: what was imported, what was left out and why, what looks odd, and the errors."""
+"""The page of an import: rows, what was left out and why, what looks odd, and the errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.log_import.report.figures import run_figure, slip_figures
+from soilml.log_import.figures import run_figure, slip_figures
 from soilml.log_import.result import ImportedLog
 from soilml.optional_imports import need
 from soilml.report.numbers import format_number, format_with_std
@@ -60,18 +60,18 @@ def page(
     for i, series in enumerate(shown):
         if progress is not None:
             progress("drawing the report", i, len(shown))
-        pictures.append({"series": series, "image": run_figure(series, imported)})
+        pictures.append({"series": series, "image": run_figure(series, imported.table)})
     if progress is not None:
         progress("drawing the report", len(shown), len(shown))
     return render(
         "import_page.html.j2",
-        "soilml.log_import.report",
+        "soilml.log_import",
         "import",
         page=summary(imported),
         origin=origin,
         pictures=pictures,
         runs=len(imported.series),
-        slip=slip_figures(imported),
+        slip=slip_figures(imported.table, imported.radius),
         header=[(text, unit) for key, text, _, unit in _SHOWN if key in imported.table],
         rows=_rows(imported),
         left_out=_left_out(imported),

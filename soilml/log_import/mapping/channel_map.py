@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from soilml.config.measurement_noise import Noise
 from soilml.config.share_and_constant import take_share_and_constant
 from soilml.io.toml_settings import Settings
-from soilml.log_import.units.conversion import dimension, factor
-from soilml.log_import.units.uncertain_value import Uncertain, take_uncertain
+from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
+from soilml.log_import.units import dimension, factor
 
 #: Unit of soilml of each channel that a map may have, and what it is.
 ROLES: dict[str, tuple[str, str]] = {
@@ -43,7 +43,7 @@ _NEEDED = "a number, '2 %' of the reading, or '2 % + 0.05'"
 
 
 @dataclass(frozen=True)
-class Channel:
+class ChannelMap:
     """A channel of a map.
 
     Attributes
@@ -101,7 +101,7 @@ class Channel:
         return f"[{self.role}]"
 
 
-def take_channel(settings: Settings, role: str) -> Channel:
+def take_channel(settings: Settings, role: str) -> ChannelMap:
     """Read the table of a channel; raises `InputError` for what is missing, unknown or wrong."""
     ours = ROLES[role][0]
     where = settings.where
@@ -147,7 +147,7 @@ def take_channel(settings: Settings, role: str) -> Channel:
     unwrap = settings.number("wraps_at", 0.0) if role == "wheel_angle" else 0.0
     std_column, std_scale, is_share = _std(settings, role, unit, scale)
     bias = _error(settings, "bias")
-    channel = Channel(
+    channel = ChannelMap(
         role,
         columns,
         scale,

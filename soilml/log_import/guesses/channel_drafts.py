@@ -1,0 +1,279 @@
+"""Drafts of the channels of a wheel: column, unit, and what stands between sensor and wheel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from soilml.log_import.channels.runs import Run
+from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
+from soilml.log_import.guesses.constants import stated_radius, stated_scale
+from soilml.log_import.guesses.draft import Draft, inputs_of
+from soilml.log_import.guesses.roles import Assignment
+from soilml.log_import.guesses.signs_and_tares import (
+    far_sinkage,
+    lifted,
+    sign_of_pull,
+    sign_of_slip,
+    signs,
+    tares,
+)
+from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.units import dimension, is_raw_signal
+
+#: Radius of the wheels of rovers and rigs, m: the usual one, and its range.
+_USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
+#: Masses that a scale shows, as forces; any other is taken for kg.
+_AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
+#: Words that say that a column counts the pulses of an encoder.
+_COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
+#: What several columns of a channel are.
+_SEVERAL = {
+    "load": "CHANGE: cells that carry the wheel together are added; leave out others",
+    "drawbar_pull": "CHANGE: cells that pull together are added; leave out others",
+    "sinkage": "the mean of them",
+    "slope": "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w",
+}
+#: Words of columns that are errors of others.
+_ERRORS = {
+    "std", "sd", "sigma", "err", "error", "stderr", "se", "sem", "uncertainty", "dev", "deviation",
+    "stdev", "stddev", "fehler", "unsicherheit", "streuung", "abweichung", "cv", "rms",
+    "incertezza", "incertidumbre", "desv", "desviacion", "desviación", "ecart", "écart", "u",
+    "标准差", "误差",
+}  # fmt: skip
+_FILLERS = {
+    "of",
+    "the",
+    "type",
+    "standard",
+    "estandar",
+    "estándar",
+    "mean",
+    "avg",
+    "average",
+    "rel",
+}
+
+
+def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
+    """The unit of a column, and why: "" where the log states it.
+
+    `moving` is the 90th percentile of the values without sign.
+    """
+    if column.unit and column.kind is not None:
+        if column.kind == "kg":
+            force = _AS_FORCE.get(column.unit.lower(), "kgf")
+            return force, f"the log says {column.unit}; as a force that is {force}"
+        return column.unit, ""
+    words = words_of(column.name)
+    if role in ("wheel_angle", "wheel_speed") and _COUNTS & {*words}:
+        return "count" if role == "wheel_angle" else "count/s", "by its name"
+    if role == "wheel_angle":
+        if column.about.wraps_at:
+            if abs(column.about.wraps_at - 2.0 * math.pi) < 0.01:
+                return "rad", "it starts again at 2 pi"
+            if column.about.wraps_at == 360.0:
+                return "deg", "it starts again at 360"
+            return "count", f"it starts again at {column.about.wraps_at:g}"
+        return ("deg", "its values are large") if moving > 60.0 else ("rad", "its values are small")
+    large = {
+        "ground_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+        "rim_speed": ((8.0, "mm/s"), (3.0, "cm/s"), (0.0, "m/s")),
+        "position": ((25.0, "mm"), (0.0, "m")),
+        "sinkage": ((1.0, "mm"), (0.0, "m")),
+        "torque": ((300.0, "mN m"), (0.0, "N m")),
+        "motor_current": ((60.0, "mA"), (0.0, "A")),
+        "slope": ((1.2, "deg"), (0.0, "rad")),
+        "slip": ((1.2, "%"), (0.0, "1")),
+        "load": ((0.0, "N"),),
+        "drawbar_pull": ((0.0, "N"),),
+        "wheel_speed": ((0.0, "rad/s"),),
+    }[role]
+    unit = next(unit for least, unit in large if moving >= least)
+    if "rpm" in words:
+        unit = "rpm"
+    why = "not stated; by the size of the values" if len(large) > 1 else "not stated"
+    return unit, why
+
+
+def guess_rotation_unit(rotation: float, travel: float, radius: float) -> tuple[str, str]:
+    """Unit of a rotation rate of this size beside a travel speed (m/s), and why.
+
+    Each unit implies a radius at which nothing slips. That of the map, or a usual one, decides.
+    """
+    if not (rotation > 0.0 and travel > 0.0):
+        return "rad/s", "not stated"
+    options = {"rad/s": 1.0, "rpm": math.pi / 30.0, "deg/s": math.pi / 180.0}
+    wanted = radius if radius > 0.0 else _USUAL_RADIUS
+    implied = {unit: travel / (rotation * factor) for unit, factor in options.items()}
+    unit = min(implied, key=lambda u: abs(math.log(implied[u] / (0.8 * wanted))))
+    if not _RADII[0] < implied[unit] < _RADII[1]:
+        return "rad/s", "not stated; no unit fits the travel, so that a gearbox may lie between"
+    return unit, f"not stated; it would fit a radius of {implied[unit]:.2g} m or more"
+
+
+def draft_of(
+    role: str,
+    column: Candidate,
+    run: Run,
+    stated: dict[str, tuple[str, str]],
+    more: Sequence[Candidate],
+) -> Draft:
+    """The table of a channel; `more` are its other columns: y and z of a place, further cells."""
+    draft = Draft(column=column)
+    draft.put(
+        "column", [c.address for c in (column, *more)] if more else column.address,
+        _SEVERAL.get(role, "") if more else "",
+    )  # fmt: skip
+    _, values = run.find(column.address)
+    known = values[np.isfinite(values)]
+    moving = float(np.percentile(np.abs(known), 90)) if known.size else 0.0
+    if role in ("position", "wheel_angle", "sinkage") and known.size:
+        moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
+                     (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
+    if role == "slope" and more:
+        return draft  # an angle, whatever the unit of accelerations
+    unit, why = guess_unit(role, column, moving)
+    if role == "position" and dimension(unit) == "count":
+        draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
+    elif is_raw_signal(unit) and role in CALIBRATED:
+        lines = [line for recording in run.recordings for line in recording.about]
+        known_scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
+        example = f"1 {ROLES[role][0]}"
+        draft.put(
+            "scale", known_scale or example,
+            f"for 1 {unit}; stated in the log: {line[:60]}" if known_scale else
+            f"CHANGE: what 1 {unit} is, from the calibration of the sensor",
+        )  # fmt: skip
+    elif dimension(unit) == "1" and role in ("torque", "motor_current"):
+        rated, one = ("torque", "N m") if role == "torque" else ("current", "A")
+        said = stated.get(f"rated_{rated}")
+        draft.put(
+            "scale",
+            f"{float(said[0].split()[0]) / 100:g} {' '.join(said[0].split()[1:]) or one}"
+            if said
+            else f"0.01 {one}",
+            f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
+            if said
+            else f"CHANGE: what 1 % is, a hundredth of the rated {rated}",
+        )
+    elif dimension(unit) in ("count", "count/s"):
+        number = stated.get("counts_per_turn", ("1", ""))[0]
+        known_turn = "counts_per_turn" in stated
+        draft.put("unit", unit, why)
+        draft.put(
+            "counts_per_turn",
+            float(number) if known_turn else 1.0,
+            "stated in the log" if known_turn else "CHANGE: counts for one turn of the encoder",
+        )
+    else:
+        draft.put("unit", unit, why)
+    if role == "slope" and column.address.endswith("orientation.pitch"):
+        draft.put(
+            "reverse",
+            True,
+            "of a quaternion (REP 103): there the nose is down where it is positive",
+        )
+    if role == "slip" and "kappa" in words_of(column.name):
+        why = "of a kappa, as of tyres; remove this line where it is 1 - v/(r omega)"
+        draft.put("definition", "(r omega - v)/v", why)
+    if role == "wheel_angle" and column.about.wraps_at:
+        draft.put("wraps_at", column.about.wraps_at, "it starts again there")
+    if role in ("wheel_angle", "wheel_speed", "motor_current"):
+        ratio = stated.get("gear_ratio")
+        if ratio is not None and _is_motor(column, role):
+            draft.put("gear_ratio", float(ratio[0].split()[0]), f"stated in the log: {ratio[1]}")
+        else:
+            why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
+            if role == "motor_current" or "mot" in column.address.lower():
+                why = "CHANGE: turns of the motor for one of the wheel"
+            draft.put("gear_ratio", 1.0, why)
+    if role == "motor_current":
+        constant = stated.get("torque_constant")
+        if constant is not None:
+            draft.put("torque_constant", f"{constant[0]} +- 5 %", f"stated: {constant[1]}")
+        else:
+            draft.put(
+                "torque_constant", "1.0 N m/A +- 5 %", "CHANGE: from the data sheet of the motor"
+            )
+        efficiency = stated.get("efficiency", ("0.7", ""))[0]
+        why = "of the gearbox" if "efficiency" in stated else "CHANGE: of the gearbox"
+        draft.put("efficiency", f"{efficiency} +- 0.05", why)
+        draft.put("idle_current", "0 A +- 0.02 A", "what the lifted wheel takes at this speed")
+    return draft
+
+
+def _is_motor(column: Candidate, role: str) -> bool:
+    words = column.address.lower()
+    return role == "motor_current" or "mot" in words or "enc" in words
+
+
+def rotation_unit(drafts: dict[str, Draft], stated: dict[str, tuple[str, str]]) -> None:
+    """Find the unit of a rotation rate that states none beside the travel speed."""
+    rotation, ground = drafts.get("wheel_speed"), drafts.get("ground_speed")
+    if rotation is None or rotation.column is None or rotation.keys["unit"] != "rad/s":
+        return
+    if rotation.column.unit or ground is None or ground.column is None:
+        return
+    factor = {"mm/s": 1e-3, "cm/s": 1e-2}.get(ground.keys["unit"], 1.0)
+    radius = stated_radius(stated)
+    unit, why = guess_rotation_unit(
+        rotation.column.about.size, factor * ground.column.about.size, radius
+    )
+    rotation.put("unit", unit, why)
+
+
+def draft_channels(
+    chosen: dict[str, Candidate],
+    run: Run,
+    stated: dict[str, tuple[str, str]],
+    parts: Mapping[str, Sequence[Candidate]] | None = None,
+) -> dict[str, Draft]:
+    """Tables of the channels of one wheel, with units, signs and tares as the samples show them.
+
+    `parts` are the further columns of a role: y and z, where the chosen place is x.
+    """
+    drafts = {
+        role: draft_of(role, column, run, stated, (parts or {}).get(role, ()))
+        for role, column in chosen.items()
+    }
+    rotation_unit(drafts, stated)
+    inputs = inputs_of(drafts, run)
+    if inputs is not None:
+        signs(drafts, inputs)
+        sign_of_slip(drafts, inputs)
+        sign_of_pull(drafts, inputs)
+        tares(drafts, inputs)
+        far_sinkage(drafts, inputs, stated_radius(stated))
+        lifted(drafts, inputs)
+    return drafts
+
+
+def is_error(candidate: Candidate) -> bool:
+    """Whether a column is the error of another one, by its name: `T_std`, `err Fz`."""
+    words = words_of(candidate.name)
+    return "±" in candidate.name or (len(words) > 1 and bool(_ERRORS & {*words}))
+
+
+def add_errors(drafts: dict[str, Draft], found: Assignment, errors: Sequence[Candidate]) -> None:
+    """Add the columns of standard errors to the channels whose names they share."""
+    for role, column in found.shared.items():
+        own = _plain(column.name)
+        for error in errors:
+            same = _plain(error.name) == own
+            if not same and role not in name_scores(" ".join(_plain(error.name))):
+                continue
+            draft = drafts[role]
+            draft.put(
+                "std", error.address,
+                "CHANGE where it is the scatter of samples or repeats: of the mean, it is less",
+            )  # fmt: skip
+            if error.unit and error.unit != column.unit:
+                draft.put("std_unit", error.unit)
+            break
+
+
+def _plain(name: str) -> list[str]:
+    return [word for word in words_of(name) if word not in _ERRORS | _FILLERS]

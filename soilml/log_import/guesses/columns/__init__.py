@@ -1,1 +1,0 @@
-"""Columns of a log: their words, how they behave, and which is taken for which role."""

@@ -1,1 +1,0 @@
-"""Units of logs, and values with a unit and a standard deviation."""
