@@ -14,9 +14,8 @@ from soilml.identification.trained_estimator import for_simulated_case
 from training.benchmark.acceptance import goals
 from training.benchmark.report import LEGEND, format_goals, format_tables
 from training.benchmark.suite import RECIPE, benchmark
-from training.regressors.kernel.exact_solution import GAMMAS
-from training.regressors.kernel.kernel_eigensystem import KernelEigensystem
-from training.regressors.kernel.rbf_kernel import rbf
+from training.regressors.exact_solution import GAMMAS, KernelEigensystem
+from training.regressors.rbf_expansion import rbf
 
 ROOT = Path(__file__).parents[1]
 FEATURES = ("slip", "torque/load", "load")

@@ -15,10 +15,9 @@ from datagen.engines.worker_setup import usable_cores
 from datagen.generate import generate
 from datagen.recipe import Block, read_recipe
 from soilml.io.atomic_files import atomic_output
-from training.calibration.metrics import Metrics, compute_metrics
-from training.calibration.recalibration import recalibrate
-from training.data.dataset import Dataset, read_dataset
-from training.regressors.feature_subset import FeatureSubset
+from training.calibration.recalibration import Metrics, compute_metrics, recalibrate
+from training.dataset import Dataset, read_dataset
+from training.regressors.gaussian_regressor import FeatureSubset
 from training.regressors.lssvm import LSSVM
 from training.spec import read_spec
 

@@ -16,17 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks_file import ROOT
-
-from soilml.quantities import SHEAR
-from training.benchmark.acceptance import COVERAGE_RANGE
-from training.benchmark.bayes_limit_file import load_limit, save_limit
-from training.benchmark.sets.compare_files import compare_with_exact
-from training.benchmark.sets.posterior_comparison import (
-    PosteriorComparison,
-    pool_comparisons,
-    uniformity_p_values,
-)
-from training.benchmark.sets.reference_sets import (
+from reference_sets import (
     ANY_WHEEL,
     ONE_WHEEL,
     as_any_wheel_sets,
@@ -35,7 +25,16 @@ from training.benchmark.sets.reference_sets import (
     packaged_posteriors,
     with_noise_of_reading,
 )
-from training.benchmark.table_format import SHEAR_SYMBOLS
+from set_comparison import (
+    PosteriorComparison,
+    compare_with_exact,
+    pool_comparisons,
+    uniformity_p_values,
+)
+
+from soilml.quantities import SHEAR
+from training.benchmark.acceptance import COVERAGE_RANGE, SHEAR_SYMBOLS
+from training.benchmark.bayes_limit_file import load_limit, save_limit
 
 #: Goals: largest RMSE ratio, largest gap in log density (nat), smallest p-value of uniformity.
 MAX_RATIO, MAX_GAP, MIN_P_VALUE = 1.05, 0.1, 0.01

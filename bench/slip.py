@@ -17,7 +17,7 @@ from soilml import Estimator
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.quantities import column
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.spec import read_any_wheel_spec, read_spec
 from training.train import train, train_any_wheel
 

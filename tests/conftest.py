@@ -167,8 +167,8 @@ def _fitted(factory: pytest.TempPathFactory, name: str, family, settings):
     from response_arrays import load_response, save_response
 
     from training.set_posterior.graph import SetPosteriorGraph
+    from training.set_posterior.misfit_test import MisfitLimits
     from training.set_posterior.response_surface import fit_response
-    from training.set_posterior.sampler.misfit_test import MisfitLimits
 
     def fill(folder: Path) -> None:
         save_response(folder / "response.npz", fit_response(family, settings, lambda *_: None))
@@ -239,7 +239,7 @@ def whole_file(small_data: Path, wheel_posterior, tmp_path_factory: pytest.TempP
     """A file with estimates of single readings and a set posterior, as `wheel.onnx` is."""
     from dataclasses import replace
 
-    from training.data.dataset import read_dataset
+    from training.dataset import read_dataset
     from training.export.model_file import export_model
     from training.spec import read_spec
     from training.train import train

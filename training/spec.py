@@ -16,16 +16,13 @@ from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.features import inputs_of
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.quantities import SHEAR, column
-from training.data.targets import PER_ROW, check_targets
-from training.regressors.feature_subset import FeatureSubset
-from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
+from training.dataset import PER_ROW, check_targets
 from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.gaussian_regressor import GaussianRegressor
+from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM
+from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
-from training.set_posterior.settings import take_response_settings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
@@ -237,3 +234,22 @@ def _take_parameter(
     if not 1e-12 <= value <= 1e12:
         settings.fail(f"{key} is {value:g}; needed is a number above zero, 1e-12 to 1e12")
     return value
+
+
+#: With fewer operating conditions no network learns the response of a wheel.
+LEAST_DESIGNS = 512
+#: Upper limits, beyond which training takes days on a laptop.
+UPPER_LIMITS = {"designs": 10**7, "hidden": 1024, "epochs": 10**5}
+
+
+def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:
+    """Read [set_posterior]; raises `InputError` naming the key."""
+    table = settings.table("set_posterior")
+    counts = {key: table.count(key) for key in UPPER_LIMITS}
+    for key, most in UPPER_LIMITS.items():
+        if counts[key] > most:
+            table.fail(f"{key} is {counts[key]}; needed is at most {most}")
+    if counts["designs"] < LEAST_DESIGNS:
+        table.fail(f"designs is {counts['designs']}; needed are {LEAST_DESIGNS} or more")
+    table.finish()
+    return ResponseSettings(**counts, seed=seed)

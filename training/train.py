@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
 from soilml.errors import InputError
+from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.gaussian_pooling import PoolingCalibration
+from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_within_prior
+from soilml.quantities import Z_90
 from training.available_memory import available_memory
 from training.calibration.held_out import carry_errors
-from training.calibration.metrics import Metrics
 from training.calibration.recalibration import (
     CalibratedRegressor,
+    Metrics,
+    compute_metrics,
     covariance_matrices,
     recalibrate,
 )
@@ -25,14 +28,16 @@ from training.calibration.row_pooling import (
     LEAST_GROUPS,
     calibrate_pooling,
     calibrate_single_rows,
+    groups_by_length,
+    measured_rows,
     row_groups,
     run_conditions,
+    runs_with_pattern,
 )
 from training.calibration.training_domain import TrainingDomain
-from training.data.dataset import Dataset, DataSplit, split_by_run
+from training.dataset import Dataset, DataSplit, split_by_run
 from training.ensemble import fuse_members
-from training.regressors.feature_subset import FeatureSubset
-from training.scores import score, score_pooling, score_rules
+from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.response_surface import fit_response
@@ -44,8 +49,9 @@ from training.set_posterior.validation import (
 from training.spec import AnyWheelSpec, Spec
 
 Floats = NDArray[np.float64]
-#: Called with the name of a stage, the steps done and the total number of steps.
 Progress = Callable[[str, int, int], None]
+
+#: Called with the name of a stage, the steps done and the total number of steps.
 #: A set posterior and its metrics by number of rows.
 TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 
@@ -138,7 +144,7 @@ def train(
 
     Examples
     --------
-    >>> from training.data.dataset import read_dataset
+    >>> from training.dataset import read_dataset
     >>> from training.spec import read_spec
     >>> spec = read_spec("linear")
     >>> data = read_dataset("data.parquet", spec.features, spec.targets)  # doctest: +SKIP
@@ -263,3 +269,47 @@ def _unscored_rows(parts: DataSplit, scored: Dataset) -> Dataset:
     """Calibration rows, a few of each run, without the runs that metrics are measured on."""
     few = parts.calibration.limit_rows_per_run()
     return few.rows(~np.isin(few.run, scored.run))
+
+
+def score(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Metrics:
+    """Metrics of single rows."""
+    return compute_metrics(data.targets, *estimator.predict(data.features), prior_std)
+
+
+def score_rules(
+    members: list[CalibratedRegressor],
+    first: Dataset,
+    second: Dataset,
+    third: Dataset,
+    prior_std: Floats,
+) -> dict[str, Metrics]:
+    """Metrics of every fusion rule, before and after recalibration."""
+    scores = {}
+    for rule in RULES:
+        ensemble = fuse_members(members, rule, first)
+        claimed = ensemble.predict(third.features)
+        scores[f"{rule}, as claimed"] = compute_metrics(third.targets, *claimed, prior_std)
+        scores[f"{rule}, recalibrated"] = score(recalibrate(ensemble, second), third, prior_std)
+    return scores
+
+
+def score_pooling(
+    estimator: CalibratedRegressor, pooling: PoolingCalibration, data: Dataset, prior: PriorSummary
+) -> dict[str, dict[int, Metrics]]:
+    """Metrics of pooled rows by pattern and number of rows, on runs not used for calibration."""
+    mean, std = estimator.predict(data.features)
+    covariance = covariance_matrices(std, estimator.correlation)
+    scores: dict[str, dict[int, Metrics]] = {}
+    for pattern in pooling.patterns:
+        by_length = scores[pooling.label(pattern)] = {}
+        runs = runs_with_pattern(pattern.varies, data, pooling.conditions)
+        for groups in groups_by_length(runs):
+            rule = pooling.rule(measured_rows(data, groups))
+            pooled = pool_within_prior(mean[groups], covariance[groups], prior, rule)
+            std = np.sqrt(np.diagonal(pooled.covariance, axis1=1, axis2=2))
+            # of a Gaussian with the same 90 % interval
+            std = std * rule.coverage_factor / Z_90
+            by_length[groups.shape[1]] = compute_metrics(
+                data.targets[groups[:, 0]], pooled.mean, std, prior.std
+            )
+    return scores

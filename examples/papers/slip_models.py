@@ -20,7 +20,7 @@ from soilml.io.atomic_files import atomic_output
 from soilml.io.text_tables import format_table
 from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
 from soilml.quantities import column
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import Spec, read_spec
 from training.train import TrainedModel, train

@@ -9,7 +9,7 @@ import pytest
 from datagen.generate import generate
 from datagen.recipe import Block, read_recipe
 from soilml.numerics.prior import Prior
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.spec import read_spec
 from training.train import train
 

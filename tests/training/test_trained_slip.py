@@ -13,7 +13,7 @@ from soilml.cli import main
 from soilml.errors import InputError, TableError
 from soilml.onboard.features import compute_features
 from soilml.onboard.multi_sensor import fuse_estimates
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train

@@ -8,10 +8,9 @@ import pytest
 
 from soilml.errors import InputError, TableError
 from soilml.onboard.estimate import PriorSummary
-from training.calibration.metrics import compute_metrics
-from training.calibration.recalibration import covariance_matrices, recalibrate
+from training.calibration.recalibration import compute_metrics, covariance_matrices, recalibrate
 from training.calibration.row_pooling import calibrate_pooling, run_conditions
-from training.data.dataset import read_dataset, split_by_run
+from training.dataset import read_dataset, split_by_run
 from training.ensemble import fuse_members
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec

@@ -11,12 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.quantities import SHEAR
+from soilml.quantities import QUANTITIES, SHEAR
+from soilml.report.terminal import shown_unit
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import NOMINAL, PairedResult
-from training.benchmark.table_format import SHEAR_SYMBOLS, SHEAR_UNITS
 
 Floats = NDArray[np.float64]
+
+#: Display units and symbols of the shear parameters: cohesion, friction angle, shear modulus.
+SHEAR_UNITS = tuple(shown_unit(QUANTITIES[name].unit) for name in SHEAR)
+SHEAR_SYMBOLS = ("c", "phi", "K")
 
 #: Largest accepted RMSE over that of the Bayes limit: of one row, and of every size of set.
 MAX_RATIO_ONE_ROW, MAX_RATIO = 1.01, 1.05

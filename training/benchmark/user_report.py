@@ -13,9 +13,10 @@ from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
 from soilml.report.figure_style import picture, short_label, take_axes
 from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.terminal import shown_unit
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
-from training.benchmark.table_format import columns_of_rows, display_unit, format_number
+from training.benchmark.report import columns_of_rows, format_number
 from training.benchmark.user_comparison import MethodScore
 
 #: Most characters of the name of a method on a terminal.
@@ -64,7 +65,7 @@ def _blocks(
     """Header, and title and rows for each size of set."""
     header = ["method", "inputs"]
     for name in names:
-        unit, symbol = display_unit(name)[1], QUANTITIES[name].symbol
+        unit, symbol = shown_unit(QUANTITIES[name].unit)[1], QUANTITIES[name].symbol
         header += [f"{symbol} {unit}".rstrip(), "/prior", "90 %"]
     header += ["failed", "ms"]
     blocks = []
@@ -79,7 +80,7 @@ def _cells(score: MethodScore, names: Sequence[str]) -> list[str]:
     cells = [score.method, score.inputs]
     for k, name in enumerate(names):
         cells += [
-            format_number(score.rmse[k] * display_unit(name)[0], ".3g"),
+            format_number(score.rmse[k] * shown_unit(QUANTITIES[name].unit)[0], ".3g"),
             format_number(score.rmse_over_prior[k], ".3f"),
             "" if np.isnan(score.rmse[k]) else f"{score.coverage90[k]:.0%}",
         ]

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
 from soilml.quantities import Z_90
-from training.calibration.metrics import Metrics, compute_metrics
+from training.calibration.recalibration import Metrics, compute_metrics
 from training.calibration.row_pooling import (
     LEAST_GROUPS,
     Rows,
     row_groups,
     runs_with_pattern,
 )
-from training.data.dataset import Dataset
+from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
 #: Mean, standard deviation (n, q) and in-range flag (n,) of features (n, d), as in the file.

@@ -16,7 +16,7 @@ from soilml.onboard.gaussian_pooling import (
     RunConditions,
     RunPattern,
 )
-from training.data.dataset import Dataset
+from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]

@@ -8,12 +8,112 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from training.calibration.conditional_bounds import ConditionalBounds
 from training.calibration.row_pooling import OPERATING_CONDITIONS
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
+
+#: Largest number of knots along the first and the second operating condition.
+MOST_KNOTS = (24, 8)
+#: Rows per knot, at least, so that the extremes of a cell are close to those of the population.
+LEAST_ROWS = 60
+#: Margin added to the bounds, as a share of their distance.
+BOUNDS_MARGIN = 0.02
+
+
+@dataclass(frozen=True)
+class ConditionalBounds:
+    """Bounds of one column of the features (n, d), given up to two other columns.
+
+    They are interpolated linearly between knots and constant beyond the last knot. Every training
+    row lies within them.
+    """
+
+    column: int
+    conditions: tuple[int, ...]  # columns of the operating conditions
+    knots: tuple[Floats, ...]
+    lower: Floats  # (k,) or (k1, k2): a value for each knot or pair of knots
+    upper: Floats
+
+    @staticmethod
+    def of(features: Floats, column: int, conditions: tuple[int, ...]) -> ConditionalBounds:
+        """The bounds at a knot are the extremes of all rows up to the adjacent knots, and a margin.
+
+        With few rows the number of knots is reduced in proportion along both conditions.
+        """
+        knots_allowed = len(features) / LEAST_ROWS / np.prod(MOST_KNOTS)
+        share = min(1.0, knots_allowed ** (1.0 / len(MOST_KNOTS)))
+        knots = tuple(
+            np.linspace(features[:, k].min(), features[:, k].max(), max(int(most * share), 2))
+            for k, most in zip(conditions, MOST_KNOTS, strict=False)
+        )
+        lower = np.full([len(k) for k in knots], np.inf)
+        upper = -lower
+        values = features[:, column]
+        intervals = [
+            np.clip(np.searchsorted(along, features[:, k], "right") - 1, 0, len(along) - 2)
+            for k, along in zip(conditions, knots, strict=True)
+        ]
+        for corner in np.ndindex(*[2] * len(knots)):
+            at = tuple(i + step for i, step in zip(intervals, corner, strict=True))
+            np.minimum.at(lower, at, values)
+            np.maximum.at(upper, at, values)
+        empty = ~np.isfinite(lower)
+        lower[empty], upper[empty] = values.min(), values.max()
+        margin = BOUNDS_MARGIN * (upper - lower)
+        conditions = conditions[: len(knots)]
+        return ConditionalBounds(column, conditions, knots, lower - margin, upper + margin)
+
+    def contains(self, features: Floats) -> NDArray[np.bool_]:
+        """Whether rows (n, d) lie within the bounds, (n,)."""
+        weights = [
+            _hat_functions(features[:, k], along)
+            for k, along in zip(self.conditions, self.knots, strict=True)
+        ]
+        lower, upper = (_interpolate(weights, bound) for bound in (self.lower, self.upper))
+        values = features[:, self.column]
+        return np.asarray((values >= lower) & (values <= upper))
+
+    def add_outside(self, graph: Graph, features: str) -> str:
+        """Add to an ONNX graph whether rows lie outside the bounds; name of the value (n,)."""
+        weights = []
+        for k, along in zip(self.conditions, self.knots, strict=True):
+            ends = [graph.constant(end) for end in (along[0], along[-1])]
+            clipped = graph.op("Clip", graph.columns(features, k, k + 1), *ends)
+            distance = graph.scaled(clipped, along, along[1] - along[0])
+            hat = graph.op("Sub", graph.constant(1.0), graph.op("Abs", distance))
+            weights.append(graph.op("Max", hat, graph.constant(0.0)))
+        value = graph.reshaped(graph.columns(features, self.column, self.column + 1), -1)
+        outside = [
+            graph.op(comparison, value, _add_interpolation(graph, weights, bound))
+            for comparison, bound in (("Less", self.lower), ("Greater", self.upper))
+        ]
+        return graph.op("Or", *outside)
+
+
+def _hat_functions(values: Floats, knots: Floats) -> Floats:
+    """Weights (n, k) of the knots in linear interpolation."""
+    clipped = np.clip(values, knots[0], knots[-1])
+    distance = (clipped[:, None] - knots) / (knots[1] - knots[0])
+    return np.asarray(np.maximum(1.0 - np.abs(distance), 0.0))
+
+
+def _interpolate(weights: list[Floats], bound: Floats) -> Floats:
+    """A bound (n,) from the hat functions (n, k) along one or two conditions."""
+    along_first = weights[0] @ bound
+    if len(weights) == 1:
+        return np.asarray(along_first)
+    return np.asarray((along_first * weights[1]).sum(axis=1))
+
+
+def _add_interpolation(graph: Graph, weights: list[str], bound: Floats) -> str:
+    """The same as nodes of an ONNX graph."""
+    along_first = graph.op("MatMul", weights[0], graph.constant(bound))
+    if len(weights) == 1:
+        return along_first
+    return graph.reduced("ReduceSum", graph.op("Mul", along_first, weights[1]), 1)
+
 
 #: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
 CENTRES = 128

@@ -131,9 +131,9 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     from soilml.report.figure_style import save_png
     from training.benchmark import report
     from training.benchmark.acceptance import goals
-    from training.benchmark.plot import SIZE, plot_benchmark
-    from training.benchmark.provenance import check_same_provenance
+    from training.benchmark.report import SIZE, plot_benchmark
     from training.benchmark.suite import RECIPE, benchmark
+    from training.benchmark.user_comparison import check_same_provenance
 
     files = [Path(file) for file in args.files] or _released_files()
     case = read_recipe(RECIPE).case
@@ -231,8 +231,7 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
     from soilml.onboard.estimator import Estimator
     from soilml.report.figure_style import save_png
     from training.benchmark import user_report as report
-    from training.benchmark.provenance import check_same_provenance
-    from training.benchmark.user_comparison import compare
+    from training.benchmark.user_comparison import check_same_provenance, compare
 
     if len(args.files) < 3 or not args.out:
         raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")

@@ -90,8 +90,7 @@ def run(args: argparse.Namespace) -> int:
 def _any_wheel(args: argparse.Namespace) -> int:
     """Train the file for wheels of any size."""
     from soilml.cli.progress import stage_progress
-    from training.export.any_wheel_card import any_wheel_card
-    from training.export.any_wheel_file import export_any_wheel
+    from training.export.any_wheel_file import any_wheel_card, export_any_wheel
     from training.spec import read_any_wheel_spec
     from training.train import train_any_wheel
 
@@ -116,7 +115,7 @@ def _from_data(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
     from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
-    from training.data.dataset import read_dataset
+    from training.dataset import read_dataset
     from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card
     from training.export.model_file import export_model

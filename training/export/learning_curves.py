@@ -11,7 +11,7 @@ from sklearn.base import clone
 
 from soilml.io.atomic_files import atomic_output
 from soilml.optional_imports import load_matplotlib, quiet_matplotlib
-from training.regressors.feature_subset import FeatureSubset
+from training.regressors.gaussian_regressor import FeatureSubset
 from training.train import TrainedModel
 
 #: Shares of the training rows at which the validation error is plotted.

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from soilml.onboard.fusion.held_out_errors import HeldOutErrors
-from training.calibration.metrics import Metrics
-from training.regressors.feature_subset import FeatureSubset
-from training.set_posterior.metadata import table_of
+from training.calibration.recalibration import Metrics
+from training.regressors.gaussian_regressor import FeatureSubset
+from training.set_posterior.validation import table_of
 from training.train import TrainedModel
 
 SINGLE_READING = (

@@ -12,6 +12,7 @@ from soilml import __version__
 from soilml.onboard.metadata.fields import read_fields
 from soilml.onboard.set_contract import MEMORY_INPUTS
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
+from training.export_c.c_text import array, number
 from training.export_c.functions import (
     ARRAYS,
     WIDTH,
@@ -23,7 +24,6 @@ from training.export_c.functions import (
 )
 from training.export_c.graph_translation import rows_are_apart
 from training.export_c.interface import Interface, read_interface
-from training.export_c.literals import array, number
 from training.export_c.program import Constant, SharedParts
 
 #: Bytes of an element, as all usual compilers have them; the C file checks what follows from it.

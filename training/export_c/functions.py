@@ -19,10 +19,8 @@ from soilml.onboard.set_contract import (
 )
 from training.export_c.graph_translation import translate_graph
 from training.export_c.interface import Interface, input_shapes
-from training.export_c.memory_plan import MemoryPlan, plan_memory
-from training.export_c.program import Program, SharedParts
-from training.export_c.sizes import Shape, Size
-from training.export_c.tensor import Tensor
+from training.export_c.program import MemoryPlan, Program, SharedParts, plan_memory
+from training.export_c.tensor import Shape, Size, Tensor
 
 #: Names of the arrays of the working memory, by the type of their elements.
 ARRAYS = {"double": "doubles", "float": "floats", "int": "ints", "bool": "bools"}

@@ -10,11 +10,9 @@ import numpy as np
 
 from soilml.errors import ModelFileError
 from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_SWITCH
-from training.export_c.node import Node
 from training.export_c.operators import OPERATORS
-from training.export_c.program import Program
-from training.export_c.sizes import Size
-from training.export_c.tensor import Tensor
+from training.export_c.program import Node, Program
+from training.export_c.tensor import Size, Tensor
 from training.onnx_graph.builder import SHORTCUT
 
 

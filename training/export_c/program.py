@@ -1,18 +1,18 @@
-"""A C function under construction: statements, working memory, constants, kernels."""
+"""A C function under construction: statements, constants, kernels, and its working memory."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from training.export_c.loops import element_loops, leaves_of
-from training.export_c.sizes import Shape, Size
-from training.export_c.tensor import Expression, Tensor, kind_of_array
+from soilml.errors import ModelFileError
+from training.export_c.c_text import element_loops, leaves_of
+from training.export_c.tensor import Expression, Shape, Size, Tensor, kind_of_array, total
 
 #: Tensors that one expression reads at most; longer ones are hard to read.
 LONGEST_EXPRESSION = 6
@@ -140,3 +140,95 @@ class Program:
         lines = [f"    {out.name}[{i}] = {cast}{size.c};" for i, size in enumerate(sizes)]
         self.emit("\n".join(lines), out)
         return out
+
+
+@dataclass(frozen=True)
+class Node:
+    """One node: operator, inputs (None where an optional one is left out), attributes, outputs."""
+
+    kind: str
+    inputs: tuple[Tensor | None, ...]
+    attributes: dict[str, Any] = field(default_factory=dict)
+    outputs: int = 1
+
+    def input(self, index: int) -> Tensor:
+        """An input that must be there."""
+        tensor = self.optional(index)
+        if tensor is None:
+            raise ModelFileError(f"operator {self.kind} lacks its input {index}")
+        return tensor
+
+    def optional(self, index: int) -> Tensor | None:
+        """An input that may be left out."""
+        return self.inputs[index] if index < len(self.inputs) else None
+
+    def given(self) -> list[Tensor]:
+        """The inputs that are there."""
+        return [tensor for tensor in self.inputs if tensor is not None]
+
+    def axis(self, rank: int, default: int = 0) -> int:
+        """The attribute `axis`, counted from the first one."""
+        return int(self.attributes.get("axis", default)) % max(rank, 1)
+
+    def numbers(self, index: int, attribute: str) -> list[int] | None:
+        """Whole numbers that are an input of newer operators and an attribute of older ones."""
+        tensor = self.optional(index)
+        if tensor is not None:
+            return tensor.numbers(f"input {index} of operator {self.kind}")
+        listed = self.attributes.get(attribute)
+        return None if listed is None else [int(x) for x in listed]
+
+
+#: Translation of an operator: appends statements to a program and returns the node's outputs.
+Translation = Callable[[Program, Node], list[Tensor]]
+
+
+#: Elements to a multiple of which places are rounded: a cache line of 64 bytes has 16 floats.
+GRAIN = 16
+
+
+@dataclass(frozen=True)
+class MemoryPlan:
+    """Offset of each tensor in the array of its type, and the length of each array."""
+
+    offsets: dict[str, int]
+    lengths: dict[str, int]
+
+
+def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
+    """Place every tensor of a program, each as low as its neighbours in time allow.
+
+    Parameters
+    ----------
+    program : Program
+        Statements with the tensors that they touch.
+    kept : frozenset of str
+        Names that are needed after the last statement.
+    """
+    first: dict[str, int] = {}
+    last: dict[str, int] = {}
+    for index, statement in enumerate(program.statements):
+        for name in statement.names:
+            first.setdefault(name, index)
+            last[name] = len(program.statements) if name in kept else index
+    offsets: dict[str, int] = {}
+    lengths: dict[str, int] = {}
+    placed: list[tuple[str, str, int, int]] = []
+    for name in first:
+        kind, shape = program.memory[name]
+        need = max(total(shape).most(program.bounds), 1)
+        need = -(-need // GRAIN) * GRAIN
+        busy = sorted(
+            (start, end)
+            for other, of_kind, start, end in placed
+            if of_kind == kind and last[other] >= first[name]
+        )
+        start = 0
+        for begin, end in busy:
+            if begin - start >= need:
+                break
+            start = max(start, end)
+        offsets[name] = start
+        placed.append((name, kind, start, start + need))
+        lengths[kind] = max(lengths.get(kind, 0), start + need)
+    return MemoryPlan(offsets, lengths)

@@ -8,7 +8,7 @@ evaluation fixes the bytes of the file.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -293,3 +293,52 @@ def gemm(
     if transpose_b:
         attributes["transB"] = 1
     return a.node("Gemm", *([b] if c is None else [b, c]), **attributes)
+
+
+def shortcut(
+    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *values: Value
+) -> Value:
+    """The general function of float32 values, or where a condition (1,) is true, a quicker one.
+
+    Only one of both is run. Both must give the same where the condition is true.
+    """
+    ways = []
+    for way in (quick, general):
+        branch = condition.graph.branch()
+        ways.append((branch, way(*(value.within(branch) for value in values)).name))
+    return Value(condition.graph, condition.graph.shortcut(condition.name, *ways))
+
+
+def cholesky_columns(matrix: Value, count: int) -> Value:
+    r"""The first columns of the lower Cholesky factor of a positive definite matrix.
+
+    .. math:: l_k = \frac{M^{(k)} e_k}{\sqrt{M^{(k)}_{kk}}}, \qquad M^{(k+1)} = M^{(k)} - l_k l_k^T
+
+    Parameters
+    ----------
+    matrix : Value
+        Second moments (p, p) of points whose first coordinate is 1, so that its first entry is 1,
+        and the first column needs no square root. That column of the factor is the mean of the
+        points, and the other columns are the Cholesky factor of their covariance.
+    count : int
+        Number of columns.
+
+    Returns
+    -------
+    Value
+        The columns (p, count).
+
+    References
+    ----------
+    Golub and Van Loan, Matrix Computations, section 4.2 (outer-product form).
+    """
+    columns = []
+    for k in range(count):
+        index = matrix.indices([k])
+        column = matrix.node("Gather", index, axis=1)
+        if k:
+            column = column / sqrt(column.node("Gather", index, axis=0))
+        columns.append(column)
+        if k < count - 1:
+            matrix = gemm(column, column, matrix, alpha=-1.0, transpose_b=True)
+    return concat(columns, axis=1)

@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_head import GaussianHead, validate_training_data
-from training.regressors.gaussian_regressor import GaussianRegressor, Progress
+from training.regressors.gaussian_regressor import (
+    GaussianHead,
+    GaussianRegressor,
+    Progress,
+    validate_training_data,
+)
 from training.regressors.standardisation import Standardisation
 from training.regressors.tanh_network import TanhNetwork
 

@@ -13,12 +13,62 @@ from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_head import GaussianHead
 from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
-#: Called with the steps done and the total number of steps.
 Progress = Callable[[int, int], None]
+
+#: Share of the training rows whose log-variances are clipped at either end.
+TAIL = 0.001
+
+
+def validate_training_data(regressor: Any, X: Any, y: Any) -> tuple[Floats, Floats, bool]:
+    """X (n, d), y as (n, q), and whether y was (n,); raises `ValueError` as scikit-learn does."""
+    rules = {"multi_output": True, "y_numeric": True, "dtype": np.float64, "ensure_min_samples": 2}
+    X, y = validate_data(regressor, X, y, **rules)
+    return X, y.reshape(len(y), -1).astype(np.float64), y.ndim == 1
+
+
+@dataclass(frozen=True)
+class GaussianHead:
+    """Converts standardised outputs to mean and standard deviation in the units of y.
+
+    The log-variance is clipped to its range on the training rows: outside their domain a regressor
+    would extrapolate it without bound.
+    """
+
+    scaling: Standardisation
+    low: Floats  # (q,) bounds of the log-variance
+    high: Floats
+    one_output: bool  # y was (n,)
+
+    @staticmethod
+    def of(scaling: Standardisation, log_variance: Floats, one_output: bool) -> GaussianHead:
+        """From the log-variances (n, q) of the training rows."""
+        low, high = np.quantile(log_variance, [TAIL, 1.0 - TAIL], axis=0)
+        return GaussianHead(scaling, low, high, one_output)
+
+    def to_original_units(self, mean: Floats, log_variance: Floats, return_std: bool) -> Any:
+        """Mean, or mean and standard deviation, (n,) or (n, q) as y was."""
+        mean = self.scaling.undo(mean)
+        std = np.exp(0.5 * np.clip(log_variance, self.low, self.high)) * self.scaling.scale
+        if self.one_output:
+            mean, std = mean[:, 0], std[:, 0]
+        return (mean, std) if return_std else mean
+
+    def add_to_graph(self, graph: Graph, mean: str, log_variance: str) -> tuple[str, str]:
+        """Add the same conversion to an ONNX graph; names of mean and std, (n, q)."""
+        scaled = graph.op("Mul", mean, graph.constant(self.scaling.scale))
+        raised = graph.op("Max", log_variance, graph.constant(self.low))
+        clipped = graph.op("Min", raised, graph.constant(self.high))
+        std = graph.op("Exp", graph.op("Mul", clipped, graph.constant(np.float64(0.5))))
+        return (
+            graph.op("Add", scaled, graph.constant(self.scaling.mean)),
+            graph.op("Mul", std, graph.constant(self.scaling.scale)),
+        )
+
+
+#: Called with the steps done and the total number of steps.
 
 
 @dataclass(frozen=True)
@@ -109,3 +159,54 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     def loss_history(self) -> list[tuple[float, float]]:
         """Training and validation loss of each epoch, of a regressor that is fitted by epochs."""
         return []
+
+
+@dataclass(frozen=True)
+class FeatureSubset:
+    """A regressor and the columns of the features (n, d) that it reads.
+
+    Errors of estimates from different sensors are less correlated than those of different
+    regressors of the same reading: fusing them reduces the error more.
+
+    Attributes
+    ----------
+    name : str
+        Label in metrics, card and plots.
+    model : GaussianRegressor
+        The regressor itself.
+    columns : tuple of int or None
+        Columns that it reads; None for all.
+
+    References
+    ----------
+    Comin and Saaj 2017, eqs. 18, 24 and 26.
+    """
+
+    name: str
+    model: GaussianRegressor
+    columns: tuple[int, ...] | None = None
+
+    def select(self, features: Floats) -> Floats:
+        """The columns (n, k) that the regressor reads."""
+        return features if self.columns is None else features[:, list(self.columns)]
+
+    def fit(
+        self,
+        training: tuple[Floats, Floats],
+        validation: tuple[Floats, Floats],
+        progress: Progress,
+    ) -> None:
+        """Fit the regressor to features and targets, with others for early stopping."""
+        subset = (self.select(validation[0]), validation[1])
+        self.model.fit_with_validation(self.select(training[0]), training[1], subset, progress)
+
+    def predict(self, features: Floats, return_std: bool = False) -> Any:
+        """Mean (n, q); with `return_std` a tuple with the standard deviation."""
+        return self.model.predict(self.select(features), return_std=return_std)
+
+    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
+        """Add the regressor to an ONNX graph; names of mean and std, (n, q)."""
+        if self.columns is not None:
+            columns = graph.constant(np.asarray(self.columns, dtype=np.int64))
+            features = graph.op("Gather", features, columns, axis=1)
+        return self.model.add_to_graph(graph, features)

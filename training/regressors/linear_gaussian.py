@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_head import GaussianHead, validate_training_data
-from training.regressors.gaussian_regressor import GaussianRegressor
-from training.regressors.kernel.rbf_kernel import log_squared_residuals
+from training.regressors.gaussian_regressor import (
+    GaussianHead,
+    GaussianRegressor,
+    validate_training_data,
+)
+from training.regressors.rbf_expansion import log_squared_residuals
 from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]

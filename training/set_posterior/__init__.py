@@ -9,8 +9,8 @@ from training.set_posterior.families.dimensionless_family import DimensionlessFa
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.response_surface import Response, ResponseSettings, fit_response
-from training.set_posterior.sampler.misfit_test import MisfitLimits
 from training.set_posterior.validation import (
     SetFigures,
     calibrate_misfit_limits,

@@ -24,13 +24,13 @@ from soilml.onboard.set_contract import (
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value, concat
 from training.set_posterior.families.wheel_family import WheelFamily
+from training.set_posterior.importance_sampler import add_importance_sampler
+from training.set_posterior.misfit_test import MisfitLimits, add_consistency
+from training.set_posterior.posterior_summary import add_posterior_outputs
+from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
-from training.set_posterior.sampler.importance_sampler import add_importance_sampler
-from training.set_posterior.sampler.misfit_test import MisfitLimits, add_consistency
-from training.set_posterior.sampler.posterior_summary import add_posterior_outputs
-from training.set_posterior.sampler.residual_system import add_residual_rows
-from training.set_posterior.sampler.sensor_errors import (
+from training.set_posterior.sensor_errors import (
     integrate_out_if_any,
     integrate_out_sensor_errors,
 )

@@ -9,7 +9,7 @@ from conftest import MODEL
 from soilml import Estimator, read_case, read_table
 from soilml.cli import main
 from soilml.errors import InputError
-from training.benchmark.provenance import check_same_provenance
+from training.benchmark.user_comparison import check_same_provenance
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 OTHERS = {

@@ -7,7 +7,7 @@ from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import RunConditions
 from training.calibration.held_out import MOST_ROWS, carry_errors, measure_held_out, steady_runs
 from training.calibration.row_pooling import calibrate_single_rows
-from training.data.dataset import Dataset
+from training.dataset import Dataset
 
 CONDITIONS = RunConditions(
     ("load",), np.asarray([10.0]), np.asarray([40.0]), np.asarray([30.0 / np.sqrt(12.0)])

@@ -5,7 +5,7 @@ import pytest
 
 from soilml import Model, Operating, Wheel, soil
 from training.calibration.training_domain import TrainingDomain
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 
 FEATURES = ("slip", "torque/load", "load")
 TARGETS = ("cohesion", "friction_angle", "shear_modulus")

@@ -11,7 +11,7 @@ from onnx.reference import ReferenceEvaluator
 from soilml import Estimator
 from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.features import compute_features
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
 from training.train import train

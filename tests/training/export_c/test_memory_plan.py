@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from training.export_c.memory_plan import plan_memory
-from training.export_c.program import Program, SharedParts
-from training.export_c.sizes import Size, total
+from training.export_c.program import Program, SharedParts, plan_memory
+from training.export_c.tensor import Size, total
 
 
 def program_of(seed):

@@ -11,12 +11,11 @@ from onnx import TensorProto, helper, numpy_helper
 
 from soilml.errors import ModelFileError
 from training.export_c.c_file import kernel_text
+from training.export_c.c_text import array
 from training.export_c.functions import ARRAYS, graph_function
-from training.export_c.literals import array
 from training.export_c.operators import OPERATORS
 from training.export_c.program import Program, SharedParts
-from training.export_c.sizes import Size, shape_of
-from training.export_c.tensor import Tensor, kind_of_array
+from training.export_c.tensor import Size, Tensor, kind_of_array, shape_of
 
 RNG = np.random.default_rng(0)
 #: Rows that the functions of these tests are called with, and their bound.

@@ -5,8 +5,7 @@ import pytest
 
 from training.export.one_step import _without_branches
 from training.onnx_graph.builder import SHORTCUT, Graph, session_of
-from training.onnx_graph.shortcut import shortcut
-from training.onnx_graph.value import Value, constant, stack_rows
+from training.onnx_graph.value import Value, constant, shortcut, stack_rows
 
 
 def test_a_constant_and_a_node_are_added_once():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from training.onnx_graph.builder import Graph, session_of
-from training.onnx_graph.cholesky import cholesky_columns
-from training.onnx_graph.value import Value
+from training.onnx_graph.value import Value, cholesky_columns
 
 
 @pytest.mark.parametrize("p", [2, 4, 6])

@@ -5,12 +5,15 @@ import pytest
 
 from soilml import Estimator
 from training import spec as specs
-from training.data.dataset import read_dataset
+from training.dataset import read_dataset
 from training.export.learning_curves import plot_learning_curves
 from training.export.model_card import model_card
 from training.export.model_file import export_model
-from training.regressors.gaussian_head import GaussianHead, validate_training_data
-from training.regressors.gaussian_regressor import GaussianRegressor
+from training.regressors.gaussian_regressor import (
+    GaussianHead,
+    GaussianRegressor,
+    validate_training_data,
+)
 from training.regressors.standardisation import Standardisation
 from training.train import train
 

@@ -5,14 +5,12 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import check_estimator
 
-from training.regressors.fixed_size_lssvm import FixedSizeLSSVM
+from training.regressors.exact_solution import KernelEigensystem
 from training.regressors.gaussian_mlp import GaussianMLP
-from training.regressors.kernel.kernel_eigensystem import KernelEigensystem
-from training.regressors.kernel.rbf_kernel import rbf
-from training.regressors.kernel.renyi_subset import select_by_renyi_entropy
-from training.regressors.kernel.ridge_eigensystem import RidgeEigensystem
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM
+from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors.nystrom_features import RidgeEigensystem, select_by_renyi_entropy
+from training.regressors.rbf_expansion import rbf
 
 ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
 

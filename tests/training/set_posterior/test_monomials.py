@@ -13,7 +13,7 @@ from training.set_posterior.monomials import (
     monomials,
     pair_factors,
 )
-from training.set_posterior.sampler.polynomial_residuals import PolynomialResiduals
+from training.set_posterior.polynomial_residuals import PolynomialResiduals
 
 
 def test_there_are_as_many_monomials_as_combinations():

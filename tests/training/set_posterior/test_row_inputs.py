@@ -10,8 +10,8 @@ from soilml import Estimator
 from soilml.onboard.set_contract import ABSENT_STD, MEMORY_INPUTS, READING_INPUTS, STD_INPUTS
 from training.onnx_graph.builder import FLOAT, Graph, session_of
 from training.onnx_graph.value import Value
+from training.set_posterior.residual_system import MOST_PULL_NOISE
 from training.set_posterior.row_inputs import ROW_STDS, complete_inputs, default_values
-from training.set_posterior.sampler.residual_system import MOST_PULL_NOISE
 
 READINGS = {"slip": [0.1, 0.3, 0.5, 0.4], "load": [40.0, 60.0, 80.0, 50.0]}
 ROWS = READINGS | {"torque": [1.3, 3.1, 5.0, 2.9]}

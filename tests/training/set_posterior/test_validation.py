@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from training.set_posterior.sampler.misfit_test import MisfitLimits
+from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.validation import graph_outputs, misfit_limits, posterior_session
 
 

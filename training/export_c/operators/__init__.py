@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from training.export_c.node import Translation
 from training.export_c.operators import (
     elementwise,
     products,
     rearrangement,
     reductions,
-    selection,
 )
+from training.export_c.program import Translation
 
 OPERATORS: dict[str, Translation] = {
     **elementwise.OPERATORS,
     **products.OPERATORS,
     **rearrangement.OPERATORS,
     **reductions.OPERATORS,
-    **selection.OPERATORS,
 }

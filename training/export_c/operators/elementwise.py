@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import ModelFileError
-from training.export_c.node import Node, Translation
-from training.export_c.program import Program
-from training.export_c.sizes import Shape, Size, broadcast
-from training.export_c.tensor import Tensor, kind_of
+from training.export_c.program import Node, Program, Translation
+from training.export_c.tensor import Shape, Size, Tensor, broadcast, kind_of
 
 #: Functions of the C library by operator, for double; float has them with an f appended.
 FUNCTIONS = {

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from training.export_c.literals import number
-from training.export_c.loops import element, indices_of, leaves_of, nest, offset
-from training.export_c.node import Node, Translation
+from training.export_c.c_text import element, indices_of, leaves_of, nest, number, offset
 from training.export_c.operators.rearrangement import transposed
-from training.export_c.program import Program
-from training.export_c.sizes import Shape, Size, broadcast, strides
-from training.export_c.tensor import Tensor
+from training.export_c.program import Node, Program, Translation
+from training.export_c.tensor import Shape, Size, Tensor, broadcast, strides
 
 
 def translate_gemm(program: Program, node: Node) -> list[Tensor]:

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from soilml.errors import ModelFileError
-from training.export_c.loops import indices_of, nest, offset
-from training.export_c.node import Node, Translation
-from training.export_c.program import Program
-from training.export_c.sizes import Size, broadcast, strides, total
-from training.export_c.tensor import Tensor
+from training.export_c.c_text import indices_of, nest, offset
+from training.export_c.program import Node, Program, Translation
+from training.export_c.tensor import Size, Tensor, broadcast, strides, total
 
 
 def translate_concat(program: Program, node: Node) -> list[Tensor]:

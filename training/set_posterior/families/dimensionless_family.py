@@ -20,7 +20,7 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, stack_rows
 from training.set_posterior.families.coordinates import Coordinate
-from training.set_posterior.families.dimensionless_design import (
+from training.set_posterior.families.dimensionless_sets import (
     BEARING_RANGE,
     COHESION_SHARE,
     EXPONENT_RANGE,
@@ -30,9 +30,8 @@ from training.set_posterior.families.dimensionless_design import (
     RADIUS,
     REFERENCE_DEPTH,
     SHEAR_MODULUS_SHARE,
+    simulate_sets,
 )
-from training.set_posterior.families.dimensionless_sets import simulate_sets
-from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
@@ -40,6 +39,8 @@ from training.set_posterior.families.wheel_family import (
     ContextValues,
     SimulatedSets,
     add_log_torque,
+    usual_contact,
+    usual_model_errors,
 )
 
 Floats = NDArray[np.float64]

@@ -26,8 +26,6 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, log, maximum, sqrt, stack_rows
 from training.set_posterior.families.coordinates import Coordinate
-from training.set_posterior.families.run_patterns import run_patterns
-from training.set_posterior.families.usual_model_errors import usual_contact, usual_model_errors
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
@@ -36,6 +34,9 @@ from training.set_posterior.families.wheel_family import (
     Origin,
     SimulatedSets,
     add_log_torque,
+    run_patterns,
+    usual_contact,
+    usual_model_errors,
 )
 
 Floats = NDArray[np.float64]

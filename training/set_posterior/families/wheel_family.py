@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.shared_errors_sizes import USUAL_SENSOR_ERRORS
+from soilml.fitting.shared_errors_sizes import (
+    USUAL_MODEL_ERRORS,
+    USUAL_SENSOR_ERRORS,
+    without_errors,
+)
 from soilml.onboard.set_contract import LEAST_STD
+from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import Coordinate
 
@@ -198,3 +205,37 @@ class WheelFamily(Protocol):
     def metadata(self) -> dict[str, Any]:
         """Ranges and axes, for the file and its card."""
         ...
+
+
+def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
+    """Random fractions of the range (count, rows).
+
+    Half of the sets vary independently from row to row, a quarter takes three levels, and a quarter
+    is constant.
+    """
+    independent = rng.random((count, rows))
+    levels = rng.random((count, 3))[np.arange(count)[:, None], rng.integers(3, size=(count, rows))]
+    constant = np.repeat(rng.random((count, 1)), rows, axis=1)
+    pattern = rng.integers(4, size=(count, 1))
+    return np.where(pattern < 2, independent, np.where(pattern == 2, levels, constant))
+
+
+def usual_contact() -> ExitAngle:
+    """The effect `exit-angle` at its usual size."""
+    return ExitAngle(**ExitAngle.about.reference)
+
+
+def usual_model_errors(unknown: Sequence[str], model: Model) -> dict[str, float]:
+    """The usual errors, without those that the model has as unknowns or as effects.
+
+    Parameters
+    ----------
+    unknown : sequence of str
+        Unknowns by their dotted paths.
+    model : Model
+        Gear, which need not be a rigid wheel, and effects.
+    """
+    nil = without_errors(unknown, {effect.name for effect in model.effects}, [model.gear])
+    if "cohesion" not in unknown:  # the change with the bearing modulus is not known then
+        nil |= {"bearing", "bearing_by_slip", "bearing_by_load"}
+    return {name: 0.0 if name in nil else std for name, std in USUAL_MODEL_ERRORS.items()}

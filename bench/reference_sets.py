@@ -1,0 +1,162 @@
+"""Reference sets: fixed simulated sets whose exact posteriors are stored beside this file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from exact_sets import RankedPosterior, exact_set_posterior
+
+from datagen.engines.processes import process_map
+from datagen.recipe import read_recipe
+from soilml.onboard.set_contract import ABSENT_STD
+from soilml.physics.gears import Wheel
+from soilml.quantities import SHEAR
+from training.benchmark.designs import HASHED_DIGITS
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
+from training.spec import read_any_wheel_spec
+
+Progress = Callable[[str, int, int], None]
+
+#: Rows per set, number of sets of each size, and a seed that no training or tuning uses.
+SIZES = (1, 3, 6, 8, 16, 32)
+COUNT = 170
+SEED = 4711
+#: Candidates simulated for each set that is used: some lie outside the range of the file.
+CANDIDATES = 3
+#: Labels of the two families; they are part of the stored design keys.
+ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
+
+
+@dataclass(frozen=True)
+class ReferenceSet:
+    """One reference set; `sets` holds this one set alone."""
+
+    label: str
+    number: int
+    family: WheelFamily
+    sets: SimulatedSets
+    effect: str = ""
+    names: tuple[str, ...] = SHEAR
+
+    @property
+    def rows(self) -> int:
+        """Rows of the set."""
+        return int(self.sets.readings["slip"].shape[1])
+
+    @property
+    def design(self) -> str:
+        """Key of the design: the family's label and the number of rows."""
+        return f"{self.label}, {self.rows} rows"
+
+    @property
+    def hash(self) -> str:
+        """Identifies the set that a stored posterior belongs to: readings, context, noise."""
+        sets = self.sets
+        inputs = sorted((sets.readings | sets.context).items())
+        noise = [(name, np.stack(parts)) for name, parts in sorted(sets.origin.noise.items())]
+        text = [
+            name + " ".join(f"{value:.{HASHED_DIGITS}g}" for value in np.ravel(values))
+            for name, values in [*inputs, *noise]
+        ]
+        ends = [f"{end:.{HASHED_DIGITS}g}" for axis in self.family.axes for end in axis.ends]
+        return hashlib.sha256("\n".join(text + ends).encode()).hexdigest()[:12]
+
+
+def families() -> dict[str, WheelFamily]:
+    """Wheels and soils of the reference sets, by label."""
+    return {
+        ONE_WHEEL: RecipeFamily.of(read_recipe("wheel"), SHEAR),
+        ANY_WHEEL: read_any_wheel_spec("any_wheel").family,
+    }
+
+
+def generate_reference_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
+    """Every reference set, the first `max_sets` of each size."""
+    references = []
+    for label, family in families().items():
+        for rows in SIZES:
+            sets = family.sets(CANDIDATES * COUNT, rows, SEED)
+            accepted = [i for i in range(len(sets.truth)) if _in_range(family, sets.context_of(i))]
+            references += [
+                ReferenceSet(label, i, family, sets.select(i)) for i in accepted[:max_sets]
+            ]
+    return references
+
+
+def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
+    """Whether a file accepts this context: candidates exceed the ends of its range slightly."""
+    ends = family.limits()
+    return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
+
+
+def compute_reference_posteriors(
+    references: Sequence[ReferenceSet], progress: Progress
+) -> Iterator[RankedPosterior]:
+    """The exact posterior of each set, in order, computed on all cores."""
+    with process_map(_exact, references) as found:
+        for done, summary in enumerate(found, 1):
+            progress("exact posteriors", done, len(references))
+            yield summary
+
+
+def packaged_posteriors() -> Path:
+    """The file with the exact posteriors of the reference sets."""
+    return Path(__file__).with_name("sets_limit.parquet")
+
+
+def _exact(reference: ReferenceSet) -> RankedPosterior:
+    return exact_set_posterior(reference.family, reference.sets, 0)
+
+
+def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
+    """Sets of the reference wheel with the context that a file for any wheel needs.
+
+    The bearing curve is known exactly, and the prior is the same: the coordinates of both families
+    agree.
+    """
+    own, other = (families()[label] for label in (ONE_WHEEL, ANY_WHEEL))
+    assert isinstance(own, RecipeFamily)
+    case, converted = own.recipe.case, []
+    gear = case.model.gear
+    assert isinstance(gear, Wheel)
+    # the ends of the coordinates, not of the prior: they differ in the last bit
+    upper = {axis.name: axis.ends[1] for axis in own.axes}
+    values = {
+        "wheel_radius": gear.radius,
+        "wheel_width": gear.width,
+        "bearing_modulus": case.soil.kc / gear.width + case.soil.kphi,
+        "n": case.soil.n,
+        "bearing_std": 0.0,
+        "cohesion_max": upper["cohesion"],
+        "shear_modulus_max": upper["shear_modulus"],
+    }
+    context = {name: np.asarray([value]) for name, value in values.items()}
+    for reference in references:
+        sets = reference.sets
+        x = np.pad(sets.origin.x, ((0, 0), (0, len(other.axes) - len(own.axes))))
+        sets = replace(sets, context=context, origin=replace(sets.origin, x=x))
+        converted.append(replace(reference, family=other, sets=sets))
+    return converted
+
+
+def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
+    """The same sets, with standard deviations computed from the reading, as a rover must.
+
+    The sets themselves have the standard deviation at the true value, which no rover can compute.
+    """
+    converted = []
+    for reference in references:
+        sets = reference.sets
+        readings = dict(sets.readings)
+        for name, (constant, share) in sets.origin.noise.items():
+            channel = "torque" if name == "torque_bias" else name
+            key = name if name == "torque_bias" else f"{name}_std"
+            std = np.hypot(constant, share * np.abs(readings[channel]))
+            readings[key] = np.where(readings[key] < ABSENT_STD, std, ABSENT_STD)
+        converted.append(replace(reference, sets=replace(sets, readings=readings)))
+    return converted

@@ -1,0 +1,239 @@
+"""Reference sets, their exact posteriors, and the posterior that the state of a file defines."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import kstest, multivariate_normal
+
+from datagen.recipe import read_recipe
+from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError
+from soilml.physics.operating_point import Operating
+from soilml.quantities import SHEAR
+from training.benchmark.bayes_limit_file import load_limit, save_limit
+from training.set_posterior.families.dimensionless_family import DimensionlessFamily
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.misfit_test import MisfitLimits
+from training.set_posterior.validation import graph_outputs, posterior_session
+from training.spec import read_any_wheel_spec
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+
+from exact_sets import exact_set_posterior
+from reference_sets import (
+    ANY_WHEEL,
+    ONE_WHEEL,
+    as_any_wheel_sets,
+    generate_reference_sets,
+    packaged_posteriors,
+    with_noise_of_reading,
+)
+from set_comparison import posterior_of_memory
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def some():
+    return generate_reference_sets(2)
+
+
+def test_the_stored_posteriors_are_of_these_sets(some):
+    limit = load_limit(packaged_posteriors(), some)
+    truth = np.concatenate([r.sets.truth for r in some])
+    std = np.sqrt(np.diagonal(limit.covariance, axis1=1, axis2=2))
+    assert np.sqrt(np.mean(((limit.mean - truth) / std) ** 2)) < 2.0
+
+
+def test_the_stored_posterior_of_a_set_is_reproduced(some):
+    limit = load_limit(packaged_posteriors(), some)
+    for i in (0, 3, len(some) // 2):
+        again = exact_set_posterior(some[i].family, some[i].sets, 0)
+        std = np.sqrt(np.diag(again.covariance))
+        assert np.all(np.abs(again.mean - limit.mean[i]) < 0.1 * std)
+
+
+def test_posteriors_of_other_rows_are_refused(some, tmp_path):
+    one = some[0]
+    path = tmp_path / "limit.parquet"
+    save_limit(path, [one], [exact_set_posterior(one.family, one.sets, 0)])
+    assert load_limit(path, [one]).mean.shape == (1, 3)
+    torque = 1.01 * one.sets.readings["torque"]
+    other = replace(one, sets=replace(one.sets, readings=one.sets.readings | {"torque": torque}))
+    with pytest.raises(InputError, match=r"stale.*make limit"):
+        load_limit(path, [other], "compute it again: make limit")
+
+
+def test_both_families_have_the_same_response_of_the_reference_wheel(some):
+    own = [r for r in some if r.label == ONE_WHEEL]
+    for one, other in zip(own, as_any_wheel_sets(own), strict=True):
+        design = np.broadcast_to(
+            [
+                other.sets.context_of(0)[k]
+                for k in (
+                    "wheel_radius",
+                    "wheel_width",
+                    "n",
+                    "bearing_modulus",
+                    "cohesion_max",
+                    "shear_modulus_max",
+                )
+            ],
+            (one.rows, 6),
+        )
+        rows, x = one.sets.rows(0), other.sets.origin.x
+        designs = np.column_stack(
+            [rows["slip"], design[:, :2], rows["load"], design[:, 2:4], design[:, 4:]]
+        )
+        as_any = other.family.responses(designs, x[None])
+        alone = one.family.responses(one.sets.origin.designs[0], one.sets.origin.x[None])
+        shift = np.log([0.15, 0.15, np.e]) * [1.0, 1.0, 0.0]
+        assert np.allclose(as_any + shift, alone, atol=1e-9)
+
+
+def test_bearing_is_known_in_some_sets_of_any_wheel_only(some):
+    near = [r.sets.origin.normal_std[0] > 0.0 for r in some if r.label == ANY_WHEEL]
+    assert any(near) and not all(near)
+
+
+def test_noise_of_the_reading_is_the_same_share_of_it(some):
+    for one, other in zip(some, with_noise_of_reading(some), strict=True):
+        before, after = one.sets.readings, other.sets.readings
+        assert np.array_equal(after["torque"], before["torque"])
+        share = one.sets.origin.noise["torque"][1]
+        assert after["torque_std"] / after["torque"] == pytest.approx(share)
+        assert np.array_equal(after["sinkage_std"] > 1.0, before["sinkage_std"] > 1.0)
+
+
+STEPS = 36
+
+
+def of_one_wheel(noise, bias=0.0) -> RecipeFamily:
+    recipe = read_recipe("wheel")
+    case = replace(recipe.case, noise=recipe.case.noise | {"torque_Nm": Noise(share=noise)})
+    shared = {"torque_Nm": Noise(share=bias)} if bias else {}
+    return RecipeFamily.of(replace(recipe, case=case, bias=shared), SHEAR)
+
+
+def on_a_grid(family, sets, index):
+    """Weights, values and log evidence on a grid of equal prior probability."""
+    case, rows = family.recipe.case, sets.rows(index)
+    u = (np.arange(STEPS) + 0.5) / STEPS
+    grid = np.stack(np.meshgrid(u, u, u, indexing="ij"), axis=-1).reshape(-1, 3)
+    values = np.stack([case.prior[n].at(grid[:, i]) for i, n in enumerate(SHEAR)], axis=1)
+    soil = case.with_values({n: values[None, :, i] for i, n in enumerate(SHEAR)}).soil
+    operating = Operating(slip=rows["slip"][:, None], load=rows["load"][:, None])
+    torque = case.model(soil, operating).torque.T
+    noise, bias = case.noise["torque_Nm"].share, family.recipe.bias.get("torque_Nm", Noise()).share
+    m = torque.shape[1]
+    shape = noise**2 * np.eye(m) + bias**2
+    # readings over true torques have the same distribution for all soils
+    off = multivariate_normal(np.ones(m), shape).logpdf(rows["torque"] / torque)
+    logs = off - np.log(torque).sum(axis=1)
+    logs += 0.5 * m * np.log(2.0 * np.pi)  # left out of the likelihood
+    weights = np.exp(logs - logs.max())
+    return weights / weights.sum(), values, np.log(np.mean(np.exp(logs - logs.max()))) + logs.max()
+
+
+def torque_only(family, rows):
+    """A set in which only torque was read."""
+    sets = family.sets(20, rows, 9)
+    return sets, int(np.flatnonzero(sets.readings["sinkage_std"][:, 0] > 1.0)[0])
+
+
+@pytest.mark.parametrize(("rows", "noise", "bias"), [(1, 0.06, 0.0), (2, 0.08, 0.04)])
+def test_it_agrees_with_integration_on_a_grid(rows, noise, bias):
+    family = of_one_wheel(noise, bias)
+    sets, index = torque_only(family, rows)
+    found = exact_set_posterior(family, sets, index)
+    weights, values, evidence = on_a_grid(family, sets, index)
+    mean = weights @ values
+    off = values - mean
+    covariance = (off.T * weights) @ off
+    std = np.sqrt(np.diag(covariance))
+    assert not found.flagged
+    assert np.all(np.abs(found.mean - mean) < 0.08 * std)
+    apart = (found.covariance - covariance) / np.outer(std, std)
+    assert np.all(np.abs(apart) < 0.08)
+    assert found.log_evidence == pytest.approx(evidence, abs=0.06)
+    below = weights @ (values < sets.truth[index])
+    assert np.all(np.abs(found.rank - below) < 0.05)
+
+
+def test_uncertain_bearing_is_marginalised():
+    family = read_any_wheel_spec("any_wheel").family
+    assert isinstance(family, DimensionlessFamily)
+    sets = family.sets(300, 1, 9)
+    o = sets.origin
+    more = sets.readings["sinkage_std"][:, 0] < 1.0
+    uncertain = (o.noise["torque"][1][:, 0] > 0.06) & (o.normal_std > 0.2) & ~more
+    index = int(np.flatnonzero(uncertain)[0])
+    found = exact_set_posterior(family, sets, index)
+    rng = np.random.default_rng(2)
+    n = 30_000
+    x = np.stack([a.quantile(rng.random(n)) for a in family.axes[:3]], axis=1)
+    near = np.clip(rng.standard_normal((n, 2)), -2.5, 2.5) * o.normal_std[index]
+    force = family.force(o.designs[index], np.concatenate([x, near], axis=1)[None])
+    noise, bias = o.noise["torque"][1][index, 0], o.noise["torque_bias"][1][index, 0]
+    off = sets.readings["torque"][index, 0] / force.torque[0] - 1.0
+    weights = np.exp(-0.5 * off**2 / (noise**2 + bias**2)) / force.torque[0]
+    weights = np.nan_to_num(weights / np.nansum(weights))
+    scale = [o.designs[index, 0, 6], 1.0, o.designs[index, 0, 7]]
+    values = np.stack([a.value(x[:, i]) for i, a in enumerate(family.axes[:3])], axis=1) * scale
+    mean = weights @ values
+    std = np.sqrt(weights @ (values - mean) ** 2)
+    assert np.all(np.abs(found.mean - mean) < 0.08 * std)
+    assert np.all(np.abs(np.sqrt(np.diag(found.covariance)) / std - 1.0) < 0.06)
+
+
+def test_ranks_of_the_truth_are_uniform():
+    family = of_one_wheel(0.02)
+    sets = family.sets(40, 1, 12)
+    found = [exact_set_posterior(family, sets, i) for i in range(len(sets.truth))]
+    for rank in np.stack([f.rank for f in found]).T:
+        assert kstest(rank, "uniform").pvalue > 1e-3
+    assert kstest([f.hpd_level for f in found], "uniform").pvalue > 1e-3
+
+
+@pytest.fixture(scope="module")
+def triples(wheel_posterior):
+    """(output of the graph, posterior of its memory, exact posterior) of sets; small response."""
+    family, response = wheel_posterior.family, wheel_posterior.response
+    free = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
+    session = posterior_session(SetPosteriorGraph(family, response, free))
+    found = []
+    for rows in (1, 6):
+        sets = family.sets(14, rows, 21)
+        for i in range(len(sets.truth)):
+            output = graph_outputs(session, response, sets, i)
+            system = output["memory_out"].astype(float)
+            found.append(
+                (
+                    output,
+                    posterior_of_memory(family, system, sets, i),
+                    exact_set_posterior(family, sets, i),
+                )
+            )
+    return found
+
+
+def test_the_estimate_is_the_mean_of_the_memory_s_posterior(triples):
+    off = [(s["set_mean"] - m.mean) / np.sqrt(np.diag(m.covariance)) for s, m, _ in triples]
+    assert np.sqrt(np.mean(np.square(off))) < 0.2
+
+
+def test_the_estimate_is_close_to_the_exact_posterior(triples):
+    off = [(s["set_mean"] - e.mean) / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
+    assert np.sqrt(np.mean(np.square(off))) < 0.3
+    wide = [s["set_std"] / np.sqrt(np.diag(e.covariance)) for s, _, e in triples]
+    assert 0.85 < np.median(wide) < 1.15
+
+
+def test_the_log_density_at_the_truth_is_that_of_the_exact_posterior(triples):
+    gap = [e.log_density - m.log_density for _, m, e in triples]
+    assert abs(np.mean(gap)) < 0.2
+    assert np.mean([e.log_density for _, _, e in triples]) > 1.0  # both are far above the prior

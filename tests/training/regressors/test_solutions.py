@@ -1,0 +1,99 @@
+"""Solutions in tiles and in parts: the same as at once, in the memory that was stated."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from datagen.engines.worker_setup import limited_workers
+from training.regressors import exact_solution, nystrom_features
+from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+
+
+def curve(rows, seed=0, noise=0.1):
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-2.0, 2.0, (rows, 2))
+    clean = np.stack([np.sin(2.0 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]], axis=1)
+    return x, clean + noise * rng.normal(size=clean.shape), clean
+
+
+def test_the_exact_solution_in_tiles_is_that_of_the_eigensystem(monkeypatch):
+    x, y, _ = curve(700)
+    whole = LSSVM(solution="exact", gamma=20.0, width=0.7).fit(x, y)
+    monkeypatch.setattr(exact_solution, "EIGENSYSTEM_ROWS", 300)
+    tiles = LSSVM(solution="exact", gamma=20.0, width=0.7).fit(x, y)
+    a, b = whole.expansion_, tiles.expansion_
+    np.testing.assert_allclose(b.alpha, a.alpha, atol=1e-8)
+    np.testing.assert_allclose(b.residual, a.residual, atol=1e-8)
+    # gamma of the log-variance is selected on fewer rows
+    for one, other in zip(whole.predict(x, True), tiles.predict(x, True), strict=True):
+        np.testing.assert_allclose(other, one, rtol=0.3, atol=1e-6)
+
+
+def test_the_fixed_size_solution_in_parts_is_that_of_all_rows_at_once(monkeypatch):
+    x, y, _ = curve(3000)
+    once = FixedSizeLSSVM(centres=40).fit(x, y)
+    monkeypatch.setattr(nystrom_features, "CHUNK", 256)
+    found = []
+    for threads in (1, 3):
+        with limited_workers(threads):
+            found.append(FixedSizeLSSVM(centres=40).fit(x, y).predict(x, return_std=True))
+    for one, three, whole in zip(*found, once.predict(x, return_std=True), strict=True):
+        np.testing.assert_array_equal(one, three)  # whatever the number of threads
+        np.testing.assert_allclose(one, whole, rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("regressor", "rows"),
+    [
+        (FixedSizeLSSVM(centres=60, gamma=10.0, width=1.0), 60_000),
+        (LSSVM(solution="exact", gamma=10.0, width=1.0), 3000),
+    ],
+)
+def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypatch):
+    monkeypatch.setattr(exact_solution, "EIGENSYSTEM_ROWS", 500)
+    x, y, _ = curve(rows)
+    regressor.fit(x[:1000], y[:1000])  # what it imports is not of the fit
+    tracemalloc.start()
+    try:
+        regressor.fit(x, y)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    stated = regressor.requirements(rows, 2, 2).memory
+    assert 0.3 * stated < peak < stated
+
+
+def test_ten_times_the_rows_need_little_more_memory_where_prototypes_are_few():
+    few, many = (FixedSizeLSSVM().requirements(n, 3, 3) for n in (100_000, 1_000_000))
+    assert many.memory - few.memory < 0.25e9
+    assert many.size == "fixed-size, 150 prototypes"
+    exact = LSSVM(solution="exact").requirements(20_000, 3, 3)
+    assert 1.6e9 < exact.memory < 2.5e9  # half of the matrix of 3.2 GB, and what it takes beside
+
+
+def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
+    rng = np.random.default_rng(0)
+    x = np.repeat(rng.uniform(-2.0, 2.0, (80, 1)), 10, axis=0) + 0.01 * rng.normal(size=(800, 1))
+    shared = np.repeat(rng.normal(size=(80, 1)), 10, axis=0)  # what the rows of a soil share
+    y = np.sin(2.0 * x) + shared
+    other = rng.uniform(-2.0, 2.0, (400, 1))
+    truth = np.sin(2.0 * other)
+    noisy = truth + rng.normal(size=truth.shape)
+    for regressor in (LSSVM(), FixedSizeLSSVM(centres=100)):
+        misled = np.sqrt(np.mean((regressor.fit(x, y).predict(other) - truth) ** 2))
+        regressor.fit_with_validation(x, y, (other, noisy), lambda done, total: None)
+        sound = np.sqrt(np.mean((regressor.predict(other) - truth) ** 2))
+        assert sound < 0.75 * misled
+
+
+def test_the_number_of_rows_picks_the_solution_unless_it_is_stated(monkeypatch):
+    monkeypatch.setattr("training.regressors.lssvm.MOST_EXACT_ROWS", 100)
+    few, many = curve(100)[:2], curve(101)[:2]
+    assert LSSVM(centres=10).fit(*few).fitted_settings().startswith("exact, 100 centres")
+    assert LSSVM(centres=10).fit(*many).fitted_settings().startswith("fixed-size, 10 centres")
+    stated = LSSVM(solution="exact").fit(*many)
+    assert stated.fitted_settings().startswith("exact, 101 centres")
+    assert stated.learning_curve_parameters() is None
+    fixed = LSSVM(solution="fixed-size", centres=10).fit(*few).learning_curve_parameters()
+    assert fixed["solution"] == "fixed-size"

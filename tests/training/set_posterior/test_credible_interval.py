@@ -1,0 +1,52 @@
+"""Ends of the interval of a weighted sample."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value
+from training.set_posterior.posterior_summary import DISTANCES, add_quantiles
+
+SAMPLES = 400
+
+
+def ends_of(deviations, weights):
+    """Ends (q, 2) by the graph, of deviations (q, n) and weights (n,) with sum 1."""
+    q, graph = len(deviations), Graph()
+    std = np.sqrt((weights * deviations**2).sum(axis=1, keepdims=True))
+    feed = {"deviations": deviations, "std": std, "weights": weights[None]}
+    given = [Value(graph, name) for name in feed]
+    add_quantiles(*given, SAMPLES).named("ends")
+    shapes = {name: list(value.shape) for name, value in feed.items()}
+    session = session_of(graph.model(shapes, {"ends": (1, [q, 2])}))
+    return session.run(None, {k: v.astype(np.float32) for k, v in feed.items()})[0] / std
+
+
+def test_the_ends_are_the_quantiles_of_a_weighted_sample():
+    # evenly spaced over ten standard deviations, with the weights of a normal density
+    z = np.linspace(-5.0, 5.0, SAMPLES)
+    weights = norm.pdf(z) / norm.pdf(z).sum()
+    skewed = np.exp(0.3 * z) - (weights * np.exp(0.3 * z)).sum()
+    found = ends_of(np.stack([2.0 * z, skewed]), weights)
+    assert found[0] == pytest.approx(norm.ppf([0.05, 0.95]), abs=0.02)
+    exact = np.interp([0.05, 0.95], np.cumsum(weights) - 0.5 * weights, skewed)
+    assert found[1] == pytest.approx(exact / np.sqrt((weights * skewed**2).sum()), abs=0.03)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_sample_that_passes_a_grid_point_moves_the_ends_little(side):
+    rng, weights = np.random.default_rng(0), np.full(SAMPLES, 0.97 / (SAMPLES - 1))
+    weights[0] = 0.03
+    others = rng.standard_normal(SAMPLES)
+    ends = []
+    for distance in DISTANCES:
+        at = []
+        for step in (-2e-4, 2e-4):
+            sample = others.copy()
+            for _ in range(30):  # the sample's place in standard deviations, which it is part of
+                std = np.sqrt((weights * sample**2).sum())
+                sample[0] = side * (distance + step) * std
+            at.append(ends_of(sample[None], weights))
+        ends.append(np.abs(at[1] - at[0]).max())
+    assert max(ends) < 2e-3

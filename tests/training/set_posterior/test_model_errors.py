@@ -1,0 +1,180 @@
+"""Errors of the model as columns of the residual system."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from datagen.recipe import read_recipe
+from soilml.config.measurement_noise import Noise
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    MEMORY_INPUTS,
+    MODEL_ERROR_COLUMNS,
+)
+from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+from soilml.physics.gears import Track, Wheel
+from soilml.physics.model import Model
+from soilml.physics.operating_point import Operating
+from soilml.quantities import SHEAR
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value, constant
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.families.wheel_family import (
+    USUAL_MODEL_ERRORS,
+    usual_model_errors,
+)
+from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.monomials import monomials
+from training.set_posterior.residual_system import add_residual_rows
+from training.set_posterior.response_surface import ResponseSettings, fit_response
+
+#: A soil at which the columns are taken.
+SOIL = np.asarray([0.5, -0.6, 0.4])
+SLIP, LOAD = np.asarray([0.08, 0.2, 0.35, 0.55]), np.asarray([40.0, 60.0, 100.0, 80.0])
+
+
+@pytest.fixture(scope="module")
+def linear_posterior():
+    """The set posterior of a wheel whose torque has constant noise: its scale is without load."""
+    recipe = read_recipe("wheel")
+    noise = recipe.case.noise | {"torque_Nm": Noise(constant=0.05)}
+    family = RecipeFamily.of(replace(recipe, case=replace(recipe.case, noise=noise)), SHEAR)
+    response = fit_response(family, ResponseSettings(768, 32, 120, 0), lambda *_: None)
+    return SetPosteriorGraph(family, response, None)
+
+
+def model_columns(posterior, readings, size) -> np.ndarray:
+    """Columns (channels, rows, errors) of errors of the model, on the scales of the channels."""
+    graph = Graph()
+    inputs = {name: Value(graph, name) for name in posterior.inputs if name not in MEMORY_INPUTS}
+    _, rows = add_residual_rows(posterior.family, posterior.response, inputs)
+    basis = monomials(SOIL, posterior.response.terms)
+    rows.system_at(constant(graph, basis[:, None])).named("out")
+    shapes = {key: posterior.inputs[key] for key in inputs}
+    session = session_of(graph.model(shapes, {"out": (1, ["m", "columns"])}))
+    noise = {"torque_std": 0.01 * readings["torque"], "sinkage_std": 0.01 * readings["sinkage"]}
+    noise["drawbar_pull_std"] = np.full(len(SLIP), 0.5)
+    feed = {key: np.zeros(1 if key in COMMON_ERROR_INPUTS else len(SLIP)) for key in inputs}
+    feed |= readings | noise | {"model_error": np.full(1, size)}
+    feed = {key: values.astype(np.float32) for key, values in feed.items()}
+    system = session.run(None, feed)[0].astype(np.float64)
+    stds = [
+        noise["torque_std"] * posterior_slope(posterior, readings),
+        np.full(len(SLIP), 0.01),
+        0.5 / readings["load"],
+    ]
+    std = np.hypot(stds, posterior.response.error[:, None]).reshape(-1, 1)
+    own = (system * std)[:, -len(MODEL_ERROR_COLUMNS) :]
+    return own.reshape(3, len(SLIP), -1)
+
+
+def posterior_slope(posterior, readings) -> np.ndarray:
+    """Derivative of the scale of torque by torque."""
+    linear = posterior.family.linear_torque
+    return 1.0 / np.sqrt(readings["torque"] ** 2 + 4.0 * linear**2)
+
+
+def true_readings(family) -> dict[str, np.ndarray]:
+    """Exact readings at the soil."""
+    case = family.recipe.case
+    y = family.responses(np.stack([SLIP, LOAD], axis=1), SOIL[None, None])[:, 0]
+    linear = family.linear_torque
+    torque = 2.0 * linear * np.sinh(y[:, 0]) if linear else np.exp(y[:, 0]) * LOAD
+    assert case.model.gear.name == "wheel"
+    readings = {"slip": SLIP, "load": LOAD, "torque": torque}
+    return readings | {"sinkage": np.exp(y[:, 1]), "drawbar_pull": y[:, 2] * LOAD}
+
+
+def test_a_stronger_soil_under_a_heavier_load_responds_alike():
+    case = read_recipe("wheel").case
+    forces = []
+    for factor in (1.0, 1.7):
+        stronger = {name: factor * getattr(case.soil, name) for name in ("kc", "kphi")}
+        soil = case.with_values(stronger | {"cohesion": factor * 900.0}).soil
+        force = case.model(soil, Operating(slip=SLIP, load=factor * LOAD))
+        forces.append([force.torque / factor, force.sinkage, force.drawbar_pull / factor])
+    assert np.asarray(forces[1]) == pytest.approx(np.asarray(forces[0]), rel=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
+def test_columns_of_the_bearing_are_changes_with_its_logarithm(kind, request):
+    posterior, step = request.getfixturevalue(kind), 1e-4
+    family, readings = posterior.family, true_readings(posterior.family)
+    found = model_columns(posterior, readings, 1.0)
+
+    def channels(factor):
+        """Channels (rows, 3) where load and cohesion are smaller by a factor."""
+        cohesion = family.axes[0]
+        ends = np.linspace(-1.0, 1.0, 20001)
+        lower = np.interp(cohesion.value(SOIL[0]) / factor, cohesion.value(ends), ends)
+        designs = family.features(np.stack([SLIP, LOAD / factor], axis=1))
+        return posterior.response.predict(designs, np.asarray([lower, *SOIL[1:]]))
+
+    change = (channels(1.0 + step) - channels(1.0 - step)) / (2.0 * step)
+    if family.linear_torque:  # torque itself is larger by the factor
+        change[:, 0] += readings["torque"] * posterior_slope(posterior, readings)
+    middle = float(family.recipe.load.at(np.asarray(0.5)))
+    profile = [1.0 + 0.0 * SLIP, SLIP, np.log(LOAD / middle)]
+    for i, (name, values) in enumerate(zip(MODEL_ERROR_COLUMNS[:3], profile, strict=True)):
+        expected = USUAL_MODEL_ERRORS[name] * values[:, None] * change
+        assert pytest.approx(expected, abs=0.01 * np.abs(expected).max()) == found[:, :, i].T
+
+
+@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
+def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
+    posterior = request.getfixturevalue(kind)
+    family, readings = posterior.family, true_readings(posterior.family)
+    found = model_columns(posterior, readings, 2.0)[:, :, 3]
+    kappa = ExitAngle.about.reference["kappa"]
+    case = family.recipe.case
+    model = replace(case.model, effects=(ExitAngle(kappa=kappa),))
+    other = replace(family, recipe=replace(family.recipe, case=replace(case, model=model)))
+    designs = np.stack([SLIP, LOAD], axis=1)
+    change = other.responses(designs, SOIL[None, None]) - family.responses(
+        designs, SOIL[None, None]
+    )
+    expected = 2.0 * change[:, 0].T
+    for channel in range(3):
+        tolerance = 0.1 * np.abs(expected[channel]).max()
+        assert found[channel] == pytest.approx(expected[channel], abs=tolerance)
+
+
+@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
+def test_channels_have_errors_of_their_own(kind, request):
+    posterior = request.getfixturevalue(kind)
+    readings = true_readings(posterior.family)
+    found = model_columns(posterior, readings, 0.5)[:, :, 4:]
+    of_torque = readings["torque"] * posterior_slope(posterior, readings)
+    expected = np.zeros((3, len(SLIP), 5))
+    for number, (name, channel, factor) in enumerate(
+        [
+            ("sinkage", 1, 1.0),
+            ("drawbar_pull", 2, 1.0),
+            ("torque_by_slip", 0, of_torque * SLIP),
+            ("sinkage_by_slip", 1, SLIP),
+            ("drawbar_pull_by_slip", 2, SLIP),
+        ]
+    ):
+        expected[channel, :, number] = 0.5 * USUAL_MODEL_ERRORS[name] * factor
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
+    assert not model_columns(posterior, readings, 0.0).any()
+
+
+def test_what_the_model_has_is_none_of_its_errors(any_posterior):
+    wheel = Model(Wheel(radius=0.1, width=0.1))
+    assert usual_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS
+
+    def nil(unknown, model=wheel):
+        return {name for name, std in usual_model_errors(unknown, model).items() if std == 0.0}
+
+    assert nil([*SHEAR, "kphi", "n"]) == {"bearing", "bearing_by_load"}
+    digging = wheel + SlipSinkage(n1=0.2)
+    assert nil([*SHEAR, "slip-sinkage.n1"], digging) == {"bearing_by_slip"}
+    assert nil(SHEAR, wheel + ExitAngle(kappa=0.1)) == {"contact"}
+    assert nil(["friction_angle"]) == {"bearing", "bearing_by_slip", "bearing_by_load"}
+    track = Track(radius=0.1, width=0.1, base=0.4)
+    assert nil(SHEAR, Model(track)) == {"contact"}
+    given = any_posterior.family.model_errors()
+    assert given["bearing"] == given["bearing_by_load"] == 0.0 < given["bearing_by_slip"]

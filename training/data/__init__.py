@@ -1,1 +1,0 @@
-"""Training data, their split by run, and the quantities that can be targets."""

@@ -1,1 +1,0 @@
-"""Numerics of the kernel regressors: kernels, prototypes, solutions in bounded memory."""

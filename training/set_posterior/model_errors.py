@@ -1,0 +1,149 @@
+"""Errors of the model that all readings share, as nodes of a graph."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
+from training.onnx_graph.value import (
+    Value,
+    concat,
+    exp,
+    gemm,
+    log,
+    maximum,
+    shortcut,
+    stack_rows,
+)
+from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
+from training.set_posterior.monomials import ONE, Terms, derivative
+from training.set_posterior.response_surface import Response
+
+#: The unknown that is a strength, beside the bearing modulus.
+COHESION = "cohesion"
+#: Place of the first error that one channel has alone, and how those that grow with slip are named.
+OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """Changes of the residuals with errors of the model, before weights.
+
+    Parameters
+    ----------
+    family, response : WheelFamily, Response
+        Usual errors of the model, and surfaces of the channels and of their changes.
+    context : ContextValues
+        Features, and how the scale of torque depends on load.
+    readings : mapping
+        Readings by input name.
+    slope : Value
+        Derivatives of the channels' scales by the readings, (channels, rows).
+    """
+
+    family: WheelFamily
+    response: Response
+    context: ContextValues
+    readings: Mapping[str, Value]
+    slope: Value
+
+    def columns_at(self, slopes: Value, coefficients: Value, basis: Value) -> Value:
+        r"""Columns (errors, readings) at a soil, in the order of `MODEL_ERROR_COLUMNS`.
+
+        Changes with the bearing modulus k follow from those with load W and cohesion c. On a soil
+        that is stronger by some factor, under a load that is larger by the same factor, T / W,
+        sinkage and P / W are what they were, for every law of stress in which strength is c, k or a
+        multiple of them:
+
+        .. math:: \frac{\partial f}{\partial \ln k} =
+            - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
+
+        A scale of torque without load changes with the logarithm of torque itself in addition.
+        They are zero where the model is right, and then not computed.
+
+        Parameters
+        ----------
+        slopes : Value
+            Derivatives of the channels by log slip and log load, at the same soil,
+            (2, channels, rows).
+        coefficients : Value
+            Coefficients of the channels (terms, readings).
+        basis : Value
+            Monomials (terms, 1) of the soil.
+        """
+        size, errors = self.readings[MODEL_ERROR_INPUT], len(MODEL_ERROR_COLUMNS)
+        row = coefficients.split([1, len(self.response.terms) - 1], axis=0)[0]
+        return shortcut(
+            size <= 0.0,
+            lambda _, first, *others: first * np.zeros((errors, 1)),
+            self._columns,
+            size,
+            row,
+            *(slopes, coefficients, basis, self.slope, self.context.features),
+            *(self.readings[name] for name in ("slip", "load", "torque")),
+        )
+
+    def _columns(
+        self,
+        size: Value,
+        _: Value,
+        slopes: Value,
+        coefficients: Value,
+        basis: Value,
+        slope: Value,
+        features: Value,
+        *readings: Value,
+    ) -> Value:
+        """The columns of a model that has errors."""
+        stds, channels = self.family.model_errors(), len(RESPONSE_CHANNELS)
+        slip, load, torque = readings
+        log_load = log(maximum(load, SMALLEST)) - self.context.usual_log_load
+        bearing = [
+            slip * 0.0 + stds["bearing"],
+            slip * stds["bearing_by_slip"],
+            log_load * stds["bearing_by_load"],
+        ]
+        profile = stack_rows(bearing).reshape(3, 1, -1)
+        first = np.zeros((channels, 1))
+        first[0] = 1.0
+        of_torque = first * (1.0 - self.context.torque_by_load)
+        change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
+        names = [axis.name for axis in self.family.axes]
+        if COHESION in names:
+            number = names.index(COHESION)
+            by_log = _by_log_value(basis, self.response.terms, number + 1, self.family.axes[number])
+            of_cohesion = gemm(by_log, coefficients, transpose_a=True)
+            change = change - of_cohesion.reshape(1, channels, -1)
+        contact = change * 0.0
+        if self.response.contact is not None:
+            at_soil = self.response.contact.add_at_soil(features).at(basis)
+            contact = at_soil.reshape(1, channels, -1) * stds["contact"]
+        own = (slope * torque * first + (1.0 - first)) * self._own_errors(slip)
+        columns = concat([change * profile, contact, own], axis=0) * size
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
+
+    def _own_errors(self, slip: Value) -> Value:
+        """Relative errors (errors, channels, rows) of single channels; of pull, over load."""
+        stds, names = self.family.model_errors(), MODEL_ERROR_COLUMNS[OF_CHANNELS:]
+        constant, growing = np.zeros((2, len(names), len(RESPONSE_CHANNELS), 1))
+        for number, name in enumerate(names):
+            part = growing if name.endswith(GROWS) else constant
+            part[number, RESPONSE_CHANNELS.index(name.removesuffix(GROWS))] = stds[name]
+        return slip * growing + constant
+
+
+def _by_log_value(basis: Value, terms: Terms, number: int, axis: Coordinate) -> Value:
+    r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
+
+    .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}
+    """
+    linear = terms.index((*(ONE,) * (len(terms[0]) - 1), number))
+    x = basis.take([linear], axis=0)
+    growth = exp(x * axis.rate) * axis.factor
+    value = growth + x * axis.slope + axis.shift
+    by_x = growth * axis.rate + axis.slope
+    return (derivative(terms, number) @ basis) * (value / by_x)

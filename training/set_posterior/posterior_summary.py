@@ -1,0 +1,167 @@
+"""Outputs of a set posterior as nodes of a graph: mean, covariance, interval, flags."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.onboard.estimate import EDGE_STDS
+from soilml.onboard.set_contract import SET_PREFIX
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from training.onnx_graph.value import Value, concat, constant, exp, gemm, maximum, sqrt, where
+from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.importance_sampler import WeightedSample
+from training.set_posterior.misfit_test import Consistency
+
+Floats = NDArray[np.float64]
+
+#: Probabilities of the ends of the interval.
+INTERVAL = (0.05, 0.95)
+#: Distances from the mean, in standard deviations, at which the distribution function is evaluated.
+#: The 5 % quantile of a normal distribution lies 1.64 below the mean, that of a uniform one 1.56,
+#: and those of an exponential one 0.95 below and 2.0 above; the grid leaves room on both sides of
+#: them. All are multiples of their spacing.
+SPACING = 0.25
+DISTANCES = np.arange(0.5, 3.3, SPACING)
+#: Least share of the sample between two grid points that is divided by.
+LEAST_SHARE = 1e-6
+
+
+def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> Value:
+    r"""The quantiles (q, 2) at `INTERVAL` of q deviations from a mean.
+
+    The weighted distribution function F is evaluated at multiples :math:`g_i` of the spacing h, and
+    inverted by linear interpolation. The weight of a sample at :math:`d_j` is shared by the grid
+    points around it:
+
+    .. math:: F(g_i) = \sum_j w_j \left[\frac{1}{2} + \frac{g_i - d_j}{h}\right]_0^1
+
+    A sample that counted as a whole on either side of a grid point would move the quantile, by a
+    hundredth of a standard deviation and more, when rounding takes it to the other side. Below the
+    quantile at probability alpha lie segments that are passed as a whole, and one that is passed in
+    part:
+
+    .. math:: Q(\alpha) = g_0 + \sum_i h
+        \left[\frac{\alpha - F(g_i)}{F(g_{i+1}) - F(g_i)}\right]_0^1
+
+    A quantile off the grid is at its end. ONNX has no weighted quantile, and sorting each
+    parameter's samples would take longer than the rest of the graph.
+
+    Parameters
+    ----------
+    deviations : Value
+        Deviations from the mean, (q, n).
+    std : Value
+        Their standard deviations, (q, 1).
+    weights : Value
+        Weights (1, n) with sum 1.
+    count : int
+        n.
+    """
+    segments = len(DISTANCES) - 1
+    grid = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING
+    spacing = std * SPACING
+    relative = (deviations / spacing).reshape(0, 1, -1)
+    below = ((grid + 0.5)[:, None] - relative).clip(0.0, 1.0)
+    flat = below.reshape(-1, count)  # (q * grid points, n)
+    # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
+    distribution = gemm(weights, flat, transpose_b=True).reshape(-1, len(grid))
+    # columns of these matrices are the segments: of the lower half of the grid for the lower
+    # quantile, then of the upper half for the upper quantile
+    minus_start, increment = np.zeros((2, len(grid), 2 * segments))
+    of_end = np.zeros((2 * segments, 2))
+    for end in range(2):
+        for i in range(segments):
+            segment, point = end * segments + i, end * (segments + 1) + i
+            minus_start[point, segment] = -1.0
+            increment[point, segment], increment[point + 1, segment] = -1.0, 1.0
+            of_end[segment, end] = 1.0
+    remaining = gemm(distribution, minus_start, np.repeat(INTERVAL, segments))
+    passed = remaining / maximum(distribution @ increment, LEAST_SHARE)
+    first_points = grid[[0, segments + 1]]
+    return gemm(passed.clip(0.0, 1.0), of_end, first_points) * spacing
+
+
+#: Stands for a factor of zero, of which the logarithm is taken.
+ZERO_FACTOR = 1e-30
+#: Quantiles of the prior, in equal steps of probability, over which its moments are computed.
+PRIOR_POINTS = 4096
+
+
+def add_posterior_outputs(
+    family: WheelFamily,
+    context: ContextValues,
+    sample: WeightedSample,
+    consistency: Consistency,
+    prefix: str,
+) -> None:
+    r"""Add the outputs, each named `<prefix>set_<name>`, from the moments of the weighted sample.
+
+    .. math:: \mu = \sum_i w_i \theta_i, \qquad
+        \Sigma = \sum_i w_i (\theta_i - \mu) (\theta_i - \mu)^T
+
+    A set without enough rows in range gets the prior. Of a set that no soil explains, the sample
+    is that with the noise that explains it, and the flag is false.
+    """
+    q = family.targets
+    value = _parameters(family, sample)
+    mean = gemm(value, sample.weights, transpose_b=True)
+    deviation = value - mean
+    covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
+    variance = (covariance * np.eye(q)).sum(axis=1, keepdims=True)
+    std = sqrt(variance)
+    interval = mean + add_quantiles(deviation, std, sample.weights, sample.count)
+    enough = consistency.enough.reshape(1, 1)
+    consistent = enough & (sample.misfit <= consistency.limit).reshape(1, 1)
+    prior = prior_summary(family)
+    names = ("mean", "std", "low", "high")
+    estimated = concat([mean, std, interval], axis=1)  # (q, 4)
+    fallback = np.stack([prior[name] for name in names], axis=1)
+    chosen, scale = where(enough, estimated, fallback), context.target_scale
+    if scale is not None:
+        chosen = chosen * scale
+    for name, column in zip(names, chosen.split(4, axis=1), strict=True):
+        column.reshape(q).named(f"{prefix}{SET_PREFIX}{name}")
+    chosen = where(enough, covariance, np.diag(prior["std"] ** 2))
+    if scale is not None:
+        chosen = chosen * gemm(scale, scale, transpose_b=True)
+    chosen.named(f"{prefix}{SET_PREFIX}covariance")
+    consistent.reshape(1).named(f"{prefix}{SET_PREFIX}in_range")
+    _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
+    vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]
+    (vague | ~consistent).reshape(q).named(f"{prefix}{SET_PREFIX}abstains")
+    sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
+
+
+def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
+    """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
+    ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
+    margin = std * EDGE_STDS
+    low, high = mean - margin < ends[:, :1], mean + margin > ends[:, 1:]
+    return (low | high).reshape(family.targets)
+
+
+def prior_summary(family: WheelFamily) -> dict[str, Floats]:
+    """Mean, standard deviation and interval of the prior of each target, without their scale."""
+    u = (np.arange(PRIOR_POINTS) + 0.5) / PRIOR_POINTS
+    axes = family.axes[: family.targets]
+    values = np.stack([axis.value(axis.quantile(u)) for axis in axes])
+    low, high = np.quantile(values, INTERVAL, axis=1)
+    return {"mean": values.mean(axis=1), "std": values.std(axis=1), "low": low, "high": high}
+
+
+def _parameters(family: WheelFamily, sample: WeightedSample) -> Value:
+    r"""Estimated parameters (q, n) of a sample without their scale.
+
+    .. math:: \theta = \alpha + \delta x + e^{\log \beta + \gamma x}
+
+    as two products with points (1, x), see `Coordinate`.
+    """
+    linear, exponent = np.zeros((2, family.targets, 1 + len(family.axes)))
+    for k, axis in enumerate(family.axes[: family.targets]):
+        column = 1 + sample.order.index(k)
+        linear[k, [0, column]] = axis.shift, axis.slope
+        exponent[k, [0, column]] = np.log(max(axis.factor, ZERO_FACTOR)), axis.rate
+    graph = sample.points.graph
+    exponential = exp(constant(graph, exponent) @ sample.points)
+    return constant(graph, linear) @ sample.points + exponential
