@@ -28,6 +28,7 @@ from soilml.identification.trained_estimator import (
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import QUANTITIES
+from soilml.remarks import texts
 from soilml.report.terminal import shown_unit, significant
 
 _HINT = "select rows with --where, or train a model for this wheel"
@@ -90,7 +91,7 @@ def apply_case_option(
                     "[gear], [soil], [soil.prior] and [noise]"
                 )
             estimator, own_notes = condition_on_case(estimator, case)
-            notes += own_notes
+            notes += texts(own_notes)
         elif case is not None:
             together = estimator.sets is not None and args.by is not None
             notes += _compare(args, estimator, case, together)
@@ -99,7 +100,7 @@ def apply_case_option(
     if case is not None and case.discrepancy:
         notes.append(_discrepancy_note(args, given[0], case))
     if case is not None:
-        notes += ignored_soil_tests(case)
+        notes += texts(ignored_soil_tests(case))
     return given, case, notes
 
 

@@ -13,6 +13,7 @@ from soilml.fitting.observations import Observations
 from soilml.fitting.operating_points import gear_numbers
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import QUANTITIES, column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -48,22 +49,24 @@ def stacked_columns(parts: Sequence[Floats]) -> Floats:
     return stacked
 
 
-def included_discrepancy(case: Case, data: Observations) -> list[str]:
-    """A sentence with the standard deviation of each channel's discrepancy; none without one."""
+def included_discrepancy(case: Case, data: Observations) -> list[Remark]:
+    """A remark with the standard deviation of each channel's discrepancy; none without one."""
     texts = []
     for channel in data.channels:
         own = case.discrepancy.get(column(channel.name), Discrepancy())
         amplitude = own.amplitude(range_with_zero(channel.reading))
         if amplitude > 0.0:
             texts.append(f"{channel.name} {amplitude:.3g} {QUANTITIES[channel.name].unit}")
-    return [f"errors of the model are included in std: {', '.join(texts)}"] if texts else []
+    text = f"errors of the model are included in std: {', '.join(texts)}"
+    return [Remark("discrepancy-included", text, severity="note")] if texts else []
 
 
 def ignored_discrepancy(
     case: Case, what: str, consequence: str = "its intervals are too narrow"
-) -> list[str]:
-    """A sentence that `what` ignores [discrepancy]; none for a case without one."""
+) -> list[Remark]:
+    """A remark that `what` ignores [discrepancy]; none for a case without one."""
     names = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
     if not names:
         return []
-    return [f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"]
+    text = f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"
+    return [Remark("discrepancy-ignored", text, tuple(names))]

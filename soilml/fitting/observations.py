@@ -17,6 +17,7 @@ from soilml.fitting.shared_errors_sizes import declared_errors
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, QUANTITIES, column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ class Observations:
     excluded_channels
         Columns that are not fitted, since their noise is not declared and that of others is.
     notes
-        Warnings about the table.
+        Remarks on the table.
     shared_errors
         Standard deviations of the errors that all rows share, by name, as [bias] declares them.
     condensed
@@ -80,7 +81,7 @@ class Observations:
     load_std: Floats
     channels: tuple[Channel, ...]
     excluded_channels: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
     shared_errors: Mapping[str, float] = field(default_factory=dict)
     condensed: Condensed | None = None
 
@@ -147,7 +148,8 @@ def read_observations(case: Case, table: Table) -> Observations:
     check_wheel_size(case, table)
     notes = _notes(case, table)
     if dropped:
-        notes.append(f"{dropped} rows are excluded: their status is not ok")
+        text = f"{dropped} rows are excluded: their status is not ok"
+        notes.append(Remark("rows-excluded", text))
     found = []
     for name in CHANNELS:
         key = column(name)
@@ -171,12 +173,12 @@ def read_observations(case: Case, table: Table) -> Observations:
     )
 
 
-def _notes(case: Case, table: Table) -> list[str]:
+def _notes(case: Case, table: Table) -> list[Remark]:
     """Several runs, and grousers that the model lacks."""
-    notes = []
+    notes: list[Remark] = []
     runs = len(np.unique(table["run"])) if "run" in table else 1
     if runs > 1:
-        notes.append(f"{runs} runs are fitted as one soil")
+        notes.append(Remark("runs-as-one-soil", f"{runs} runs are fitted as one soil"))
     if case.gears:
         for name in case.gears:
             rows = table.rows(operating_points(table).gear == name) if "gear" in table else table
@@ -186,13 +188,14 @@ def _notes(case: Case, table: Table) -> list[str]:
     return notes
 
 
-def _grouser_note(case: Case, table: Table, owner: str) -> list[str]:
+def _grouser_note(case: Case, table: Table, owner: str) -> list[Remark]:
     """Whether the wheel of a table has grousers that the model lacks."""
     lugs = QUANTITIES["grouser_height"].column
     if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
         height = float(np.nanmax(table[lugs]))
         if not any(effect.name == "grousers" for effect in case.model.effects):
-            return [f"{lugs} is {height:g}, but {owner} has no effect grousers"]
+            text = f"{lugs} is {height:g}, but {owner} has no effect grousers"
+            return [Remark("grousers-missing", text, ("grousers",))]
     return []
 
 
@@ -207,7 +210,7 @@ def declared_std(case: Case, table: Table, key: str) -> Floats:
     return np.asarray(std)
 
 
-def _without_zeros(table: Table, key: str, std: Floats) -> tuple[Floats, list[str]]:
+def _without_zeros(table: Table, key: str, std: Floats) -> tuple[Floats, list[Remark]]:
     """Standard deviations with zeros replaced by the median of the others, and a note of that.
 
     A relative noise is zero at a reading of zero, where the row would have infinite weight. Raises
@@ -233,4 +236,4 @@ def _without_zeros(table: Table, key: str, std: Floats) -> tuple[Floats, list[st
     )
     if more:
         note += f"; {more} more rows likewise"
-    return np.where(zero, median, std), [note]
+    return np.where(zero, median, std), [Remark("zero-noise", note, (key,))]

@@ -11,6 +11,7 @@ from soilml.config.case import Case
 from soilml.config.sensor_bias import KNOWN_PARTS, common_errors
 from soilml.physics.effects.soil.exit_angle import ExitAngle
 from soilml.physics.gears.base import Gear
+from soilml.remarks import Remark
 
 #: Standard deviations of errors that the readings of a drive usually have in common: wheel speed
 #: over ground speed, effective radius and gear ratios, current to torque, mass and load transfer,
@@ -56,10 +57,11 @@ def declared_errors(case: Case) -> dict[str, float]:
     return {name: std for name, std in common_errors(case.bias).items() if std > 0.0}
 
 
-def included_bias(case: Case) -> list[str]:
-    """A sentence with the declared errors that all rows share; none without one."""
+def included_bias(case: Case) -> list[Remark]:
+    """A remark with the declared errors that all rows share; none without one."""
     texts = [f"{key} {bias.as_setting()}" for key, bias in case.bias.items() if bias.as_setting()]
-    return [f"errors that all rows share are included in std: {', '.join(texts)}"] if texts else []
+    text = f"errors that all rows share are included in std: {', '.join(texts)}"
+    return [Remark("bias-included", text, severity="note")] if texts else []
 
 
 def usual_errors(case: Case, load: NDArray[np.float64], unknown: Sequence[str]) -> dict[str, float]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.physics.soils.soil_tests import deviations
+from soilml.remarks import Remark
 
 #: Deviation, in standard deviations of the test's scatter, that is remarked on.
 NOTABLE = 2.5
@@ -26,11 +27,12 @@ def disagreeing_soil_tests(case: Case, values: Mapping[str, float]) -> list[str]
     ]
 
 
-def ignored_soil_tests(case: Case) -> list[str]:
-    """A sentence that a file for the board ignores the case's tests; none for a case without."""
+def ignored_soil_tests(case: Case) -> list[Remark]:
+    """A remark that a file for the board ignores the case's tests; none for a case without."""
     if not case.soil_tests:
         return []
-    return ["[[soil.test]] is ignored: a file for the board takes no tests of the soil"]
+    text = "[[soil.test]] is ignored: a file for the board takes no tests of the soil"
+    return [Remark("soil-tests-ignored", text)]
 
 
 def _kpa(stress: float) -> str:

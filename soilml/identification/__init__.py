@@ -26,6 +26,7 @@ from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.io.read_table import Rows, as_table
 from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.remarks import Remark
 from soilml.unsolvable import solvable
 
 Method = Callable[[Case, Observations, Sequence[FreeParameter]], Fit]
@@ -135,13 +136,13 @@ def identify(
     fit = METHODS[method](case, data, selected)
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)
-    texts = [
+    remarks = [
         *_method_limits(fit, data, free),
         *_about_discrepancy(case, fit, data),
         *_about_soil_tests(case, fit),
         *data.notes,
     ]
-    return replace(fit, warnings=(*fit.warnings, *texts))
+    return replace(fit, warnings=(*fit.warnings, *remarks))
 
 
 def _within_priors(fit: Fit, selected: Sequence[FreeParameter]) -> Fit:
@@ -152,39 +153,46 @@ def _within_priors(fit: Fit, selected: Sequence[FreeParameter]) -> Fit:
     return replace(fit, low=np.maximum(low, ends[:, 0]), high=np.minimum(high, ends[:, 1]))
 
 
-def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[str]:
+def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[Remark]:
     """Parameters not requested, and noise that a closed form does not propagate."""
-    texts = []
+    remarks = []
     if free is not None and (others := [name for name in fit.names if name not in free]):
-        texts.append(
+        text = (
             f"{', '.join(others)} identified too, although not requested: the {fit.method} method "
             f"identifies {', '.join(fit.names)} together"
         )
+        remarks.append(Remark("identified-together", text, tuple(others), "note"))
     if fit.method in CLOSED_FORM and (np.any(data.slip_std) or np.any(data.load_std)):
-        texts.append(f"the {fit.method} method does not propagate noise of slip and load into std")
-    return texts
+        text = f"the {fit.method} method does not propagate noise of slip and load into std"
+        remarks.append(Remark("input-noise-ignored", text))
+    return remarks
 
 
-def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[str]:
+def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[Remark]:
     """Whether discrepancy and bias of the case are in the intervals."""
     if fit.method in CLOSED_FORM:
+        bias_ignored = f"the {fit.method} method ignores [bias]"
         return [
             *ignored_discrepancy(case, f"the {fit.method} method"),
-            *([f"the {fit.method} method ignores [bias]"] if case.bias else []),
+            *([Remark("bias-ignored", bias_ignored)] if case.bias else []),
         ]
     return [*included_discrepancy(case, data), *included_bias(case)]
 
 
-def _about_soil_tests(case: Case, fit: Fit) -> list[str]:
+def _about_soil_tests(case: Case, fit: Fit) -> list[Remark]:
     """Whether tests of the soil take part, and which ones the rows disagree with."""
     if not case.soil_tests:
         return []
     if fit.method in CLOSED_FORM:
-        return [f"the {fit.method} method ignores [[soil.test]]"]
+        text = f"the {fit.method} method ignores [[soil.test]]"
+        return [Remark("soil-tests-ignored", text)]
     values = dict(zip(fit.names, fit.values, strict=True))
     return [
-        f"the rows disagree with a test of the soil: {text}; an effect may be missing from the "
-        "model, or the test was made on another soil"
+        Remark(
+            "soil-test-disagrees",
+            f"the rows disagree with a test of the soil: {text}; an effect may be missing from "
+            "the model, or the test was made on another soil",
+        )
         for text in disagreeing_soil_tests(case, values)
     ]
 

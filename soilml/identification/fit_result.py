@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.numerics.prior import Prior
 from soilml.quantities import Z_90
+from soilml.remarks import Remark
 
 if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
@@ -37,12 +38,12 @@ class Fit:
     covariance
         Covariance (p, p) of the errors of `values`.
     warnings
-        What limits the result; one sentence each.
+        What limits the result.
     rows_used
         Number of rows.
     remaining_fraction
         By parameter, its standard deviation after the measurement over that of the prior: 1 where
-        the rows are uninformative. Empty for methods without a prior. `left_of_prior` in JSON.
+        the rows are uninformative. Empty for methods without a prior.
     misfit
         Mean squared residual in standard deviations of the noise, per degree of freedom; NaN where
         the noise is not declared.
@@ -61,7 +62,7 @@ class Fit:
     units: tuple[str, ...]
     values: Floats
     covariance: Floats
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
     rows_used: int
     remaining_fraction: dict[str, float] = field(default_factory=dict)
     misfit: float = float("nan")
@@ -136,14 +137,14 @@ class Fit:
             "parameters": {
                 name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
                 | {"unit": unit}
-                | ({"left_of_prior": remaining[name]} if name in remaining else {})
+                | ({"remaining_fraction": remaining[name]} if name in remaining else {})
                 for name, v, s, low, high, unit in rows
             },
             "correlation": {
                 a: {b: float(correlation[i, j]) for j, b in enumerate(self.names) if j != i}
                 for i, a in enumerate(self.names)
             },
-            "warnings": list(self.warnings),
+            "warnings": [remark.as_json() for remark in self.warnings],
             "rows_used": self.rows_used,
             "channels_used": list(self.channels),
             "misfit": None if np.isnan(self.misfit) else float(self.misfit),

@@ -9,8 +9,8 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.fit_result import Fit
+from soilml.remarks import Remark
 
 #: One standard deviation of a uniform prior to either side of its middle, as fractions of it.
 SIDES = (0.5 - 12.0**-0.5, 0.5 + 12.0**-0.5)
@@ -29,7 +29,8 @@ def with_fixed_parameter(case: Case, path: str, solve: Callable[[Case], Fit]) ->
     prior = case.prior.get(path)
     value = float(case.parameters()[path][1])
     if prior is None:
-        note = f"{path} is fixed at {value:g} and treated as exact: it has no prior"
+        text = f"{path} is fixed at {value:g} and treated as exact: it has no prior"
+        note = Remark("fixed-parameter", text, (path,))
         return replace(fit, warnings=(note, *fit.warnings, *_validity(fit, case)))
     covariance = fit.covariance.copy()
     for side in SIDES:
@@ -39,24 +40,25 @@ def with_fixed_parameter(case: Case, path: str, solve: Callable[[Case], Fit]) ->
         except FitError:
             continue
         covariance += 0.5 * np.outer(change, change)
-    note = f"{path} is fixed at {value:g}; the width of its prior is propagated into std"
+    text = f"{path} is fixed at {value:g}; the width of its prior is propagated into std"
+    note = Remark("fixed-parameter", text, (path,))
     warnings = (note, *fit.warnings, *_validity(fit, case))
     return replace(fit, covariance=covariance, warnings=warnings)
 
 
-def _validity(fit: Fit, case: Case) -> list[str]:
+def _validity(fit: Fit, case: Case) -> list[Remark]:
     """Values outside their priors and residuals beyond the noise: the method has no bounds."""
-    texts = []
+    remarks = []
     for name, value in zip(fit.names, fit.values, strict=True):
         prior = case.prior.get(name)
         if prior is not None and not prior.lower <= value <= prior.upper:
-            texts.append(
-                f"{name} is {value:.4g}, outside its prior of {prior.lower:g} to {prior.upper:g}: "
-                "do not use it"
-            )
+            ends = f"{prior.lower:g} to {prior.upper:g}"
+            text = f"{name} is {value:.4g}, outside its prior of {ends}: do not use it"
+            remarks.append(Remark("outside-prior", text, (name,)))
     if fit.misfit > MOST_MISFIT:
-        texts.append(
-            f"residuals are {np.sqrt(fit.misfit):.1f} {EXCESS_RESIDUALS}: the closed form "
+        text = (
+            f"residuals are {np.sqrt(fit.misfit):.1f} times the declared noise: the closed form "
             "does not describe these rows; use --method nonlinear"
         )
-    return texts
+        remarks.append(Remark("excess-residuals", text))
+    return remarks

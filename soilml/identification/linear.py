@@ -20,6 +20,7 @@ from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears import LinearWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 #: Most iterations of the stress at the exit and of the weights.
@@ -187,17 +188,22 @@ def _channel(data: Observations, name: str) -> Channel:
     )
 
 
-def _limits(case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats) -> list[str]:
+def _limits(
+    case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats
+) -> list[Remark]:
     """What the closed form leaves out, and values outside what soil can have."""
-    texts = [
-        f"{f.path} is not identified by the linear method"
+    remarks = [
+        Remark("not-identified", f"{f.path} is not identified by the linear method", (f.path,))
         for f in free
         if f.path not in ("cohesion", "friction_angle", "shear_modulus")
     ]
     if any(effect.overrides("on_stress") for effect in case.model.effects):
-        texts.append("the linear method neglects effects on the stress")
+        text = "the linear method neglects effects on the stress"
+        remarks.append(Remark("effects-neglected", text))
     if solution[0] < 0 or solution[1] < 0:
-        texts.append("the linear method gives a negative value, which no soil has")
+        text = "the linear method gives a negative value, which no soil has"
+        remarks.append(Remark("negative-value", text))
     if is_one_load(load):
-        texts.append("one load only: cohesion is not identified")
-    return texts
+        text = "one load only: cohesion is not identified"
+        remarks.append(Remark("not-identified", text, ("cohesion",)))
+    return remarks

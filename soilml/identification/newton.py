@@ -23,6 +23,7 @@ from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -101,15 +102,21 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * noise_variance
     values, rate = values_at(unknowns, u)
     warnings = [
-        f"{f.path} is not identified by the Newton-Raphson method"
+        Remark(
+            "not-identified",
+            f"{f.path} is not identified by the Newton-Raphson method",
+            (f.path,),
+        )
         for f in free
         if f.path not in ("cohesion", *(unknown.path for unknown in unknowns))
     ]
     if not known:
-        warnings.append(
+        text = (
             "noise is not declared: estimated from the residuals; in [noise] of the model file "
             "torque_Nm = '3 %' would declare it"
         )
+        names = tuple(column(c.name) for c in data.channels if not c.declared)
+        warnings.append(Remark("undeclared-noise", text, names))
     return Fit(
         method="newton",
         names=tuple(f.path for f in unknowns),

@@ -26,6 +26,7 @@ from soilml.numerics.sampling.importance_sampling import (
 )
 from soilml.numerics.sampling.surface_sampling import surface_sample
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -248,14 +249,12 @@ def _from_surface(
     return sample
 
 
-def _sampling_warnings(sample: ImportanceSample) -> tuple[str, ...]:
+def _sampling_warnings(sample: ImportanceSample) -> tuple[Remark, ...]:
     size = sample.effective_size
     if size >= 0.5 * LEAST_EFFECTIVE_SIZE:
         return ()
-    return (
-        f"the effective sample size is {size:.0f} only: sampling error of the values is about "
-        f"{100 / np.sqrt(size):.0f} % of their std",
-    )
+    text = f"the effective sample size is {size:.0f} only: sampling error of the values is about "
+    return (Remark("few-samples", f"{text}{100 / np.sqrt(size):.0f} % of their std"),)
 
 
 def misfit_limit(freedom: int) -> float:

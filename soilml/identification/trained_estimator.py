@@ -21,6 +21,7 @@ from soilml.parameters import declared
 from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ FIXED_ANGLE = {"a0": 0.4, "a1": 0.15}
 SAME_PRIOR = 0.02
 
 
-def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list[str]]:
+def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list[Remark]]:
     """The estimator for a case, and warnings about what it cannot represent of the case.
 
     Wheel and bearing parameters are the case's, and so are the upper bounds of the priors of
@@ -57,7 +58,8 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
                 f"{estimator.path} is for {name} = {value:g}, the model has "
                 f"{float(getattr(soil, name)):g}; train a file for this model with [set_posterior]"
             )
-    warnings, upper_bounds = [], {}
+    warnings: list[Remark] = []
+    upper_bounds = {}
     for name in ("cohesion", "shear_modulus"):
         own = prior.get(name)
         if own is None:
@@ -67,10 +69,11 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
     bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
     widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
     if bearing_std > widest:
-        warnings.append(
+        text = (
             f"the prior of kphi has a standard deviation of a factor {math.exp(bearing_std):.2g}, "
             f"the file allows {math.exp(widest):.2g}: intervals may be too narrow"
         )
+        warnings.append(Remark("prior-too-wide", text, ("kphi",)))
     conditioned = with_sensors_of(estimator, case).on(
         noise=None,
         wheel_radius=float(gear.radius),
@@ -187,9 +190,9 @@ def _log_std(prior: Prior, bearing: float) -> float:
     return prior.std / max(bearing, 1e-12)
 
 
-def _prior_differences(estimator: Estimator, case: Case) -> list[str]:
+def _prior_differences(estimator: Estimator, case: Case) -> list[Remark]:
     """Priors that differ from those of the file."""
-    texts, used = [], narrower_priors(estimator, case)
+    remarks, used = [], narrower_priors(estimator, case)
     for i, name in enumerate(estimator.names):
         own, ends = case.prior.get(name), _ends(estimator, i)
         width = ends[1] - ends[0]
@@ -202,11 +205,13 @@ def _prior_differences(estimator: Estimator, case: Case) -> list[str]:
             or max(abs(own.lower - ends[0]), abs(own.upper - ends[1])) > SAME_PRIOR * width
         ):
             unit = declared(Soil)[name].unit
-            texts.append(
+            text = (
                 f"{name}: the file's prior is uniform from {ends[0]:.4g} to {ends[1]:.4g} {unit}; "
                 "that of the model is ignored"
             )
+            remarks.append(Remark("prior-ignored", text, (name,)))
     others = [path for path in case.prior if path not in (*estimator.names, "kphi")]
     if others:
-        texts.append(f"{', '.join(others)}: fixed at the model's values; their priors are ignored")
-    return texts
+        text = f"{', '.join(others)}: fixed at the model's values; their priors are ignored"
+        remarks.append(Remark("prior-ignored", text, tuple(others)))
+    return remarks

@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.numerics.quantile_band import quantile_band
 from soilml.physics.operating_point import Operating
+from soilml.remarks import Remark
 from soilml.row_status import Status
 from soilml.traction.messages import MeasuredRange, prediction_warnings
 from soilml.traction.pull_and_slope import Traction, predict_traction
@@ -34,7 +35,7 @@ class LoadPrediction:
 
     posterior: Traction
     prior: Traction
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     @property
     def remaining_fraction(self) -> tuple[float, float]:

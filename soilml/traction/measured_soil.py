@@ -10,9 +10,10 @@ from soilml.config.compatibility import check_wheel_size
 from soilml.fitting.free_parameters import FreeParameter, select_free
 from soilml.fitting.observations import read_observations
 from soilml.fitting.shared_errors_sizes import usual_errors
-from soilml.identification.diagnostics import EXCESS_RESIDUALS
+from soilml.identification.diagnostics import excess_residuals_remark
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
+from soilml.remarks import Remark
 from soilml.traction.onboard_draws import onboard_draws
 from soilml.traction.soil_draws import SoilDraws, posterior_draws
 
@@ -26,7 +27,7 @@ class MeasuredSoil:
 
     draws: SoilDraws
     unknown: Sequence[FreeParameter]
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
     noise_scale: float | None
 
 
@@ -53,13 +54,10 @@ def measured_soil(
     posterior = posterior_draws(case, data, unknown)
     warnings = list(data.notes)
     if [c.name for c in data.channels] == ["torque"]:
-        warnings.append(
-            "torque alone hardly reveals errors of the model: measure pull or sinkage too"
-        )
+        text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
+        warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
     if posterior.samples.noise_inflated:
-        allowed = f"{EXCESS_RESIDUALS}{' and discrepancy' if case.discrepancy else ''}"
-        warnings.append(
-            f"residuals are {posterior.samples.noise_scale:.1f} {allowed}: the model lacks an "
-            "effect or the noise is understated; bands are widened and may be biased"
-        )
+        scale = posterior.samples.noise_scale
+        consequence = "bands are widened and may be biased"
+        warnings.append(excess_residuals_remark(scale, case, consequence))
     return MeasuredSoil(posterior.draws, unknown, tuple(warnings), posterior.samples.noise_scale)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
+from soilml.remarks import Remark
 from soilml.traction.pull_and_slope import Traction
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,7 @@ class MeasuredRange:
         return MeasuredRange(*ends)
 
 
-def limitations(pull_error: float | None) -> str:
+def limitations(pull_error: float | None) -> Remark:
     """What the bands include; `pull_error` is the declared error of the pull, N, if there is one.
 
     >>> print(limitations(0.4))
@@ -47,7 +48,7 @@ def limitations(pull_error: float | None) -> str:
     else:
         error = f"drawbar pull {pull_error:.3g} N before any reading"
         included = f"the uncertainty of the soil, the noise and errors of the model ({error})"
-    return f"bands include {included}; {_NOT_INCLUDED}"
+    return Remark("band-content", f"bands include {included}; {_NOT_INCLUDED}", severity="note")
 
 
 def prediction_warnings(
@@ -56,7 +57,7 @@ def prediction_warnings(
     measured: MeasuredRange,
     *,
     error_included: bool = False,
-) -> Iterator[str]:
+) -> Iterator[Remark]:
     """Warnings about a prediction; `remaining_fraction` as in `LoadPrediction`.
 
     `error_included` is whether the draws include a declared error of the pull.
@@ -65,40 +66,48 @@ def prediction_warnings(
     yield from _extrapolation(prediction, measured, error_included)
     failed, load = prediction.failed_fraction, prediction.load
     if failed > 0.0:
-        yield f"{failed:.0%} of the soils and slips do not carry {load:.4g} N and are excluded"
+        text = f"{failed:.0%} of the soils and slips do not carry {load:.4g} N and are excluded"
+        yield Remark("not-carried", text)
     if np.nanmedian(prediction.steepest_slope) > OVERTURNING_SLOPE:
-        yield (
+        yield Remark(
+            "overturning",
             "slopes beyond 45 degrees are due to cohesion under a light load: vehicles overturn "
-            "earlier"
+            "earlier",
         )
     if prediction.rising_fraction > 0.5:
-        yield (
+        yield Remark(
+            "still-rising",
             f"the pull still increases at slip {prediction.slip[-1]:g}, the highest evaluated: it "
-            "may be larger beyond"
+            "may be larger beyond",
         )
 
 
-def _identifiability(remaining_fraction: tuple[float, float]) -> Iterator[str]:
+def _identifiability(remaining_fraction: tuple[float, float]) -> Iterator[Remark]:
     for name, fraction in zip(("largest pull", "steepest slope"), remaining_fraction, strict=True):
         width = f"its band is {min(fraction, 1.0):.0%} as wide as the prior's"
         if fraction > NOT_IDENTIFIED_ABOVE:
-            yield f"the {name} is not identified by these rows: {width}; do not use it"
+            text = f"the {name} is not identified by these rows: {width}; do not use it"
+            yield Remark("not-identified", text, (name,))
         elif fraction > WEAKLY_IDENTIFIED_ABOVE:
-            yield f"the {name} is weakly identified: {width}"
+            yield Remark("weakly-identified", f"the {name} is weakly identified: {width}", (name,))
 
 
 def _extrapolation(
     prediction: Traction, measured: MeasuredRange, error_included: bool
-) -> Iterator[str]:
+) -> Iterator[Remark]:
     error = "may be larger here than [discrepancy] says" if error_included else "is not in the band"
     note = f"extrapolated by the model, whose error {error}"
     low, high = measured.slip
     if prediction.slip[-1] > high + SLIP_MARGIN:
-        yield f"no slip above {high:.2g} was measured: {note}"
+        text = f"no slip above {high:.2g} was measured: {note}"
+        yield Remark("extrapolated", text)
     if prediction.slip[0] < low - SLIP_MARGIN:
-        yield f"no slip below {low:.2g} was measured: {note}"
+        text = f"no slip below {low:.2g} was measured: {note}"
+        yield Remark("extrapolated", text)
     load, (light, heavy) = prediction.load, measured.load
     if load > LOAD_FACTOR * heavy:
-        yield f"no load above {heavy:.3g} N was measured, predicted is {load:.3g} N: {note}"
+        text = f"no load above {heavy:.3g} N was measured, predicted is {load:.3g} N: {note}"
+        yield Remark("extrapolated", text)
     if load < light / LOAD_FACTOR:
-        yield f"no load below {light:.3g} N was measured, predicted is {load:.3g} N: {note}"
+        text = f"no load below {light:.3g} N was measured, predicted is {load:.3g} N: {note}"
+        yield Remark("extrapolated", text)

@@ -20,13 +20,14 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.traction.moment_draws import estimated_draws
 from soilml.traction.soil_draws import SoilDraws
 
 
 def onboard_draws(
     estimator: Estimator, case: Case, table: Table
-) -> tuple[list[FreeParameter], SoilDraws, list[str]]:
+) -> tuple[list[FreeParameter], SoilDraws, list[Remark]]:
     """Parameters that the file estimates with their priors, draws of its estimate, and warnings.
 
     Raises `InputError` where the file is for another gear or estimates a parameter that the case
@@ -59,14 +60,15 @@ def onboard_draws(
     warnings += ignored_soil_tests(case)
     estimate = estimator.run(**readings)
     if not estimate.in_range:
-        warnings.append(
+        text = (
             f"the rows are outside the training domain of {estimator.path}, which returns the "
             "prior, or no soil explains them, which widens its estimate"
         )
+        warnings.append(Remark("out-of-range", text))
     return free, estimated_draws(free, estimate.mean, estimate.covariance), warnings
 
 
-def _check_case(estimator: Estimator, case: Case) -> list[str]:
+def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
     """Warnings of fixed values and effects that differ; raises `InputError` for another gear."""
     trained = recipe_case(estimator.metadata["recipe"], estimator.path)
     if trained is None:
@@ -75,10 +77,10 @@ def _check_case(estimator: Estimator, case: Case) -> list[str]:
         raise InputError(
             f"{estimator.path} was trained with {difference}; train a model for this gear"
         )
+    found = [(text, "soil") for text in value_differences(case, trained)]
+    found += [(text, "model") for text in effect_differences(case, trained)]
+    head = f"{estimator.path} was trained with"
     return [
-        f"{estimator.path} was trained with {difference}: its estimate is of another soil"
-        for difference in value_differences(case, trained)
-    ] + [
-        f"{estimator.path} was trained with {difference}: its estimate is of another model"
-        for difference in effect_differences(case, trained)
+        Remark(f"another-{what}", f"{head} {text}: its estimate is of another {what}")
+        for text, what in found
     ]

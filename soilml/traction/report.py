@@ -15,6 +15,7 @@ from soilml.io.read_table import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.traction.by_load import LoadPrediction, measured_loads, predictions_by_load, slip_grid
 from soilml.traction.measured_soil import measured_soil
 from soilml.traction.messages import MeasuredRange, limitations
@@ -47,7 +48,7 @@ class PullReport:
     measured_range: MeasuredRange
     by_load: list[LoadPrediction]
     measured_pull: tuple[Floats, Floats, Floats]
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw pull (N) and slope (degrees) against slip with 90 % bands, a column for each load.
@@ -120,7 +121,8 @@ def pull_report(
     draws, unknown, warnings = soil.draws, soil.unknown, list(soil.warnings)
     excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
     if excluded:
-        warnings.append(f"effects of rig and sensors are excluded: {', '.join(excluded)}")
+        text = f"effects of rig and sensors are excluded: {', '.join(excluded)}"
+        warnings.append(Remark("effects-excluded", text, tuple(excluded), "note"))
     table = table.rows(table.answered)
     at = operating_points(table)
     measured_range = MeasuredRange.of(table["slip"], table["load_N"])

@@ -15,7 +15,6 @@ from datagen.engines.processes import FORKS, process_map
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
-from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate
@@ -238,7 +237,7 @@ def analytic_method(case: Case, name: str, names: Sequence[str]) -> Method:
         covariance = np.where(pairs, fit.covariance[np.ix_(index, index)], np.nan)
         interval90 = np.where(np.isnan(mean), np.nan, np.stack(fit.interval)[:, index])
         return gaussian_estimate(
-            mean, covariance, interval90, any(EXCESS_RESIDUALS in w for w in fit.warnings)
+            mean, covariance, interval90, any(w.code == "excess-residuals" for w in fit.warnings)
         )
 
     inputs = ", ".join(["slip", "load", *channels]) + fixed

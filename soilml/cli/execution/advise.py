@@ -34,6 +34,7 @@ from soilml.fitting.observations import Observations, read_observations
 from soilml.io.read_table import RUNS
 from soilml.optional_imports import need
 from soilml.quantities import column
+from soilml.remarks import texts
 
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
@@ -94,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
-    notes = [] if at is None else [*next_row_messages(advice), *data.notes]
+    notes = [] if at is None else [*next_row_messages(advice), *texts(data.notes)]
     if case.discrepancy:
         notes.append(
             "the [discrepancy] of a next row counts as independent of that of other rows: "

@@ -14,6 +14,7 @@ from soilml.config.case import read_case
 from soilml.fitting.declared_discrepancy import ignored_discrepancy
 from soilml.io.atomic_files import save_text
 from soilml.io.text_tables import format_table
+from soilml.remarks import texts
 from soilml.report.terminal import shown_unit, significant
 
 if TYPE_CHECKING:
@@ -34,7 +35,9 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     show(_text(found))
-    for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
+    for line in texts(
+        ignored_discrepancy(case, "the audit", "effects are harder to name than it says")
+    ):
         tell(line)
     return 0
 

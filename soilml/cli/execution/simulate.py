@@ -18,6 +18,7 @@ from soilml.fitting.declared_discrepancy import ignored_discrepancy
 from soilml.io.table import fault_of_text
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.remarks import texts
 from soilml.row_status import Status
 
 Floats = NDArray[np.float64]
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         },
         args.out,
     )
-    for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
+    for line in texts(ignored_discrepancy(case, "simulate", "the rows have no error of the model")):
         print(line, file=sys.stderr)
     if failed:
         print(

@@ -9,6 +9,7 @@ from soilml.cli.reports.parameter_lines import ParameterLine, parameter_lines, p
 from soilml.io.text_tables import format_table
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.remarks import texts
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import rounded, shown_unit, significant
@@ -66,7 +67,7 @@ def climb_report(report: ClimbingReport, files: tuple[str, str]) -> Report:
                 rows,
             ),
         ],
-        warnings=report.warnings,
+        warnings=texts(report.warnings),
         next_steps=["Climb a steeper slope within the band, and run the command again."],
         notation=[("90 %", "from the 5 % to the 95 % quantile; medians before them.")],
     )

@@ -22,6 +22,7 @@ from soilml.experiment_design import Advice, is_identified
 from soilml.experiment_design.messages import next_row_messages, summary
 from soilml.identification.fit_result import Fit
 from soilml.io.text_tables import format_table
+from soilml.remarks import about
 from soilml.report import numbers
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture
@@ -81,7 +82,9 @@ def identify_report(
         ]
     else:
         answer = [f"The table has a result for each of {len(found)} values of {by}."]
-    warnings = [head[name] + text for name, one in found.items() for text in one.fit.warnings]
+    warnings = [
+        f"{head[name]}{remark}" for name, one in found.items() for remark in one.fit.warnings
+    ]
     warnings += [
         head[name] + _with_marks(one.usual.note())
         for name, one in found.items()
@@ -158,11 +161,7 @@ def _picture(case: Case, answers: Mapping[str, Fit]) -> ReportPicture:
 
 def _lines(fit: Fit) -> list[ParameterLine]:
     left = [fit.remaining_fraction.get(name) for name in fit.names]
-    doubted = [
-        name
-        for name in fit.names
-        if any(f"{name} is not identified" in text for text in fit.warnings)
-    ]
+    doubted = about(fit.warnings, "not-identified")
     return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left, doubted)
 
 

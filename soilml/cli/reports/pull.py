@@ -13,6 +13,7 @@ from soilml.cli.reports.presentation import Presentation
 from soilml.io.text_tables import format_table
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.remarks import texts
 from soilml.report import numbers
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
@@ -63,7 +64,7 @@ def _ends(found: QuantileBand) -> tuple[Any, Any, Any]:
 def pull_warnings(report: PullReport) -> list[str]:
     """Warnings of each load, then those of the whole result."""
     own = [f"{one.posterior.load:.4g} N: {text}" for one in report.by_load for text in one.warnings]
-    return [*own, *report.warnings]
+    return [*own, *texts(report.warnings)]
 
 
 def pull_text(report: PullReport) -> str:

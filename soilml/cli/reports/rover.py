@@ -13,6 +13,7 @@ from soilml.cli.reports.presentation import Presentation
 from soilml.config.wheeled_rover import WheeledRover
 from soilml.io.text_tables import format_table
 from soilml.numerics.quantile_band import quantile_band
+from soilml.remarks import texts
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.traction.rover.plot import SIZE
@@ -126,7 +127,7 @@ def rover_presentation(rover: WheeledRover) -> Presentation[RoverReport]:
     return Presentation(
         columns=rover_columns,
         text=partial(rover_text, rover),
-        warnings=lambda report: report.warnings,
+        warnings=lambda report: texts(report.warnings),
         page=partial(rover_page, rover),
         panels=lambda report: (2, 2, SIZE),
     )
@@ -167,7 +168,9 @@ def rover_page(
         tone="named" if all(moves) else "bad-data",
         pictures=images,
         tables=tables,
-        warnings=[heads[n] + text for n, report in found.items() for text in report.warnings],
+        warnings=[
+            f"{heads[n]}{remark}" for n, report in found.items() for remark in report.warnings
+        ],
         next_steps=["Keep below the lower end of the band, and drive rows that narrow it."],
         notation=[
             ("90 %", "from the 5 % to the 95 % quantile; medians before them."),

@@ -9,7 +9,6 @@ from typing import Any
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
-from soilml.identification.diagnostics import EXCESS_RESIDUALS
 from soilml.identification.fit_result import Fit
 from soilml.io.table import Table
 from soilml.io.text_tables import format_table
@@ -60,7 +59,7 @@ class UsualFit:
 
     @staticmethod
     def _explained(fit: Fit) -> bool:
-        return not any(EXCESS_RESIDUALS in text for text in fit.warnings)
+        return all(remark.code != "excess-residuals" for remark in fit.warnings)
 
 
 def fit_cells(fit: Fit) -> list[tuple[str, str, str, str, str]]:

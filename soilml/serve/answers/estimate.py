@@ -21,6 +21,7 @@ from soilml.identification import Fit, identify
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
+from soilml.remarks import texts
 from soilml.serve.answers.dropped_file import table_summary
 from soilml.serve.answers.job_output import Tell, setting_file, write_files
 from soilml.serve.answers.pull_curves import pull_curves, pull_of_gears
@@ -30,6 +31,8 @@ from soilml.traction.rover.report import rover_report
 #: SI unit -> shown unit and its factor.
 SHOWN = {"Pa": ("kPa", 1e-3), "rad": ("°", float(np.rad2deg(1.0))), "m": ("mm", 1e3)}
 #: Ends of a 90 % interval as fractions of a distribution.
+#: Codes of remarks that stand beside the value of their parameter.
+STATED_BESIDE = ("not-identified", "weakly-identified")
 _ENDS = np.asarray([0.05, 0.5, 0.95])
 
 
@@ -53,7 +56,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     tell("predicting drawbar pull and slope")
     pull = _pull(case, table, as_usual=usual is not None)
     pull["as_usual"] = usual is not None
-    pull["warnings"] = [w for w in pull.get("warnings", []) if w not in fit.warnings]
+    pull["warnings"] = [w for w in pull.get("warnings", []) if w not in texts(fit.warnings)]
     best = fit if usual is None else usual.usual
     found = case.with_values(dict(zip(best.names, map(float, best.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
@@ -69,8 +72,9 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "parameters": parameters(case, fit, None if usual is None else usual.usual),
         "believe": "" if usual is None else usual.note(),
         "words": words(fit, advice),
-        # the width that remains stands beside each parameter
-        "warnings": [text for text in fit.warnings if "prior's width remains" not in text],
+        "warnings": [
+            r.text for r in fit.warnings if r.code not in ("not-identified", "weakly-identified")
+        ],
         "next": "" if advice is None else row_message(advice, advice.best()),
         "misfit": fit.misfit,
         "channels": [COLUMNS[name].name.replace("_", " ") for name in fit.channels],

@@ -11,6 +11,7 @@ from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.remarks import texts
 from soilml.traction.by_load import LoadPrediction
 from soilml.traction.report import PullReport, pull_report
 
@@ -21,7 +22,7 @@ def pull_curves(report: PullReport) -> dict[str, Any]:
     return {
         "loads": [_curves(one) for one in report.by_load],
         "measured": {"slip": slip.tolist(), "load": load.tolist(), "pull": pull.tolist()},
-        "warnings": list(report.warnings),
+        "warnings": texts(report.warnings),
     }
 
 
@@ -57,7 +58,7 @@ def _curves(one: LoadPrediction) -> dict[str, Any]:
         "best_slip": _band(quantile_band(after.best_slip)),
         "steepest_slope": _band(quantile_band(np.rad2deg(after.steepest_slope))),
         "known": [left <= NOT_IDENTIFIED_ABOVE for left in one.remaining_fraction],
-        "warnings": list(one.warnings),
+        "warnings": texts(one.warnings),
     }
 
 

@@ -13,6 +13,7 @@ from soilml.identification.diagnostics import STRONG_CORRELATION
 from soilml.identification.fit_result import Fit
 from soilml.numerics.prior import Prior
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, SHEAR, WEAKLY_IDENTIFIED_ABOVE
+from soilml.remarks import Remark
 from soilml.systems.climbing.balance_likelihood import ForceBalances
 from soilml.systems.climbing.balance_noise import ShearParameters
 from soilml.systems.climbing.climb import Climb, Uncertainty, group_by_slope
@@ -180,27 +181,39 @@ def _fit(
     warnings = []
     for name, left in fit.remaining_fraction.items():
         if left > NOT_IDENTIFIED_ABOVE:
-            warnings.append(f"{name} is not identified: {left:.0%} of its prior width remains")
+            text = f"{name} is not identified: {left:.0%} of its prior width remains"
+            warnings.append(Remark("not-identified", text, (name,)))
         elif left > WEAKLY_IDENTIFIED_ABOVE:
-            warnings.append(f"{name} is hardly identified: {left:.0%} of its prior width remains")
+            text = f"{name} is weakly identified: {left:.0%} of its prior width remains"
+            warnings.append(Remark("weakly-identified", text, (name,)))
     correlation = fit.correlation
     warnings += [
-        f"{a} and {b} compensate each other (correlation {correlation[i, j]:+.2f}): rely on the "
-        "pull that follows from both, not on each value"
+        Remark(
+            "trade-off",
+            f"{a} and {b} compensate each other (correlation {correlation[i, j]:+.2f}): rely on "
+            "the pull that follows from both, not on each value",
+            (a, b),
+        )
         for i, a in enumerate(free)
         for j, b in enumerate(free)
         if i < j and abs(correlation[i, j]) > STRONG_CORRELATION
     ]
     if posterior.noise_scale > 1.0:
-        warnings.append(
+        text = (
             f"the residuals of the force balances are {posterior.noise_scale:.1f} times the noise; "
             "standard deviations are scaled up by the same factor"
         )
+        warnings.append(Remark("excess-residuals", text))
     if slopes == 1:
-        warnings.append("only one slope: that the parameters hold on other slopes is not checked")
+        text = "only one slope: that the parameters hold on other slopes is not checked"
+        warnings.append(Remark("one-slope", text))
     warnings += [
-        f"{name} has neither a value nor a range in [soil]: {ranges[name].lower:g} to "
-        f"{ranges[name].upper:g} {QUANTITIES[name].unit} is assumed"
+        Remark(
+            "assumed-prior",
+            f"{name} has neither a value nor a range in [soil]: {ranges[name].lower:g} to "
+            f"{ranges[name].upper:g} {QUANTITIES[name].unit} is assumed",
+            (name,),
+        )
         for name in assumed
     ]
     return replace(fit, warnings=tuple(warnings))

@@ -16,6 +16,7 @@ from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.read_table import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.traction.by_load import slip_grid
 from soilml.traction.measured_soil import measured_soil
 from soilml.traction.messages import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange
@@ -39,7 +40,7 @@ class RoverReport:
     measured_range: MeasuredRange
     performance: RoverPerformance
     prior_steepest: Floats
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw slip, margin and energy against the slope, and the steepest slope.
@@ -135,36 +136,62 @@ def _steepest_before(case: Case, draws: SoilDraws, slip: Floats, speed: float | 
         return np.full(len(draws.values), np.nan)
 
 
-def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> list[str]:
+def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> list[Remark]:
     assert case.rover is not None
-    texts = []
+    remarks = []
     loads = np.stack(list(found.loads.values()))
     if loads.max() > LOAD_FACTOR * measured.load[1] or loads.min() < measured.load[0] / LOAD_FACTOR:
-        texts.append(
-            f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
-            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
-            "whose error is not in the bands"
+        remarks.append(
+            Remark(
+                "extrapolated",
+                f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
+                f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
+                "whose error is not in the bands",
+            )
         )
     if found.slip_limit > measured.slip[1] + SLIP_MARGIN:
-        texts.append(
-            f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up to "
-            f"{found.slip_limit:.2g}"
+        remarks.append(
+            Remark(
+                "extrapolated",
+                f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up "
+                f"to {found.slip_limit:.2g}",
+            )
         )
     if abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
-        texts.append(
-            f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the parameters "
-            "that the rows show"
+        remarks.append(
+            Remark(
+                "other-gravity",
+                f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the "
+                "parameters that the rows show",
+            )
         )
     tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
     if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:
-        texts.append(f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
+        remarks.append(
+            Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
+        )
     excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
     if excluded:
-        texts.append(f"effects of rig and sensors are excluded: {', '.join(excluded)}")
+        remarks.append(
+            Remark(
+                "effects-excluded",
+                f"effects of rig and sensors are excluded: {', '.join(excluded)}",
+                severity="note",
+            )
+        )
     if case.discrepancy:
-        texts.append("[discrepancy] widens the soil's parameters, not the bands of the rover")
-    texts.append(
-        "bands include the uncertainty of the soil and the noise, not errors of the model; all "
-        "wheels driven at one slip, loads of equally stiff wheels, no side slope"
+        remarks.append(
+            Remark(
+                "discrepancy-not-in-bands",
+                "[discrepancy] widens the soil's parameters, not the bands of the rover",
+            )
+        )
+    remarks.append(
+        Remark(
+            "band-content",
+            "bands include the uncertainty of the soil and the noise, not errors of the model; all "
+            "wheels driven at one slip, loads of equally stiff wheels, no side slope",
+            severity="note",
+        )
     )
-    return texts
+    return remarks

@@ -16,6 +16,7 @@ from soilml.fitting.operating_points import gear_numbers, operating_points, rows
 from soilml.identification import trained_estimator as trained
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
+from soilml.remarks import texts
 
 
 @pytest.fixture
@@ -163,12 +164,12 @@ def test_priors_differ_by_ends_and_kind(case, other, said):
 
 def test_grousers_that_the_model_lacks_and_several_runs_are_noted(case):
     table = rows(run=np.asarray(["a", "b"]), grouser_height_m=np.asarray([0.01, np.nan]))
-    assert read_observations(case, table).notes == (
+    assert texts(read_observations(case, table).notes) == [
         "2 runs are fitted as one soil",
         "grouser_height_m is 0.01, but the model has no effect grousers",
-    )
+    ]
     lugged = replace(case, model=case.model + EFFECTS["grousers"](height=0.01))
-    assert read_observations(lugged, table).notes == ("2 runs are fitted as one soil",)
+    assert texts(read_observations(lugged, table).notes) == ["2 runs are fitted as one soil"]
     none = rows(run=np.asarray(["a", "a"]), grouser_height_m=0.0)
     assert read_observations(case, none).notes == ()
 
@@ -221,7 +222,7 @@ def test_a_prior_of_the_bearing_that_is_wider_than_the_file_allows_is_said(case,
     for factor, said in ((1.2, False), (1000.0, True)):
         own = Prior(kphi / factor, kphi * factor, log=True)
         _, warnings = trained.condition_on_case(any_wheel, fitting(case, any_wheel, kphi=own))
-        assert any("intervals may be too narrow" in text for text in warnings) == said
+        assert any("intervals may be too narrow" in text for text in texts(warnings)) == said
     log_std = trained._log_std
     assert log_std(Prior(1.0, np.e, log=True), 9.0) == pytest.approx(1.0 / np.sqrt(12.0))
     assert log_std(Prior(0.0, 6.0), 3.0) == pytest.approx(6.0 / np.sqrt(12.0) / 3.0, rel=1e-3)
@@ -236,7 +237,8 @@ def test_priors_that_a_file_ignores_are_named_and_narrower_ones_are_used(case, a
 
     def with_angle(lower, upper, **kind):
         changed = fitting(case, any_wheel, friction_angle=Prior(lower, upper, **kind))
-        return trained.narrower_priors(found, changed), trained._prior_differences(found, changed)
+        remarks = trained._prior_differences(found, changed)
+        return trained.narrower_priors(found, changed), texts(remarks)
 
     # less than a fiftieth of the width is no difference
     assert with_angle(low + 0.019 * width, high - 0.019 * width) == ({}, [])
@@ -253,7 +255,7 @@ def test_priors_that_a_file_ignores_are_named_and_narrower_ones_are_used(case, a
     used, said = with_angle(low, high, normal_std=0.1)
     assert used == {} and len(said) == 1
     other = fitting(case, any_wheel, n=Prior(0.8, 1.2), kphi=Prior(1e5, 1e7))
-    assert trained._prior_differences(found, other) == [
+    assert texts(trained._prior_differences(found, other)) == [
         "n: fixed at the model's values; their priors are ignored"
     ]
     unknown = {k: v for k, v in fitted.prior.items() if k != "friction_angle"}

@@ -13,6 +13,7 @@ from soilml.experiment_design.predicted_readings import predicted_readings
 from soilml.fitting.free_parameters import select_free
 from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table
+from soilml.remarks import texts
 
 TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 COLUMNS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
@@ -49,10 +50,12 @@ def measured(case, truth, rng, error=0.02, noise=0.01):
 
 def test_a_declared_error_widens_the_intervals_and_explains_the_residuals(case):
     case, table = measured(case, TRUTH, np.random.default_rng(4))
-    assert any("times the declared noise" in text for text in identify(case, table).warnings)
+    assert any("times the declared noise" in text for text in texts(identify(case, table).warnings))
     fit = identify(replace(case, discrepancy=USUAL), table)
-    assert not any("times the declared noise" in text for text in fit.warnings)
-    assert any("errors of the model are included in std: torque" in text for text in fit.warnings)
+    assert not any("times the declared noise" in text for text in texts(fit.warnings))
+    assert any(
+        "errors of the model are included in std: torque" in text for text in texts(fit.warnings)
+    )
     noise_only = identify(*measured(case, TRUTH, np.random.default_rng(4), error=0.0))
     assert (fit.std > 1.5 * noise_only.std).all()
     assert (np.abs(fit.values - list(TRUTH.values())) < 3.0 * fit.std).all()
@@ -71,7 +74,7 @@ def test_a_closed_form_says_that_it_ignores_the_discrepancy(case):
     case, table = measured(case, TRUTH, np.random.default_rng(6), error=0.0)
     fit = identify(replace(case, discrepancy=USUAL), table, method="linear")
     said = "the linear method ignores the [discrepancy] of torque_Nm, drawbar_pull_N, sinkage_m"
-    assert any(text.startswith(said) for text in fit.warnings)
+    assert any(text.startswith(said) for text in texts(fit.warnings))
 
 
 def test_readings_of_a_next_row_have_the_error_of_the_model_too(case):

@@ -9,6 +9,7 @@ from test_identification import TRUTH, measured
 from soilml import identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
+from soilml.remarks import texts
 
 
 @pytest.fixture
@@ -31,4 +32,4 @@ def test_residuals_exceed_the_noise_from_two_standard_deviations_of_chi_squared(
         fit = identify(known, table)
         size *= np.sqrt(squares / fit.misfit)
     assert fit.misfit == pytest.approx(squares, rel=1e-2)
-    assert any("times the declared noise" in text for text in fit.warnings) == excess
+    assert any("times the declared noise" in text for text in texts(fit.warnings)) == excess

@@ -10,6 +10,7 @@ from soilml import LinearWheel, Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError, InputError, TableError
 from soilml.io.table import Table
+from soilml.remarks import texts
 
 TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 SLIPS = np.tile(np.linspace(0.1, 0.6, 6), 3)
@@ -65,7 +66,7 @@ def test_one_load_does_not_identify_cohesion_and_says_so(case):
     for k in range(40):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         fit = identify(case, measured(case, truth, slip, load, noise=0.02, seed=k))
-        assert "one load only: cohesion is not identified" in fit.warnings
+        assert "one load only: cohesion is not identified" in texts(fit.warnings)
         assert fit.remaining_fraction["cohesion"] > 0.5
         inside.append(np.abs(fit.values - list(truth.values())) <= 1.645 * fit.std)
     assert (np.mean(inside, axis=0) > 0.78).all()
@@ -112,7 +113,7 @@ def test_a_std_given_in_the_table_stands(case):
 
 def test_a_single_row_leaves_the_prior_and_says_so(case):
     fit = identify(case, measured(case, TRUTH, SLIPS[:1], LOADS[:1], noise=0.02))
-    assert "1 reading for 3 parameters: the prior determines the rest" in fit.warnings
+    assert "1 reading for 3 parameters: the prior determines the rest" in texts(fit.warnings)
     assert fit.remaining_fraction["cohesion"] > 0.8
     assert fit.std[0] > 500.0
 
@@ -145,7 +146,7 @@ def test_undeclared_noise_is_estimated_from_residuals(case):
     table = measured(case, TRUTH, SLIPS, LOADS, noise=0.02)
     fit = identify(replace(case, noise={}), table)
     known = identify(case, table)
-    assert any("not declared" in said for said in fit.warnings)
+    assert any("not declared" in said for said in texts(fit.warnings))
     assert np.all(fit.std / known.std < 2.5) and np.all(fit.std / known.std > 0.4)
     with pytest.raises(FitError, match="declare it"):
         identify(replace(case, noise={}), table.rows(np.arange(3)))
@@ -155,7 +156,7 @@ def test_a_channel_whose_noise_is_not_declared_is_left_out_and_named(case):
     table = measured(case, TRUTH, SLIPS, LOADS, sinkage_m=True)
     fit = identify(case, table)
     assert fit.channels == ("torque_Nm",)
-    assert any("sinkage_m is not used" in said for said in fit.warnings)
+    assert any("sinkage_m is not used" in said for said in texts(fit.warnings))
 
 
 def test_noise_of_slip_widens_the_answer(case):
@@ -168,7 +169,7 @@ def test_more_misfit_than_noise_is_said_and_widens(case):
     table = measured(case, TRUTH, SLIPS, LOADS)
     table.columns["torque_Nm"] = table["torque_Nm"] * (1.0 + 0.3 * np.sin(7 * SLIPS))
     fit = identify(case, table)
-    assert any("times the declared noise" in said for said in fit.warnings)
+    assert any("times the declared noise" in said for said in texts(fit.warnings))
     assert fit.misfit > 3.0
 
 
@@ -199,7 +200,7 @@ def test_linear_least_squares_is_exact_on_the_closed_form(case):
     fit = identify(given, table, ["cohesion", "friction_angle"], method="linear")
     assert fit["cohesion"] == pytest.approx(812.0, rel=1e-6)
     assert fit["friction_angle"] == pytest.approx(0.6, rel=1e-6)
-    assert any("shear_modulus is fixed at" in said for said in fit.warnings)
+    assert any("shear_modulus is fixed at" in said for said in texts(fit.warnings))
 
 
 def test_linear_least_squares_carries_the_doubt_about_the_shear_modulus(case):

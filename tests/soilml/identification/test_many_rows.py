@@ -15,6 +15,7 @@ from soilml.fitting.observations import read_observations
 from soilml.identification import condensed_rows
 from soilml.identification.cells import cells_of
 from soilml.io.table import Table
+from soilml.remarks import texts
 from soilml.traction.soil_draws import posterior_draws
 
 ROWS = 2400
@@ -86,7 +87,7 @@ def test_residuals_within_the_cells_count_as_misfit(case, condensing):
     columns = {name: table[name] for name in ("slip", "load_N")} | {"torque_Nm": louder}
     fit = identify(case, Table(columns))
     assert fit.misfit == pytest.approx((0.06**2 + 0.02**2) / 0.02**2, rel=0.1)
-    assert any("times the declared noise" in text for text in fit.warnings)
+    assert any("times the declared noise" in text for text in texts(fit.warnings))
 
 
 def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condensing):

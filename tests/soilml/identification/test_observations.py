@@ -9,6 +9,7 @@ from soilml.errors import FitError, TableError
 from soilml.fitting.observations import read_observations
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
+from soilml.remarks import texts
 
 SHEAR = ["friction_angle", "shear_modulus"]
 
@@ -48,9 +49,11 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
 @pytest.mark.parametrize("column, std", [("slip_std", 0.05), ("load_N_std", 4.0)])
 def test_a_closed_form_says_that_it_leaves_out_noise_of_slip_or_of_load(case, table, column, std):
     shaky = changed(table, **{column: np.full(12, std)})
-    said = " ".join(identify(case, shaky, SHEAR, "newton").warnings)
+    said = " ".join(texts(identify(case, shaky, SHEAR, "newton").warnings))
     assert "newton method does not propagate noise of slip and load" in said
-    assert "not propagate noise" not in " ".join(identify(case, table, SHEAR, "newton").warnings)
+    assert "not propagate noise" not in " ".join(
+        texts(identify(case, table, SHEAR, "newton").warnings)
+    )
 
 
 def test_noise_of_slip_is_linearised_at_the_mean_of_the_posterior(case, table, monkeypatch):
@@ -72,7 +75,7 @@ def test_a_reading_of_zero_with_relative_noise_has_finite_weight(case, table, me
     torque = table["torque_Nm"].copy()
     torque[4] = 0.0
     fit = identify(case, changed(table, torque_Nm=torque), SHEAR, method)
-    said = " ".join(fit.warnings)
+    said = " ".join(texts(fit.warnings))
     assert (
         "log.csv line 6, column torque_Nm: standard deviation 0 replaced by the column's median"
         in said
@@ -87,7 +90,7 @@ def test_a_standard_deviation_of_almost_zero_is_replaced(case, table):
     fit = identify(case, changed(table, torque_Nm_std=std), SHEAR)
     assert (
         "line 4, column torque_Nm: standard deviation 1e-300 replaced by the column's median 0.05; "
-        "1 more rows likewise" in (" ".join(fit.warnings))
+        "1 more rows likewise" in (" ".join(texts(fit.warnings)))
     )
     np.testing.assert_allclose(
         fit.std, identify(case, changed(table, torque_Nm_std=np.full(12, 0.05)), SHEAR).std
@@ -106,15 +109,15 @@ def test_rows_whose_status_is_not_ok_are_excluded_and_counted(case, table):
     fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR)
     assert fit.rows_used == 10
     assert fit["friction_angle"] == pytest.approx(float(case.soil.friction_angle), rel=1e-4)
-    assert "2 rows are excluded: their status is not ok" in fit.warnings
+    assert "2 rows are excluded: their status is not ok" in texts(fit.warnings)
     with pytest.raises(FitError, match=r"log\.csv: no row has the status ok"):
         identify(case, changed(table, status=np.full(12, "no peak")), SHEAR)
 
 
 def test_a_method_of_fixed_unknowns_reports_parameters_not_requested(case, table):
-    said = " ".join(identify(case, table, ["friction_angle"], "newton").warnings)
+    said = " ".join(texts(identify(case, table, ["friction_angle"], "newton").warnings))
     assert "shear_modulus, kphi identified too, although not requested" in said
-    assert "not requested" not in " ".join(identify(case, table, None, "nonlinear").warnings)
+    assert "not requested" not in " ".join(texts(identify(case, table, None, "nonlinear").warnings))
 
 
 def test_rows_cannot_be_grouped_by_blank_cells(table):

@@ -11,6 +11,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.io.table import Table
 from soilml.numerics.sampling.importance_sampling import importance_sample
+from soilml.remarks import texts
 
 SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
 LOADS = np.repeat([40.0, 100.0], 4)
@@ -97,7 +98,7 @@ def test_what_rows_do_not_tell_comes_out_as_the_prior_and_is_said(case):
     table = measured(case, truth, np.asarray([0.2]), np.asarray([60.0]), seed=1)
     fit = identify(case, table, None, "posterior")
     assert fit.remaining_fraction["cohesion"] > 0.8
-    assert any("cohesion is not identified" in text for text in fit.warnings)
+    assert any("cohesion is not identified" in text for text in texts(fit.warnings))
     low, high = fit.interval
     prior = [case.prior[name] for name in fit.names]
     assert all(p.lower <= a < b <= p.upper for p, a, b in zip(prior, low, high, strict=True))
@@ -113,7 +114,7 @@ def test_a_model_that_lacks_something_is_said_to(case):
     )  # five times the declared 2 %
     table = Table(dict(table.columns) | {"torque_Nm": shaken})
     fit, calm = (identify(case, t, None, "posterior") for t in (table, measured_well))
-    assert "times the declared noise" in " ".join(fit.warnings)
+    assert "times the declared noise" in " ".join(texts(fit.warnings))
     assert (fit.std > 2.0 * calm.std).all()
 
 

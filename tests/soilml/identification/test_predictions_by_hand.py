@@ -235,7 +235,7 @@ def test_standard_deviations_of_a_table_stand_before_those_of_the_case(case):
     given = Table(columns | {"torque_Nm_std": np.asarray([0.5, np.nan, 0.0, 0.7])})
     data = read_observations(replace(case, noise={"torque_Nm": Noise(share=0.1)}), given)
     np.testing.assert_allclose(data.channels[0].std, [0.5, 0.2, 0.5, 0.7])  # 0 by the median
-    assert data.notes[0].endswith("standard deviation 0 replaced by the column's median 0.5")
+    assert data.notes[0].text.endswith("standard deviation 0 replaced by the column's median 0.5")
     assert data.row_count == data.reading_count == 4 and data.squares_within == 0.0
     part = data.of_rows(np.asarray([2, 0]))
     assert part.slip.tolist() == [0.5, 0.1] and part.channels[0].reading.tolist() == [3.0, 1.0]

@@ -20,6 +20,7 @@ from soilml.numerics.sampling.importance_sampling import ImportanceSample
 from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
+from soilml.remarks import Remark, texts
 
 COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
 
@@ -31,7 +32,7 @@ def fit_of(**changes):
         units=("Pa", "rad"),
         values=np.asarray([10.0, 0.5]),
         covariance=COVARIANCE,
-        warnings=("first",),
+        warnings=(Remark("first", "first"),),
         rows_used=3,
         remaining_fraction={"cohesion": 0.3, "friction_angle": 0.2},
     )
@@ -85,14 +86,16 @@ def test_intervals_for_a_figure_have_the_ranges_of_the_priors():
 
 def test_json_of_a_fit_names_every_number():
     content = fit_of(remaining_fraction={"cohesion": 0.3}, channels=("torque_Nm",)).as_json()
-    assert content["parameters"]["cohesion"]["left_of_prior"] == 0.3
-    assert "left_of_prior" not in content["parameters"]["friction_angle"]
+    assert content["parameters"]["cohesion"]["remaining_fraction"] == 0.3
+    assert "remaining_fraction" not in content["parameters"]["friction_angle"]
     assert content["parameters"]["friction_angle"]["std"] == 1.0
     assert content["correlation"]["cohesion"] == {"friction_angle": pytest.approx(0.6)}
     assert content["correlation"]["friction_angle"] == {"cohesion": pytest.approx(0.6)}
     assert content["misfit"] is None and content["rows_used"] == 3
     assert fit_of(misfit=1.5).as_json()["misfit"] == 1.5
-    assert content["channels_used"] == ["torque_Nm"] and content["warnings"] == ["first"]
+    assert content["channels_used"] == ["torque_Nm"] and [
+        w["code"] for w in content["warnings"]
+    ] == ["first"]
 
 
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
@@ -149,8 +152,8 @@ def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
     found = with_warnings(
         fit, case, data, free, np.asarray(u), excess_residuals=excess, undeclared=undeclared
     )
-    assert found.warnings[0] == "first"
-    return found.warnings[1:]
+    assert found.warnings[0].code == "first"
+    return tuple(texts(found.warnings[1:]))
 
 
 def test_a_sound_fit_has_no_warnings(case):
@@ -182,8 +185,8 @@ def test_what_the_rows_leave_open_is_said_by_how_much_of_the_prior_remains(case)
 def test_values_at_bounds_and_assumed_priors_are_said(case):
     said = warned(case, fit_of(), rows_of(), u=(0.0009, 0.9991))
     assert said == (
-        "cohesion is at the lower bound of its prior: the prior determines the estimate",
-        "friction_angle is at the upper bound of its prior: the prior determines the estimate",
+        "cohesion is at the lower bound of its prior, which determines the estimate",
+        "friction_angle is at the upper bound of its prior, which determines the estimate",
     )
     at_bound = at_prior_bound(np.asarray([0.0011, 0.9989, 0.0, 1.0]))
     assert at_bound.tolist() == [False, False, True, True]
@@ -229,12 +232,12 @@ def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
     spread = 1200.0**2 / 12.0 + 400.0**2
     expected = np.diag([1.0, 1e-4]) + spread * np.outer(slope, slope)
     np.testing.assert_allclose(found.covariance, expected, rtol=1e-9)
-    assert found.warnings == (
+    assert texts(found.warnings) == [
         "cohesion is fixed at 200; the width of its prior is propagated into std",
         "first",
-    )
+    ]
     exact = with_fixed_parameter(replace(known, prior={}), "cohesion", solve)
-    assert "treated as exact" in exact.warnings[0]
+    assert "treated as exact" in exact.warnings[0].text
     np.testing.assert_array_equal(exact.covariance, np.diag([1.0, 1e-4]))
 
     def fails_above(one):
@@ -251,10 +254,11 @@ def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
 def test_a_closed_form_says_where_it_does_not_hold(case, misfit, said):
     prior = {"cohesion": Prior(0.0, 9.0), "friction_angle": Prior(0.5, 0.6)}
     fit = fit_of(misfit=misfit)
-    texts = with_fixed_parameter(replace(case, prior=prior), "n", lambda _: fit).warnings[2:]
-    assert texts[0] == "cohesion is 10, outside its prior of 0 to 9: do not use it"
-    assert any(t.startswith("residuals are 2.0 times the declared noise") for t in texts) == said
-    assert len(texts) == 1 + said
+    fixed = with_fixed_parameter(replace(case, prior=prior), "n", lambda _: fit)
+    found = texts(fixed.warnings)[2:]
+    assert found[0] == "cohesion is 10, outside its prior of 0 to 9: do not use it"
+    assert any(t.startswith("residuals are 2.0 times the declared noise") for t in found) == said
+    assert len(found) == 1 + said
 
 
 def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
@@ -268,7 +272,7 @@ def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
 def test_a_small_effective_sample_size_is_said():
     def of_size(size):
         weights = np.full(size, 1.0 / size)
-        return _sampling_warnings(ImportanceSample(np.zeros((size, 1)), weights, 0.0))
+        return tuple(texts(_sampling_warnings(ImportanceSample(np.zeros((size, 1)), weights, 0.0))))
 
     assert of_size(100000) == ()
     assert of_size(100) == (

@@ -20,6 +20,7 @@ from soilml.identification.posterior_density import PosteriorDensity
 from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
+from soilml.remarks import texts
 from soilml.traction import prior_draws
 
 SAND = soil("wong1989/dry_sand")
@@ -141,10 +142,10 @@ def test_a_test_narrows_what_rows_leave_open():
 def test_rows_that_disagree_with_a_test_are_remarked_on():
     case = a_case(soil_tests=(replace(SHEAR, strength=9000.0, scatter=0.05),))
     fit = identify(case, some_rows(case))
-    (text,) = [line for line in fit.warnings if "disagree with a test of the soil" in line]
+    (text,) = [line for line in texts(fit.warnings) if "disagree with a test of the soil" in line]
     assert "shear strength under 8 kPa was 9 kPa in the test" in text
     case = a_case(soil_tests=(SHEAR,))
-    assert "disagree" not in " ".join(identify(case, some_rows(case)).warnings)
+    assert "disagree" not in " ".join(texts(identify(case, some_rows(case)).warnings))
 
 
 def test_closed_form_says_that_it_ignores_tests():
@@ -152,7 +153,7 @@ def test_closed_form_says_that_it_ignores_tests():
     force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
     rows = {"slip": SLIP, "load_N": LOAD, "torque_Nm": force.torque, "sinkage_m": force.sinkage}
     fit = identify(case, Table(rows), method="linear")
-    assert "the linear method ignores [[soil.test]]" in fit.warnings
+    assert "the linear method ignores [[soil.test]]" in texts(fit.warnings)
 
 
 def test_draws_of_the_prior_follow_tests():

@@ -15,6 +15,7 @@ from soilml.fitting.observations import Channel, Observations
 from soilml.identification import condensed_rows
 from soilml.identification.joint_sample import normal_start
 from soilml.identification.posterior_density import PosteriorDensity
+from soilml.remarks import texts
 
 # the package has functions of these names
 linear, newton, nonlinear = (
@@ -117,12 +118,12 @@ def test_steps_of_newton_are_halved_until_the_cost_falls_inside_the_range():
 def test_limits_of_the_linear_method_are_said(case):
     free = select_free(case, ["cohesion", "friction_angle", "shear_modulus", "kphi"])
     several = np.asarray([30.0, 60.0])
-    said = linear._limits(case, free, np.asarray([1.0, 0.5]), several)
+    said = texts(linear._limits(case, free, np.asarray([1.0, 0.5]), several))
     assert said == ["kphi is not identified by the linear method"]
     for solution in ([-1.0, 0.5], [1.0, -0.5]):
-        said = linear._limits(case, [], np.asarray(solution), several)
+        said = texts(linear._limits(case, [], np.asarray(solution), several))
         assert said == ["the linear method gives a negative value, which no soil has"]
-    said = linear._limits(case, [], np.zeros(2), np.full(2, 60.0))
+    said = texts(linear._limits(case, [], np.zeros(2), np.full(2, 60.0)))
     assert said == ["one load only: cohesion is not identified"]
     with pytest.raises(FitError, match="needs drawbar_pull"):
         linear._channel(rows_of(case), "drawbar_pull")

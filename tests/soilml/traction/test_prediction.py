@@ -6,6 +6,7 @@ import pytest
 from soilml import DrawbarOffset, LoadTransfer, Operating, SlipSinkage, read_case
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.remarks import texts
 from soilml.traction import SoilDraws, predict_traction, prior_draws, quantile_band
 from soilml.traction.by_load import measured_loads, predictions_by_load, slip_grid
 from soilml.traction.messages import MeasuredRange
@@ -57,7 +58,7 @@ def test_a_light_wheel_on_sticky_soil_climbs_walls_with_a_warning(case):
     sticky = soils((2e4, 0.7, 0.002))
     (one,) = predictions_by_load(case, sticky, sticky, [5.0], SLIPS, EVERYWHERE)
     assert one.posterior.steepest_slope[0] == pytest.approx(1.5)
-    assert any("vehicles overturn" in text for text in one.warnings)
+    assert any("vehicles overturn" in text for text in texts(one.warnings))
 
 
 def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
@@ -92,12 +93,12 @@ def test_draws_of_the_prior_are_reported_as_not_identified(case):
     before = prior_draws([free_of(case, name) for name in NAMES], 60)
     (one,) = predictions_by_load(case, before, before, [60.0], SLIPS, EVERYWHERE)
     assert one.remaining_fraction == (1.0, 1.0)
-    assert sum("is not identified" in text for text in one.warnings) == 2
+    assert sum("is not identified" in text for text in texts(one.warnings)) == 2
     (sure,) = predictions_by_load(
         case, soils((900.0, 0.6, 0.012)), before, [60.0], SLIPS, EVERYWHERE
     )
     assert sure.remaining_fraction == (0.0, 0.0)
-    assert not any("identified" in text for text in sure.warnings)
+    assert not any("identified" in text for text in texts(sure.warnings))
 
 
 def free_of(case, name):
@@ -110,7 +111,7 @@ def test_extrapolation_is_reported(case):
     one = soils((900.0, 0.6, 0.012))
     measured = MeasuredRange((0.3, 0.35), (50.0, 60.0))
     (far,) = predictions_by_load(case, one, one, [120.0], SLIPS, measured)
-    text = " ".join(far.warnings)
+    text = " ".join(texts(far.warnings))
     for said in (
         "no slip above 0.35",
         "no slip below 0.3",
@@ -119,7 +120,7 @@ def test_extrapolation_is_reported(case):
     ):
         assert said in text
     (near,) = predictions_by_load(case, one, one, [55.0], np.asarray([0.3, 0.4]), measured)
-    assert not any("was measured" in said for said in near.warnings)
+    assert not any("was measured" in said for said in texts(near.warnings))
 
 
 def test_a_load_that_the_soil_does_not_carry_is_refused_with_what_it_carries(case):
@@ -134,7 +135,7 @@ def test_soils_that_do_not_carry_the_load_are_left_out_and_counted(case):
     draws = SoilDraws(("kphi",), np.asarray([[1.5e6], [1.5e6], [1e4]]))
     (one,) = predictions_by_load(case, draws, draws, [60.0], SLIPS, EVERYWHERE)
     assert one.posterior.failed_fraction == pytest.approx(1 / 3)
-    assert any("do not carry 60 N" in text for text in one.warnings)
+    assert any("do not carry 60 N" in text for text in texts(one.warnings))
     assert np.isfinite(quantile_band(one.posterior.pull).lower).all()
     assert np.isnan(one.posterior.steepest_slope[2]) and np.isnan(one.posterior.best_slip[2])
 

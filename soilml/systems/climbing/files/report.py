@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
+from soilml.remarks import Remark
 from soilml.systems.climbing.ability import (
     ClimbingAbility,
     check_slip,
@@ -55,15 +56,16 @@ class ClimbingReport:
         return quantile_band(self.ability.slope)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Remark, ...]:
         """Limitations of the data and of the estimate."""
         warnings = list(self.ground.fit.warnings)
         highest, lowest = self.ability.slip[-1], self.ability.slip[0]
         if self.ability.fraction_still_rising > MAX_STILL_RISING:
-            warnings.append(
+            text = (
                 f"in {self.ability.fraction_still_rising:.0%} of the samples the slope still rises "
                 f"with slip at {highest:.2f}, the end of the curve: measure stress at higher slips"
             )
+            warnings.append(Remark("still-rising", text))
         noise = self.ground.noise
         zero_slip = [
             climb.name
@@ -74,10 +76,11 @@ class ClimbingReport:
             )
         ]
         if zero_slip:
-            warnings.append(
+            text = (
                 f"slip is zero within its noise in run {', '.join(zero_slip)}: the direction of "
                 "the shear displacement there is not known"
             )
+            warnings.append(Remark("zero-slip", text, tuple(zero_slip)))
         outside = [
             c.name
             for c in self.data.climbs
@@ -86,11 +89,16 @@ class ClimbingReport:
             )
         ]
         if outside:
-            warnings.append(f"the slip of run {', '.join(outside)} lies outside the curve")
+            text = f"the slip of run {', '.join(outside)} lies outside the curve"
+            warnings.append(Remark("outside-curve", text, tuple(outside)))
         most = float(quantile_band(self.ability.steepest).upper)
         warnings += [
-            f"run {climb.name} climbed {np.rad2deg(climb.slope):.3g} deg, more than predicted (at "
-            f"most {np.rad2deg(most):.3g}): it is inconsistent with the others"
+            Remark(
+                "inconsistent",
+                f"run {climb.name} climbed {np.rad2deg(climb.slope):.3g} deg, more than predicted "
+                f"(at most {np.rad2deg(most):.3g}): it is inconsistent with the others",
+                (climb.name,),
+            )
             for climb in self.data.climbs
             if climb.slope > most
         ]
@@ -150,7 +158,7 @@ class ClimbingReport:
             "steepest_slope_rad": _listed(quantile_band(self.ability.steepest)),
             "slip_at_steepest": _listed(quantile_band(self.ability.steepest_slip)),
             "slips_with_stress": [float(self.ability.slip[0]), float(self.ability.slip[-1])],
-            "warnings": list(self.warnings),
+            "warnings": [remark.as_json() for remark in self.warnings],
         }
         if self.slip_limit is not None:
             within = self.ability.steepest_within(self.slip_limit)

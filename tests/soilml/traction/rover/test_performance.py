@@ -12,6 +12,7 @@ from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.model import Model
+from soilml.remarks import texts
 from soilml.traction.rover import rover_performance
 from soilml.traction.rover.report import rover_report, with_gravity
 from soilml.traction.soil_draws import SoilDraws
@@ -139,5 +140,5 @@ def test_the_report_knows_what_the_rows_tell(case):
     after = np.quantile(found.performance.steepest_slope, [0.05, 0.95])
     assert np.ptp(after) < 0.8 * np.ptp(before)
     light = rover_report(with_gravity(case, 1.62), table, slopes=SLOPES)
-    assert any("gravity is 1.62" in text for text in light.warnings)
-    assert any("wheels carry" in text for text in light.warnings)
+    assert any("gravity is 1.62" in text for text in texts(light.warnings))
+    assert any("wheels carry" in text for text in texts(light.warnings))
