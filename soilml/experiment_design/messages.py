@@ -86,7 +86,9 @@ def as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
         "slip": c.slip,
         "load_N": c.load,
         "channels": list(c.channels),
-        "left_of_prior": dict(zip(advice.names, choice.remaining_fraction.tolist(), strict=True)),
+        "remaining_fraction": dict(
+            zip(advice.names, choice.remaining_fraction.tolist(), strict=True)
+        ),
     }
 
 

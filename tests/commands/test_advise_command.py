@@ -108,8 +108,8 @@ def test_the_posterior_says_what_is_told_and_what_to_drive_next(folder, capsys):
     captured = capsys.readouterr()
     content = json.loads(captured.out)
     assert content["told"] == {"cohesion": False, "friction_angle": False, "shear_modulus": True}
-    left = content["advice"]["next_for"]["cohesion"]["left_of_prior"]["cohesion"]
-    assert left < content["advice"]["repeat"]["left_of_prior"]["cohesion"] - 0.2
+    left = content["advice"]["next_for"]["cohesion"]["remaining_fraction"]["cohesion"]
+    assert left < content["advice"]["repeat"]["remaining_fraction"]["cohesion"] - 0.2
     assert main([*command, "--out", "o.json"]) == 0
     said = capsys.readouterr().out
     assert "cohesion: not identified by these rows, 99% of the prior's width remains" in said

@@ -42,7 +42,7 @@ Methods:
 
 The result is JSON in SI units, in the file of --out or in a pipe; a terminal
 shows a table. --report writes a page to read and print. `posterior/prior`
-(left_of_prior in the file) is the width of the estimate divided by that of the
+(remaining_fraction in the file) is the width of the estimate divided by that of the
 prior. std is the expected error; it is large where least squares leaves a wide
 range open. Read the warnings.
 """

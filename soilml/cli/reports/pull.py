@@ -53,7 +53,7 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
     for name, share in zip(
         ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
     ):
-        columns[f"{name}_left_of_prior"] = np.full(count, share)
+        columns[f"{name}_remaining_fraction"] = np.full(count, share)
     return columns
 
 

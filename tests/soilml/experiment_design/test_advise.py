@@ -152,4 +152,4 @@ def test_the_summary_has_slip_load_channels_and_every_fraction(case):
     content = summary(after(case, [0.2], [60.0]))
     assert set(content) == {"next", "next_for", "repeat"}
     assert content["repeat"]["slip"] == 0.2 and content["next"]["channels"] == ["torque"]
-    assert set(content["next_for"]) == set(content["next"]["left_of_prior"]) == set(SOIL)
+    assert set(content["next_for"]) == set(content["next"]["remaining_fraction"]) == set(SOIL)
