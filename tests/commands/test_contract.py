@@ -80,7 +80,8 @@ def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
     assert main(["identify", str(model_file), str(runs_file)]) == 0
-    assert "2 runs are fitted as one soil" in json.loads(capsys.readouterr().out)["warnings"]
+    content = json.loads(capsys.readouterr().out)
+    assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
 
 
 def test_simulate_takes_braking_slip(model_file, capsys):
@@ -108,7 +109,9 @@ def test_identify_warns_of_one_load(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--where", "load_N=40"]
     assert main(command) == 0
     content = json.loads(capsys.readouterr().out)
-    assert "one load only: cohesion is not identified" in content["warnings"]
+    assert ("not-identified", ["cohesion"]) in [
+        (w["code"], w["about"]) for w in content["warnings"]
+    ]
     assert content["rows_used"] == 5
 
 
