@@ -203,7 +203,7 @@ def _function(content: _Content) -> Callable[[Any], Any]:
     """The function of a content, in a worker."""
     import cloudpickle
 
-    from soilml.physics.effects.user_effects import load_effects
+    from soilml.physics.user_effects import load_effects
 
     with TemporaryDirectory() as folder:
         for name, text in content.effects:

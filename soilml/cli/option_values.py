@@ -21,7 +21,7 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
     """The catalogue of effects by name, with those of the file of `--effects`."""
     if args.effects is None:
         return dict(EFFECTS)
-    from soilml.physics.effects.user_effects import load_effects
+    from soilml.physics.user_effects import load_effects
 
     return {**EFFECTS, **load_effects(args.effects)}
 

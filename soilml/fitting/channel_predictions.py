@@ -13,10 +13,10 @@ from soilml.config.case import Case
 from soilml.fitting.free_parameters import FreeParameter
 from soilml.fitting.observations import Observations
 from soilml.fitting.operating_points import rows_by_gear
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.linear_response import linear_response
 from soilml.physics.operating_point import Operating
+from soilml.physics.sinkage_estimate import SinkageEstimate
 from soilml.quantities import CHANNELS, column
 
 Floats = NDArray[np.float64]

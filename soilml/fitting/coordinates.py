@@ -20,8 +20,7 @@ from soilml.fitting.predictions import (
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
-from soilml.physics.effects.base import Effect
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import Effect, SlipLoadScaling
 
 Floats = NDArray[np.float64]
 

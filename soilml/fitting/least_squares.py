@@ -24,7 +24,7 @@ from soilml.fitting.readings_by_gear import readings_by_gear
 from soilml.fitting.soil_test_terms import SoilTestTerms
 from soilml.fitting.whitening import Whitening
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.physics.coarse_search import SinkageEstimate
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 Floats = NDArray[np.float64]
 

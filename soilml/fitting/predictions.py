@@ -15,11 +15,11 @@ from soilml.errors import InputError
 from soilml.fitting.joined_cases import CaseSets, join_key, joined_load_case
 from soilml.fitting.readings import Readings
 from soilml.fitting.readings_by_gear import GearReadings, readings_by_gear
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 if TYPE_CHECKING:
     from soilml.fitting.coordinates import Coordinate
@@ -37,7 +37,7 @@ class PredictionRequest:
     """The readings that a case predicts at sets of coordinates, x (sets, p).
 
     `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
-    see `soilml.physics.nearby_equilibrium.SinkageEstimate`. `gears` are the readings of each of
+    see `soilml.physics.sinkage_search.SinkageEstimate`. `gears` are the readings of each of
     several gears, where they are known from an earlier request.
     """
 

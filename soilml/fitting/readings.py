@@ -16,7 +16,7 @@ from soilml.fitting.observations import declared_std
 from soilml.fitting.operating_points import gear_numbers, operating_points
 from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
-from soilml.physics.effects.slip_load_scaling import REFERENCE_LOAD, log_relative_slip
+from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 

@@ -8,12 +8,12 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect, EffectCard
-from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.rigid_wheel import WheelArc
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 #: Bounds of an error of size 1, far outside of what is looked for.
 LEAST, MOST = -50.0, 50.0

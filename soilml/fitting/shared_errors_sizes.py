@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.sensor_bias import KNOWN_PARTS, common_errors
-from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.gears.base import Gear
 from soilml.remarks import Remark
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from soilml.arrays import Array, Real, namespace
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 #: Depth (m) in place of none, where the stress is zero: log(0) has no derivative.
 SMALLEST_DEPTH = 1e-300
@@ -35,24 +34,6 @@ class Contact:
     shear_direction: Array | None = None  # 1 or -1, of the shear stress; None: that of the slip
     travel_ratio: Array | None = None  # v / (r omega), (batch,); None: 1 - slip
     repeats: int = 1  # how often the depths of the first points are repeated by the others
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Array:
-            """The field under its former name, which effect files of users may still read."""
-            if name not in _FORMER_NAMES:
-                raise AttributeError(f"a contact has no {name!r}")
-            return getattr(self, _FORMER_NAMES[name])
-
-
-_FORMER_NAMES = {
-    "sheared": "shear_displacement",
-    "rolled": "surface_travel",
-    "up": "horizontal_area",
-    "ahead": "frontal_area",
-    "lever": "shear_lever_arm",
-    "normal_lever": "normal_lever_arm",
-}
 
 
 @dataclass(frozen=True)
@@ -125,7 +106,7 @@ def shear_direction(contact: Contact, at: Operating) -> Array:
     """Direction of the shear stress, 1 or -1: (points, batch), or (batch,) where it is the slip's.
 
     The shear stress on a braking gear has the sign of the shear displacement or, by the law that
-    the source papers print, that of the slip (`soilml.physics.gears.braking_law`).
+    the source papers print, that of the slip (`soilml.physics.gears.arc`).
     """
     return slip_sign(at) if contact.shear_direction is None else contact.shear_direction
 

@@ -9,13 +9,12 @@ import numpy as np
 
 from soilml.arrays import namespace, no_gradient, requires_gradient
 from soilml.parameters import values
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase
-from soilml.physics.nearby_equilibrium import equilibrium_near
-from soilml.physics.sinkage_search import first_equilibrium
+from soilml.physics.sinkage_estimate import SinkageEstimate
+from soilml.physics.sinkage_search import equilibrium_near, first_equilibrium
 
 #: Relative step in sinkage of the central difference for dW/dz. Its truncation error is of the
 #: order of the step squared, and an error in the slope of a Newton step only scales its derivative.

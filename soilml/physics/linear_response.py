@@ -8,13 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from soilml.arrays import Array, namespace
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
 from soilml.physics.model import in_chunks, in_chunks_near
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 #: Step in the logarithm of sinkage of the difference for dW/d(ln z): a truncation error of the
 #: order of the step, and a rounding error of 1e-10.

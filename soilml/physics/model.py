@@ -12,7 +12,6 @@ import numpy as np
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import check, mapped, values
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.computing_device import (
     DEVICE_CHUNK,
     current_device,
@@ -27,7 +26,8 @@ from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.load_case import LoadCase, rows
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.sinkage_estimate import SinkageEstimate
+from soilml.physics.soils import Soil
 
 #: Rows solved together: many enough that calls cost little beside the arithmetic, and few enough
 #: that the points along their contacts stay in a processor's cache.

@@ -7,13 +7,11 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Array, Real, namespace, to_numpy
 from soilml.errors import InputError
-from soilml.parameters import check
 from soilml.physics.equilibrium import equilibrium_forces
 from soilml.physics.forces import apply_input_effects, stresses_at_sinkage
-from soilml.physics.load_case import LoadCase
-from soilml.physics.model import Model, flattened
+from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 #: Pull efficiency at which the next class begins. References: Comin and Saaj 2017, section V-C.
 THRESHOLDS = (0.35, 0.50, 0.65)
@@ -38,10 +36,7 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
     ----------
     Comin and Saaj 2017, eq. 32.
     """
-    check(at)
-    check(soil, "soil ")
-    check(model)
-    load_case, shape = flattened(LoadCase(model.gear, soil, at, model.effects))
+    load_case, shape = model.load_case(soil, at)
     xp = namespace(load_case.at.slip)
     if not bool(xp.all(load_case.at.slip > 0)):
         raise InputError(

@@ -14,12 +14,15 @@ from dataclasses import replace
 
 from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
-from soilml.physics.coarse_search import INITIAL_MARGIN, coarse_estimate
 from soilml.physics.contact import Force, vertical_load
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage, stresses_at_sinkage
-from soilml.physics.load_case import LoadCase, rows, single_precision
-from soilml.physics.merged_rows import merge_rows
-from soilml.physics.secant_steps import forces_near
+from soilml.physics.load_case import LoadCase, merge_rows, rows, single_precision
+from soilml.physics.sinkage_estimate import (
+    INITIAL_MARGIN,
+    SinkageEstimate,
+    coarse_estimate,
+    forces_near,
+)
 from soilml.row_status import Status
 
 #: Stages of an effect that depend on the sinkage; the others act before or after the search.
@@ -77,6 +80,24 @@ def _solve_in_turn(load_case: LoadCase, searches: Sequence[Search]) -> Force:
         return force
     unsolved = rows(load_case, xp.nonzero(~solved)[0])
     return merge_rows(force, solved, _solve_in_turn(unsolved, searches[1:]))
+
+
+def equilibrium_near(load_case: LoadCase, estimate: SinkageEstimate) -> Force:
+    """Forces at the equilibrium next to an estimate of the sinkage; arrays (batch,).
+
+    They agree with those of the ordinary search to about 1e-7. Rows that secant steps do not solve,
+    or that may have an earlier equilibrium, are solved by that search; those of an estimate with
+    `nearest` are marked by their status instead.
+    """
+    xp = namespace(estimate.slope)
+    force, slope = forces_near(load_case, estimate)
+    if estimate.nearest:
+        return force
+    solved = (force.status == 0) & ~earlier_equilibrium_possible(load_case, force, slope)
+    unsolved = xp.nonzero(~solved)[0]
+    if not unsolved.shape[0]:
+        return force
+    return merge_rows(force, solved, first_equilibrium(rows(load_case, unsolved)))
 
 
 def load_rises_with_sinkage(load_case: LoadCase) -> bool:

@@ -11,8 +11,8 @@ from conftest import THREE_CHANNEL_MODEL as MODEL
 from soilml.cli import main
 from soilml.config.case import read_case
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.user_effects import load_effects
 from soilml.physics.operating_point import Operating
+from soilml.physics.user_effects import load_effects
 
 pytestmark = pytest.mark.slow
 

@@ -93,7 +93,7 @@ def test_the_bytes_are_those_of_the_other_engine(scheduler, tmp_path, monkeypatc
 
 def test_effects_of_a_file_reach_the_workers(scheduler, tmp_path):
     from soilml.physics.effects import EFFECTS
-    from soilml.physics.effects.user_effects import load_effects
+    from soilml.physics.user_effects import load_effects
 
     (tmp_path / "mine.py").write_text(MINE)
     (tmp_path / "other.py").write_text("1 / 0")  # which nothing here refers to

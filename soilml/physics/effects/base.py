@@ -6,17 +6,16 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar, final
 
-from soilml.arrays import Array
+from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
+from soilml.parameters import Parameter
 from soilml.physics.contact import Force, Stress
 from soilml.physics.gears.base import Gear
+from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.physics.soils.soil import Soil
-
-if TYPE_CHECKING:
-    from soilml.physics.load_case import LoadCase
+from soilml.physics.soils import Soil
 
 T = TypeVar("T")
 
@@ -29,6 +28,11 @@ STAGES = {
     "on_force": "Force at any sinkage, inside the search for equilibrium",
     "on_reading": "Force at equilibrium -> what the sensors report",
 }
+
+#: Slip ratio and load (N) at which the size of an effect is its parameter's value.
+REFERENCE_SLIP, REFERENCE_LOAD = 0.3, 100.0
+#: Slip ratio added where a size is a power of slip, so that it stays finite at zero slip.
+SLIP_OFFSET = 0.03
 
 #: Where the cause of an effect may lie.
 KINDS = ("soil", "wheel", "rig", "sensor")
@@ -49,11 +53,6 @@ class EffectCard:
     signs: dict[str, int]
     #: runs that would distinguish it from other effects
     isolate: str
-    #: for classes that do not derive from `Effect`, which declare `gear_types` instead: the effect
-    #: applies to rigid wheels only
-    wheel: bool = False
-    #: likewise: the effect applies to tracks only
-    track: bool = False
     #: fields of `Operating` that must be given, and must vary for the effect to be identifiable
     needs: tuple[str, ...] = ()
     #: what the runs of one gear cannot vary, so that a search for missing effects cannot test it
@@ -82,7 +81,7 @@ class Effect:
     ------
     InputError
         When a subclass is defined with a public method that begins with ``on_`` and is not one of
-        `STAGES`, or with `EffectCard.wheel` or `EffectCard.track` in place of `gear_types`.
+        `STAGES`.
 
     Examples
     --------
@@ -122,12 +121,6 @@ class Effect:
         super().__init_subclass__(**options)
         if fault := misspelt_stage(cls):
             raise InputError(f"{cls.__name__}: {fault}")
-        about = getattr(cls, "about", None)
-        if isinstance(about, EffectCard) and (about.wheel or about.track):
-            raise InputError(
-                f"{cls.__name__}: about.wheel and about.track have no meaning for a class that "
-                "derives from Effect; declare gear_types, for example (RigidWheel,)"
-            )
 
     @classmethod
     def applies_to(cls, gear: Gear) -> bool:
@@ -194,3 +187,39 @@ def apply_stage(effects: Iterable[Effect], stage: str, value: T, load_case: Load
         if effect.overrides(stage):
             value = getattr(effect, stage)(value, load_case)
     return value
+
+
+def log_relative_slip(slip: Array) -> Array:
+    """Natural logarithm of the slip ratio's magnitude, relative to the reference; finite at 0."""
+    xp = namespace(slip)
+    return xp.log((xp.abs(slip) + SLIP_OFFSET) / (REFERENCE_SLIP + SLIP_OFFSET))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlipLoadScaling(Effect):
+    r"""An effect whose cause is known and whose law is not: its size may vary with slip and load.
+
+    .. math::
+        a(s, W) = a \left( \frac{|s| + 0.03}{0.33} \right)^{p_s} (W / 100 N)^{b_W}
+        e^{b_s (|s| - 0.3)}
+
+    All three exponents are zero unless they were fitted to data. The power describes effects that
+    need slip (exponent near 1), the exponential those that saturate or grow steeply at high slip.
+    `law_terms` are the exponents that may be fitted: the deflection of a wheel, for one, does not
+    depend on slip.
+    """
+
+    law_terms: ClassVar[tuple[str, ...]] = ("slip_power", "by_slip", "by_load")
+    by_slip: Annotated[Real, Parameter("1", -20.0, 20.0, "growth of the size with slip")] = 0.0
+    slip_power: Annotated[Real, Parameter("1", -5.0, 5.0, "power of slip that the size has")] = 0.0
+    by_load: Annotated[Real, Parameter("1", -5.0, 5.0, "power of load that the size has")] = 0.0
+
+    @final
+    def scaled(self, size: Real, load_case: LoadCase) -> Array:
+        """The size at the slip and load of a load case; unchanged, to the last bit, by default."""
+        xp = namespace(load_case.at.slip)
+        slip = xp.abs(load_case.at.slip)
+        power = self.by_slip * (slip - REFERENCE_SLIP)
+        power = power + self.slip_power * log_relative_slip(slip)
+        power = power + self.by_load * xp.log(load_case.at.load / REFERENCE_LOAD)
+        return size * xp.exp(power)

@@ -7,7 +7,7 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.braking_law import displacement_direction
+from soilml.physics.gears.arc import displacement_direction
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.operating_point import Operating
 

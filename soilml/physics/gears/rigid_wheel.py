@@ -8,10 +8,9 @@ from typing import Annotated, final
 
 from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.gears.arc import entry_angle
-from soilml.physics.gears.braking_law import BrakingLaw, check_law, displacement_slip
+from soilml.physics.gears.arc import BrakingLaw, check_law, displacement_slip, entry_angle
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 from soilml.row_status import Status
 
 #: Smallest value of 3 - n in the initial sinkage, whose equation holds for n well below 3.
@@ -45,7 +44,7 @@ class WheelArc:
 class RigidWheel(ABC):
     """A rigid cylinder in the soil, for any assumption on the stresses along its arc.
 
-    `braking` names the law of shear while it brakes (`soilml.physics.gears.braking_law`).
+    `braking` names the law of shear while it brakes (`soilml.physics.gears.arc`).
     """
 
     radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]

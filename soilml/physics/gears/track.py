@@ -13,10 +13,9 @@ from soilml.parameters import Parameter, as_numbers
 from soilml.physics.contact import Contact
 from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.rigid_wheel import SMALLEST_DIVISOR
-from soilml.physics.gears.track_contact import belt_contact, belt_profile
-from soilml.physics.gears.track_geometry import Belt
+from soilml.physics.gears.track_belt import Belt, belt_contact, belt_profile
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 #: Nodes of the arc that enters the soil, of each part of the middle arc, and of each short
 #: segment; their accuracy is tested against dense quadrature.
@@ -38,10 +37,10 @@ class Track:
         dj = [1 - (1 - i) \cos\alpha] ds
 
     with alpha the inclination of the belt. The soil is loaded along k z^n under the front wheel as
-    far as z_1, springs back and is loaded again along k_u (`track_contact.equivalent_depth`), and
+    far as z_1, springs back and is loaded again along k_u (`track_belt.equivalent_depth`), and
     follows k z^n again where the rear wheel presses it deeper. Where the belt rises so far that no
     pressure remains it does not touch, and there is no shear either
-    (`track_contact.shear_retention`). Load and forces are those of one track. References: Wang, Yan
+    (`track_belt.shear_retention`). Load and forces are those of one track. References: Wang, Yan
     and Du, J. Terramechanics 77, 2018, eqs. 1-9; Okello, Watany and Crolla, J. agric. Engng Res.
     69, 1998. The trim angle comes from the balance of displacements, so that the centre of mass and
     the hitch are those which that trim needs; tensions at the joints are inner forces, and the

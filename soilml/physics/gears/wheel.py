@@ -9,13 +9,13 @@ from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
 from soilml.numerics.sine_series import sine_and_versine
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.arc import differences_from_entry
-from soilml.physics.gears.braking_law import (
+from soilml.physics.gears.arc import (
     BrakingLaw,
+    differences_from_entry,
     displacement_direction,
+    reversals,
 )
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
-from soilml.physics.gears.shear_reversal import reversals
 from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive

@@ -11,10 +11,9 @@ from soilml.arrays import Array, Real, namespace
 from soilml.numerics.quadrature import columns, crowded_ends
 from soilml.parameters import Parameter
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.arc import differences_from_entry, entry_angle
-from soilml.physics.gears.shear_reversal import reversals
+from soilml.physics.gears.arc import differences_from_entry, entry_angle, reversals
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 from soilml.row_status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.

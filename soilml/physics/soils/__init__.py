@@ -1,6 +1,5 @@
 """The parameters of a soil, and the catalogue of published soils."""
 
-from soilml.physics.soils.catalogue import SoilEntry, soil, soil_catalogue
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils.catalogue import Soil, SoilEntry, soil, soil_catalogue
 
 __all__ = ["Soil", "SoilEntry", "soil", "soil_catalogue"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.parameters import Parameter
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from soilml.errors import InputError
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
-from soilml.physics.gears.track_geometry import FRONT, MIDDLE, REAR, distance_along
+from soilml.physics.gears.track_belt import FRONT, MIDDLE, REAR, distance_along
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil

@@ -29,7 +29,7 @@ from soilml.gap.verdict.claimed_effects import (
 from soilml.gap.verdict.residual_trend import residual_trend
 from soilml.gap.verdict.updated_case import PRIOR_HALF_WIDTH, updated_case
 from soilml.physics.effects import EFFECTS
-from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+from soilml.physics.effects.slip_sinkage import SlipSinkage
 from soilml.physics.operating_point import Operating
 
 

@@ -22,9 +22,9 @@ from soilml.fitting.predictions import (
 )
 from soilml.gap.data.candidate_effects import with_effect
 from soilml.gap.search.problem import StartedFit, fit_many
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 WHEEL_EFFECTS = [
     name

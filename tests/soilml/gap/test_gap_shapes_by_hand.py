@@ -17,7 +17,7 @@ from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.predicted_gains import free_law_gains
 from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.statistics.signatures import Signature
-from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+from soilml.physics.effects.slip_sinkage import SlipSinkage
 
 
 @pytest.fixture(scope="module")

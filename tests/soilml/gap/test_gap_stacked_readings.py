@@ -10,7 +10,7 @@ from soilml.errors import InputError
 from soilml.fitting.readings import MOST_READINGS, check_size, stack_readings
 from soilml.gap.search.marginal_fits import _changed
 from soilml.io.table import Table
-from soilml.physics.effects.slip_load_scaling import REFERENCE_LOAD, log_relative_slip
+from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 
 SMALL = Table(
     {

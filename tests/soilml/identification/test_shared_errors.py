@@ -21,8 +21,8 @@ from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.physics.effects.sensors.slip_offset import SlipOffset
-from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.sensors import SlipOffset
 from soilml.remarks import texts
 
 TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}

@@ -61,7 +61,7 @@ def test_intervals_hold_where_the_bearing_is_another(estimator, wheel_posterior)
 
 @pytest.mark.slow
 def test_intervals_hold_where_the_soil_sinks_with_slip(estimator, wheel_posterior):
-    from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+    from soilml.physics.effects.slip_sinkage import SlipSinkage
 
     runs = list(wrong_runs(wheel_posterior, SlipSinkage(n1=0.25)))
     right, usual = (share_held(estimator.on(model_error=size), runs) for size in (0.0, 1.0))

@@ -14,11 +14,11 @@ import soilml.physics
 from soilml import EFFECTS, Midstance, Operating, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
-from soilml.physics.coarse_search import SinkageEstimate
 from soilml.physics.effects.base import KINDS, Effect, EffectCard
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.rigid_wheel import WheelArc
 from soilml.physics.operating_point import COVARIATES
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 #: Bounds and defaults that files of users rely on: one that becomes narrower refuses files that
 #: were valid, and another default changes what they mean.
@@ -59,7 +59,9 @@ def test_values_are_frozen_and_parameters_given_by_name(cls):
 
 
 def test_every_parameter_of_the_room_is_published():
-    assert DECLARING.keys() == {(row["class"], row["field"]) for row in PUBLISHED}
+    published = {(row["class"], row["field"]) for row in PUBLISHED}
+    assert DECLARING.keys() - published == set(), "declared_parameters.csv lacks their rows"
+    assert published - DECLARING.keys() == set(), "declared_parameters.csv has rows of none"
 
 
 @pytest.mark.parametrize("row", PUBLISHED, ids=lambda row: f"{row['class']}.{row['field']}")
@@ -117,7 +119,7 @@ def test_effects_of_running_gear_are_for_their_gear():
 
 def test_an_effect_is_for_all_gears_unless_its_card_says_otherwise():
     card = EffectCard("a text", "a source", "soil", {"size": 1.0}, {}, "runs")
-    assert not card.wheel and not card.track and card.calibration is None
+    assert card.calibration is None and Effect.gear_types == ()
     assert card.size == "size"
 
 

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from soilml import EFFECTS, Model, Operating, Status, Wheel, soil
-from soilml.physics.coarse_search import SinkageEstimate, coarse_estimate
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage, load_at_sinkage
 from soilml.physics.linear_response import linear_response
-from soilml.physics.load_case import LoadCase
-from soilml.physics.merged_rows import merge_rows
+from soilml.physics.load_case import LoadCase, merge_rows
 from soilml.physics.model import flattened, in_chunks_near
-from soilml.physics.nearby_equilibrium import equilibrium_near
-from soilml.physics.secant_steps import forces_near
+from soilml.physics.sinkage_estimate import SinkageEstimate, coarse_estimate, forces_near
+from soilml.physics.sinkage_search import equilibrium_near
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Wheel(radius=0.15, width=0.12)

@@ -7,7 +7,7 @@ import pytest
 
 from soilml import EFFECTS, Model, Operating, Status, Track, Wheel, soil
 from soilml.errors import InputError
-from soilml.physics import coarse_search, secant_steps, sinkage_search
+from soilml.physics import sinkage_estimate, sinkage_search
 from soilml.physics.forces import load_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
 from soilml.physics.model import flattened
@@ -55,7 +55,7 @@ def test_the_three_searches_find_the_same_sinkage():
 
 def test_ordinary_rows_need_few_evaluations(monkeypatch):
     counts = dict.fromkeys(("coarse", "full"), 0)
-    coarse, full = coarse_search.load_at_sinkage, secant_steps.forces_at_sinkage
+    coarse, full = sinkage_estimate.load_at_sinkage, sinkage_estimate.forces_at_sinkage
 
     def counted_coarse(*args, **options):
         counts["coarse"] += 1
@@ -66,8 +66,8 @@ def test_ordinary_rows_need_few_evaluations(monkeypatch):
         counts["full"] += 1
         return full(*args, **options)
 
-    monkeypatch.setattr(coarse_search, "load_at_sinkage", counted_coarse)
-    monkeypatch.setattr(secant_steps, "forces_at_sinkage", counted_full)
+    monkeypatch.setattr(sinkage_estimate, "load_at_sinkage", counted_coarse)
+    monkeypatch.setattr(sinkage_estimate, "forces_at_sinkage", counted_full)
     assert not sinkage_search.first_equilibrium(box()).status.any()
     assert 2 <= counts["coarse"] <= 4
     assert 2 <= counts["full"] <= 4

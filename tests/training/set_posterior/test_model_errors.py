@@ -12,8 +12,8 @@ from soilml.onboard.set_contract import (
     MEMORY_INPUTS,
     MODEL_ERROR_COLUMNS,
 )
-from soilml.physics.effects.soil.exit_angle import ExitAngle
-from soilml.physics.effects.soil.slip_sinkage import SlipSinkage
+from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.slip_sinkage import SlipSinkage
 from soilml.physics.gears import Track, Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating

@@ -15,7 +15,7 @@ from soilml.fitting.shared_errors_sizes import (
     without_errors,
 )
 from soilml.onboard.set_contract import LEAST_STD
-from soilml.physics.effects.soil.exit_angle import ExitAngle
+from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import Coordinate

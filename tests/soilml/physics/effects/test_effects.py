@@ -1,7 +1,9 @@
 """One contract for every effect of the catalogue."""
 
+import inspect
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +13,7 @@ from soilml import EFFECTS, GEARS, Model, Operating, Status, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics import effects
-from soilml.physics.effects.base import KINDS, STAGES, Effect
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import KINDS, STAGES, Effect, SlipLoadScaling
 from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
@@ -22,6 +23,7 @@ SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
 AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0, **KNOWN)
+PUBLISHED = Path(__file__).parents[1] / "declared_parameters.csv"
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
 FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
@@ -159,6 +161,32 @@ def test_is_described(name):
     check(sized(name))
 
 
+@pytest.mark.parametrize("name", EFFECTS)
+def test_is_computed_by_hand(name):
+    by_hand = Path(__file__).with_name("test_effects_by_hand.py")
+    assert f'"{name}"' in by_hand.read_text(), (
+        f"no test computes {name} by hand. Write one in tests/soilml/physics/effects/{by_hand.name}"
+        f" with EFFECTS[{name!r}](...): what the equation in the docstring of"
+        f" {EFFECTS[name].__name__} gives at one operating point, in numbers of the test's own"
+    )
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_its_parameters_are_published(name):
+    cls, rows = EFFECTS[name], PUBLISHED.read_text().splitlines()
+    lacking = [
+        f"{cls.__name__},{key},{own.unit},{own.lower},{own.upper},{getattr(cls(), key)}"
+        for key, own in declared(cls).items()
+        if key in inspect.get_annotations(cls)
+        and not any(row.startswith(f"{cls.__name__},{key},") for row in rows)
+    ]
+    assert not lacking, (
+        "files of users rely on units, bounds and defaults of parameters. Add to "
+        f"tests/soilml/physics/{PUBLISHED.name}, in the order of the alphabet:\n"
+        + "\n".join(lacking)
+    )
+
+
 @needy
 def test_what_nobody_measured_is_asked_for_by_its_column(name):
     (need,) = EFFECTS[name].about.needs
@@ -256,12 +284,6 @@ def test_stages_that_an_effect_does_not_override_return_their_value():
     assert [stage for stage in STAGES if effect.overrides(stage)] == ["on_reading"]
     for stage in set(STAGES) - {"on_reading"}:
         assert getattr(effect, stage)(value, None) is value
-
-
-def test_gear_flags_of_the_card_are_refused_where_gear_types_belong():
-    about = replace(EFFECTS["slip-sinkage"].about, wheel=True)
-    with pytest.raises(InputError, match="declare gear_types"):
-        type("ForWheels", (Effect,), {"name": "for-wheels", "about": about})
 
 
 def test_what_is_no_effect_is_refused_by_the_model():

@@ -1,4 +1,8 @@
-"""Each effect of soil and wheel against a formula, a limit or a published number."""
+"""Each effect of the catalogue against a formula, a limit or a published number.
+
+Soil and running gear first, then rig and sensors. `test_effects.py` asks that every effect of the
+catalogue has a test here.
+"""
 
 from dataclasses import replace
 
@@ -7,7 +11,7 @@ import pytest
 
 from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
 from soilml.physics.contact import Contact, Stress, stress
-from soilml.physics.effects.soil.sidewall_shear import buried
+from soilml.physics.effects.sidewall_shear import buried
 from soilml.physics.load_case import LoadCase
 
 SAND = soil("wong1989/dry_sand")
@@ -15,6 +19,9 @@ GEAR = Wheel(radius=0.15, width=0.12)
 WHEEL = Model(GEAR)
 AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0)
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
+#: For effects of rig and sensors: driving and braking.
+RIG_AT = Operating(slip=np.asarray([-0.4, -0.1, 0.15, 0.4, 0.7]), load=60.0)
+RIG_PLAIN = WHEEL(SAND, RIG_AT)
 
 
 def same(found, expected, channels=CHANNELS, rtol=1e-9):
@@ -209,3 +216,129 @@ def test_a_wheel_that_slides_sideways_shears_along_its_slip_velocity():
     right, left = (model(SAND, replace(AT, slip_angle=a)) for a in (0.2, -0.2))
     same(right, left, rtol=0)
     same(model(SAND, replace(AT, slip_angle=0.0)), WHEEL(SAND, AT), rtol=0)
+
+
+def test_grousers_of_a_track_shear_soil_on_soil_and_beside_the_track():
+    before, scene = sheared_by(SAND.shear_modulus * np.asarray([0.75, 3.0, 30.0]))
+    effect = EFFECTS["track-grousers"](spacing=0.8, height=0.02, yielding=3.0, power=0.5)
+    sides = 1.0 + 2.0 * 0.02 / GEAR.width
+    block = SAND.cohesion * sides + before.normal * np.tan(SAND.friction_angle)
+    expected = 0.2 * before.shear + 0.8 * block * np.asarray([0.5, 1.0, 1.0])
+    np.testing.assert_allclose(effect.on_stress(before, scene).shear, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("b0", [-1.0, -0.3])
+def test_an_exit_angle_given_as_a_share_of_the_entry_lies_behind_the_axle(b0):
+    at = replace(AT, slip=np.asarray([0.3]))
+    rim = GEAR.contact_geometry(np.asarray([0.02]), SAND, at)
+    found = EFFECTS["exit-angle"](b0=b0).on_contact(rim, LoadCase(GEAR, SAND, at))
+    np.testing.assert_allclose(found.exit, b0 * rim.entry, rtol=1e-12)
+    kappa = EFFECTS["exit-angle"](kappa=0.2).on_contact(rim, LoadCase(GEAR, SAND, at))
+    np.testing.assert_allclose(kappa.exit, -np.arccos(1.0 - 0.2 * 0.02 / 0.15), rtol=1e-9)
+
+
+def test_weight_pulls_back_on_a_slope_and_forward_in_reverse():
+    model = WHEEL + EFFECTS["slope"](angle=0.2)
+    flat = WHEEL(SAND, replace(RIG_AT, load=60.0 * np.cos(0.2)))
+    up, down = (model(SAND, replace(RIG_AT, speed=v)) for v in (0.1, -0.1))
+    np.testing.assert_allclose(up.drawbar_pull, flat.drawbar_pull - 60.0 * np.sin(0.2))
+    np.testing.assert_allclose(0.5 * (up.drawbar_pull + down.drawbar_pull), flat.drawbar_pull)
+    np.testing.assert_array_equal(model(SAND, RIG_AT).drawbar_pull, up.drawbar_pull)
+    np.testing.assert_allclose(up.torque, flat.torque)
+
+
+def test_the_soil_carries_what_the_pull_presses_down():
+    found = (WHEEL + EFFECTS["load-transfer"](ratio=0.2, offset=3.0))(SAND, RIG_AT)
+    true = WHEEL(SAND, replace(RIG_AT, load=63.0 + 0.2 * found.drawbar_pull))
+    for channel in CHANNELS:
+        np.testing.assert_allclose(getattr(found, channel), getattr(true, channel), rtol=1e-7)
+
+
+def test_a_load_that_is_lifted_away_barely_touches():
+    found = (WHEEL + EFFECTS["load-transfer"](offset=-100.0))(SAND, RIG_AT)
+    assert (found.status == 0).all() and (found.sinkage < 1e-5).all()
+
+
+def test_a_bearing_rubs_under_the_load_that_it_carries():
+    found = (WHEEL + EFFECTS["bearing-friction"](coefficient=0.02))(SAND, RIG_AT)
+    np.testing.assert_allclose(found.torque - RIG_PLAIN.torque, 0.02 * 60.0 * 0.15)
+    weighed = WHEEL + EFFECTS["load-gain"](gain=0.25) + EFFECTS["bearing-friction"](coefficient=0.1)
+    np.testing.assert_allclose(
+        weighed(SAND, RIG_AT).torque - WHEEL(SAND, replace(RIG_AT, load=48.0)).torque,
+        0.1 * 48.0 * 0.15,
+    )
+
+
+def test_a_load_cell_that_reads_a_quarter_too_much():
+    found = (WHEEL + EFFECTS["load-gain"](gain=0.25))(SAND, RIG_AT)
+    for channel in CHANNELS:
+        expected = getattr(WHEEL(SAND, replace(RIG_AT, load=48.0)), channel)
+        np.testing.assert_allclose(getattr(found, channel), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name, size, channel, times, more",
+    [
+        ("torque-offset", 0.3, "torque", 1.0, 0.3),
+        ("torque-gain", -0.1, "torque", 0.9, 0.0),
+        ("drawbar-offset", -2.0, "drawbar_pull", 1.0, -2.0),
+        ("drawbar-gain", 0.1, "drawbar_pull", 1.1, 0.0),
+        ("sinkage-offset", -0.05, "sinkage", 1.0, -0.05),
+        ("sinkage-gain", 0.2, "sinkage", 1.2, 0.0),
+    ],
+)
+def test_a_sensor_changes_its_own_channel_alone(name, size, channel, times, more):
+    found = (WHEEL + EFFECTS[name](**{EFFECTS[name].about.size: size}))(SAND, RIG_AT)
+    for other in CHANNELS:
+        exact = getattr(RIG_PLAIN, other)
+        expected = times * exact + more if other == channel else exact
+        np.testing.assert_allclose(getattr(found, other), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name, channel", [("torque-offset", "torque"), ("drawbar-offset", "drawbar_pull")]
+)
+def test_the_zero_of_a_sensor_turns_around_in_reverse(name, channel):
+    at = replace(RIG_AT, speed=np.where(np.arange(np.size(RIG_AT.slip)) % 2, -0.05, 0.05))
+    found = getattr((WHEEL + EFFECTS[name](offset=0.4))(SAND, at), channel)
+    added = np.where(at.speed < 0.0, -0.4, 0.4)
+    np.testing.assert_allclose(found, getattr(WHEEL(SAND, at), channel) + added, rtol=1e-12)
+
+
+@pytest.mark.parametrize("error", [-0.2, -0.015, 0.015, 0.2])
+def test_slip_from_a_wrong_speed_is_corrected(error):
+    rim_speed = 0.1
+    speed = rim_speed * np.asarray([0.05, 0.3, 0.9, 0.99, 1.0, 1.01, 1.1, 2.0, 9.0])
+
+    def slip(v):
+        return np.where(v < rim_speed, 1.0 - v / rim_speed, rim_speed / v - 1.0)
+
+    reported = Operating(slip=slip(speed * (1.0 + error)), load=60.0)
+    found = EFFECTS["slip-scale"](error=error).on_operating(reported, None)
+    np.testing.assert_allclose(found.slip, slip(speed), atol=1e-14)
+
+
+@pytest.mark.parametrize("error", [-0.2, 0.2])
+def test_corrected_slip_stays_a_slip(error):
+    most = 1.0 - 1e-9
+    at = Operating(slip=np.asarray([-most, most]), load=60.0)
+    for effect in (EFFECTS["slip-scale"](error=error), EFFECTS["slip-offset"](offset=error)):
+        assert (np.abs(effect.on_operating(at, None).slip) <= most).all()
+
+
+def test_a_slip_that_is_off_by_a_constant_is_corrected():
+    true, off = np.asarray([-0.4, 0.0, 0.1, 0.8]), 0.03
+    reported = Operating(slip=true + off, load=60.0)
+    model = WHEEL + EFFECTS["slip-offset"](offset=off)
+    expected = WHEEL(SAND, Operating(slip=true, load=60.0))
+    found = model(SAND, reported)
+    for channel in CHANNELS:
+        np.testing.assert_allclose(getattr(found, channel), getattr(expected, channel), rtol=1e-12)
+
+
+def test_stresses_are_those_of_the_true_sinkage_whatever_the_sensor_says():
+    expected = WHEEL.profile(SAND, RIG_AT)
+    for effect in (EFFECTS["sinkage-offset"](offset=-0.05), EFFECTS["sinkage-gain"](gain=0.4)):
+        found = (WHEEL + effect).profile(SAND, RIG_AT)
+        np.testing.assert_array_equal(found.angle, expected.angle)
+        np.testing.assert_array_equal(found.normal, expected.normal)

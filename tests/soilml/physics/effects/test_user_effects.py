@@ -5,10 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from soilml import Model, Operating, Track, Wheel, soil
+from soilml import Model, Operating, Wheel, soil
 from soilml.errors import InputError
-from soilml.physics.effects import Effect
-from soilml.physics.effects.user_effects import load_effects
+from soilml.physics.user_effects import load_effects
 
 OWN = '''\
 from __future__ import annotations
@@ -17,12 +16,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 from soilml.arrays import Real
-from soilml.physics.effects import EffectCard
+from soilml.physics.effects import Effect, EffectCard
 from soilml.parameters import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crust:
+class Crust(Effect):
     """A crust carries a part of the load."""
 
     name: ClassVar[str] = "crust"
@@ -98,7 +97,7 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
         ("[Real, Parameter", "[Reel, Parameter", "types that exist and neutral defaults"),
         (" = 0.0\n", "\n", "Crust: its fields need types that exist and neutral defaults"),
         (" = 0.0\n", " = -1.0\n", "Crust: strength is -1 N"),
-        ("frozen=True, ", "", "Crust: an effect is decorated by @dataclass(frozen=True"),
+        ("frozen=True, ", "", "TypeError when run: cannot inherit non-frozen dataclass"),
         ("@dataclass(frozen=True, kw_only=True)\n", "", "an effect is decorated by @dataclass"),
         (
             "on_force",
@@ -106,7 +105,8 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
             "Crust: on_forces is not a stage of a model; did you mean on_force? ",
         ),
         ("on_force", "forces", "Crust: it acts on nothing; it needs one of the methods on_op"),
-        ("class Crust:", "class Crust(Effect):", "NameError when run"),
+        ("class Crust(Effect):", "class Crust(Base):", "NameError when run"),
+        ("class Crust(Effect):", "class Crust:", "Crust: derive it from soilml.Effect"),
         ('"soil"', '"water"', "about.kind is 'water'; there are: soil, wheel, rig, sensor"),
         (
             "        signs",
@@ -124,53 +124,10 @@ def test_what_is_wrong_is_said_in_one_line(own, old, new, said):
     assert text.startswith(f"{own}: ") and said in text and "\n" not in text
 
 
-DERIVED = OWN.replace("import EffectCard", "import Effect, EffectCard").replace(
-    "class Crust:", "class Crust(Effect):"
-)
-
-
-def test_an_effect_with_and_without_the_base_class_acts_alike(own):
-    (plain,) = load_effects(own).values()
-    own.write_text(DERIVED)
-    (derived,) = load_effects(own).values()
-    at = Operating(slip=np.asarray([0.2, 0.5]), load=60.0)
-    for cls in (plain, derived):
-        assert issubclass(cls, Effect) and cls.__doc__ == "A crust carries a part of the load."
-        assert cls.overrides("on_force") and not cls.overrides("on_reading")
-    np.testing.assert_array_equal(
-        (WHEEL + plain(strength=5.0))(SAND, at).torque,
-        (WHEEL + derived(strength=5.0))(SAND, at).torque,
-    )
-
-
-@pytest.mark.filterwarnings("ignore:.*has moved:DeprecationWarning")
-def test_a_file_with_the_former_import_path_works(own):
-    former = OWN.replace("from soilml.physics.effects import", "from soilml.effects.base import")
-    assert former != OWN
-    own.write_text(former)
-    assert list(load_effects(own)) == ["crust"]
-
-
-def test_an_effect_without_the_base_class_is_found_where_its_file_defines_it(own):
+def test_an_effect_is_found_where_its_file_defines_it(own):
     """Worker processes look a class up by its module and name."""
     (crust,) = load_effects(own).values()
     assert getattr(sys.modules[crust.__module__], crust.__qualname__) is crust
-
-
-def test_a_misspelt_stage_beside_the_base_class_is_one_line(own):
-    own.write_text(DERIVED.replace("on_force", "on_forces"))
-    with pytest.raises(InputError) as caught:
-        load_effects(own)
-    message = str(caught.value)
-    assert message.startswith(f"{own}: Crust: on_forces is not a stage") and "\n" not in message
-
-
-def test_gear_flags_of_a_card_are_the_gear_types_of_the_effect(own):
-    own.write_text(OWN.replace('kind="soil"', 'kind="soil",\n        wheel=True'))
-    (crust,) = load_effects(own).values()
-    assert crust.applies_to(WHEEL.gear)
-    with pytest.raises(InputError, match="it applies to: wheel, linear-wheel"):
-        _ = Model(Track(radius=0.1, width=0.1, base=0.5)) + crust()
 
 
 def test_an_effect_that_only_derives_from_a_dataclass_is_refused(own):

@@ -8,7 +8,7 @@ import pytest
 
 from soilml import LinearWheel, Midstance, Operating, Track, Wheel, soil
 from soilml.physics.contact import Contact, stress
-from soilml.physics.effects.running_gear.track_grousers import TrackGrousers
+from soilml.physics.effects.track_grousers import TrackGrousers
 from soilml.physics.load_case import LoadCase
 
 SAND = soil("wong1989/dry_sand", kc=2e4, n=1.1)

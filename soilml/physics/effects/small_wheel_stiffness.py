@@ -7,11 +7,10 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import EffectCard, SlipLoadScaling
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 #: Diameter (m) from which the curve of a plate holds for wheels.
 LARGE = 0.5

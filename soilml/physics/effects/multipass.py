@@ -7,10 +7,9 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard, covariate
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import EffectCard, SlipLoadScaling, covariate
 from soilml.physics.load_case import LoadCase
-from soilml.physics.soils.soil import Soil
+from soilml.physics.soils import Soil
 
 
 @final

@@ -8,8 +8,7 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress
-from soilml.physics.effects.base import EffectCard, covariate
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import EffectCard, SlipLoadScaling, covariate
 from soilml.physics.load_case import LoadCase
 
 #: Speed (m/s) at which the soil's strength is as written, and the slowest that the law is for.

@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar, final
 
 from soilml.arrays import Real
 from soilml.parameters import Parameter
-from soilml.physics.effects.base import EffectCard
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import EffectCard, SlipLoadScaling
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 

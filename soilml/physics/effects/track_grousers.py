@@ -8,8 +8,7 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real, namespace
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, slip_sign
-from soilml.physics.effects.base import EffectCard
-from soilml.physics.effects.slip_load_scaling import SlipLoadScaling
+from soilml.physics.effects.base import EffectCard, SlipLoadScaling
 from soilml.physics.gears.track import Track
 from soilml.physics.load_case import LoadCase
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import sys
-from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -15,8 +14,6 @@ from soilml.errors import InputError
 from soilml.parameters import check, declared
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import KINDS, STAGES, Effect, EffectCard, misspelt_stage
-from soilml.physics.gears.rigid_wheel import RigidWheel
-from soilml.physics.gears.track import Track
 from soilml.physics.operating_point import COVARIATES
 
 
@@ -24,10 +21,9 @@ def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
     """Run a Python file and return the effects that it defines, by name.
 
     An effect is a frozen dataclass with a `name`, a card `about` and at least one stage of
-    `soilml.physics.effects.base.STAGES`. It derives from `soilml.physics.effects.Effect`, or from
-    no class, as in files written before that class existed; such a class is given the base here.
-    Classes whose names begin with an underscore are ignored. The file may do all that Python may:
-    load only what you would run.
+    `soilml.physics.effects.base.STAGES`, derived from `soilml.physics.effects.Effect`. Classes
+    whose names begin with an underscore are ignored. The file may do all that Python may: load only
+    what you would run.
 
     Parameters
     ----------
@@ -54,7 +50,7 @@ def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
             raise InputError(f"{where}: the catalogue has an effect {cls.name!r} already")
         if cls.name in effects:
             raise InputError(f"{where}: {effects[cls.name].__name__} is {cls.name!r} already")
-        effects[cls.name] = _derived(cls, module)
+        effects[cls.name] = cls
     if not effects:
         raise InputError(
             f"{path}: no effect in it; one is a frozen dataclass with name, about and one of: "
@@ -95,31 +91,14 @@ def _candidates(module: ModuleType) -> list[Any]:
     return [v for v in own if v.__name__[0] != "_" and any(hasattr(v, name) for name in marks)]
 
 
-def _derived(cls: Any, module: ModuleType) -> type[Effect]:
-    """The class itself where it derives from `Effect`, else a subclass of it that does."""
-    if issubclass(cls, Effect):
-        derived: type[Effect] = cls
-        return derived
-    gear_types = (RigidWheel,) * cls.about.wheel + (Track,) * cls.about.track
-    members = {
-        "__module__": cls.__module__,
-        "__doc__": cls.__doc__,
-        "about": replace(cls.about, wheel=False, track=False),
-        "gear_types": gear_types,
-    }
-    derived = type(cls.__name__, (cls, Effect), members)
-    setattr(module, cls.__name__, derived)  # so that instances can be pickled
-    return derived
-
-
 def _fault(cls: Any) -> str:
     """What keeps a class from being an effect; empty where it is one."""
     own_dataclass = vars(cls).get("__dataclass_params__")  # not that of what it derives from
     if own_dataclass is None or not own_dataclass.frozen:
         return "an effect is decorated by @dataclass(frozen=True, kw_only=True)"
-    if fault := misspelt_stage(cls):
-        return fault
-    if not any(getattr(cls, name, None) not in (None, getattr(Effect, name)) for name in STAGES):
+    if not issubclass(cls, Effect):
+        return misspelt_stage(cls) or f"derive it from soilml.Effect: class {cls.__name__}(Effect)"
+    if not any(cls.overrides(name) for name in STAGES):
         return f"it acts on nothing; it needs one of the methods {', '.join(STAGES)}"
     if not isinstance(getattr(cls, "name", None), str):
         return 'name is missing; write name: ClassVar[str] = "my-effect"'

@@ -1,0 +1,281 @@
+"""Faults of the sensors: gains and offsets of torque, drawbar pull, sinkage, load and slip.
+
+Channels are changed at the stage `on_reading`, slip and load at `on_operating`, where the true
+ones follow from those reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, ClassVar, final
+
+from soilml.arrays import Array, Real, namespace
+from soilml.parameters import Parameter
+from soilml.physics.contact import Force
+from soilml.physics.effects.base import Effect, EffectCard
+from soilml.physics.load_case import LoadCase
+from soilml.physics.operating_point import MOST_SLIP, Operating
+
+_linear_error = partial(EffectCard, source="linear sensor error", kind="sensor")
+
+
+def signed_by_travel(value: Real, load_case: LoadCase) -> Array:
+    """`value` (...), with its sign turned around in rows whose travel speed is below zero.
+
+    Torque and drawbar pull are counted positive along the travel. A sensor that is bolted to the
+    rig does not turn around with it: in reverse its reading changes sign before it is tabled, and
+    so does all that the sensor itself adds to it.
+    """
+    speed = load_case.at.speed
+    if speed is None:
+        return value
+    value = value + 0.0 * speed
+    return namespace(value).where(speed < 0, -value, value)
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class TorqueOffset(Effect):
+    r"""The torque sensor does not read zero when nothing turns it.
+
+    .. math:: T' = T + d T_0
+
+    with d = -1 where the travel speed is given and below zero, else 1 (`signed_by_travel`).
+    References: sensor error of first order. Constant over a campaign; a zero that drifts with
+    temperature is not of this form.
+    """
+
+    name: ClassVar[str] = "torque-offset"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the torque sensor's zero is off",
+        reference={"offset": 0.1},
+        signs={"torque": +1},
+        isolate="reading the torque with the wheel lifted; the same runs driven the other way",
+        calibration=0.05,
+    )
+    offset: Annotated[Real, Parameter("N m", -100.0, 100.0, "T0, reading at no torque")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, torque=force.torque + signed_by_travel(self.offset, load_case))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class TorqueGain(Effect):
+    r"""The torque sensor reads a share too much, or too little.
+
+    .. math:: T' = (1 + e) T
+
+    References: sensor error of first order. A torque computed from motor current with a wrong
+    torque constant is of this form too; friction of the gears is not.
+    """
+
+    name: ClassVar[str] = "torque-gain"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the torque sensor's scale is off",
+        reference={"gain": 0.03},
+        signs={"torque": +1},
+        isolate="a dead weight on a lever of known length",
+        calibration=0.03,
+    )
+    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, torque=force.torque * (1.0 + self.gain))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class DrawbarOffset(Effect):
+    r"""The drawbar sensor does not read zero when nothing pulls.
+
+    .. math:: DP' = DP + d F_0
+
+    with d = -1 where the travel speed is given and below zero, else 1 (`signed_by_travel`).
+    References: sensor error of first order; friction of the carriage, which opposes the travel in
+    both directions, is not of this form.
+    """
+
+    name: ClassVar[str] = "drawbar-offset"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the drawbar sensor's zero is off",
+        reference={"offset": 0.5},
+        signs={"drawbar_pull": +1},
+        isolate="reading the drawbar with the wheel lifted; the same runs driven the other way",
+        calibration=0.5,
+    )
+    offset: Annotated[Real, Parameter("N", -200.0, 200.0, "F0, reading at no pull")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(
+            force, drawbar_pull=force.drawbar_pull + signed_by_travel(self.offset, load_case)
+        )
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class DrawbarGain(Effect):
+    r"""The drawbar sensor reads a share too much, or too little.
+
+    .. math:: DP' = (1 + e) DP
+
+    References: sensor error of first order. It says nothing of a sensor that also feels the load.
+    """
+
+    name: ClassVar[str] = "drawbar-gain"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the drawbar sensor's scale is off",
+        reference={"gain": 0.03},
+        signs={},
+        isolate="a dead weight on the drawbar over a pulley",
+        calibration=0.03,
+    )
+    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, drawbar_pull=force.drawbar_pull * (1.0 + self.gain))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SinkageOffset(Effect):
+    r"""The sinkage is measured from a level that is not that of the soil.
+
+    .. math:: z' = z + z_0
+
+    References: sensor error of first order. The surface is taken as level; one that was raked
+    unevenly is noise, not this.
+    """
+
+    name: ClassVar[str] = "sinkage-offset"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the sinkage sensor's zero is off",
+        reference={"offset": 0.001},
+        signs={"sinkage": +1},
+        isolate="reading the sinkage with the wheel on a plate level with the soil",
+        calibration=0.0005,
+    )
+    offset: Annotated[Real, Parameter("m", -0.1, 0.1, "z0, reading at no sinkage")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, sinkage=force.sinkage + self.offset)
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SinkageGain(Effect):
+    r"""The sinkage sensor reads a share too much, or too little.
+
+    .. math:: z' = (1 + e) z
+
+    References: sensor error of first order, such as an arm whose length is not what was written
+    down; for angles so small that its height is proportional to its angle.
+    """
+
+    name: ClassVar[str] = "sinkage-gain"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the sinkage sensor's scale is off",
+        reference={"gain": 0.03},
+        signs={"sinkage": +1},
+        isolate="reading the sinkage on blocks of known height",
+        calibration=0.03,
+    )
+    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
+
+    def on_reading(self, force: Force, load_case: LoadCase) -> Force:
+        return replace(force, sinkage=force.sinkage * (1.0 + self.gain))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class LoadGain(Effect):
+    r"""The load cell reads a share too much: the wheel feels less than is reported.
+
+    .. math:: W' = (1 + e) W
+
+    with W' as reported and W what the soil carries. References: sensor error of first order. A
+    zero that is off is `offset` of load-transfer.
+    """
+
+    name: ClassVar[str] = "load-gain"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the load cell's scale is off",
+        reference={"gain": 0.03},
+        signs={"torque": -1, "sinkage": -1},
+        isolate="weighing the wheel on its stand",
+        calibration=0.03,
+    )
+    gain: Annotated[Real, Parameter("1", -0.5, 0.5, "e, share read too much")] = 0.0
+
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
+        return replace(at, load=at.load / (1.0 + self.gain))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SlipOffset(Effect):
+    r"""The reported slip is off by the same amount in all rows.
+
+    .. math:: s = s' - s_0
+
+    with s' as reported. An estimate of slip from images or from motor current can have such an
+    error; a wrong travel speed or wheel radius has the form of `slip-scale` instead, which equals
+    an offset of -e at small slip and vanishes towards full slip. References: sensor error of first
+    order.
+    """
+
+    name: ClassVar[str] = "slip-offset"
+    about: ClassVar[EffectCard] = _linear_error(
+        text="the reported slip is off by a constant",
+        reference={"offset": 0.015},
+        signs={"torque": -1, "drawbar_pull": -1},
+        isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
+        calibration=0.01,
+    )
+    offset: Annotated[Real, Parameter("1", -0.2, 0.2, "s0, reported slip at no slip")] = 0.0
+
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
+        return _with_slip(at, at.slip - self.offset)
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SlipScale(Effect):
+    r"""Travel speed, or the wheel's radius, is known wrongly, and slip with it.
+
+    .. math::
+        1 - s' = (1 - s) (1 + e) \text{ driving}, \quad
+        1 + s = (1 + s') (1 + e) \text{ braking}
+
+    with s' as reported: in both the reported v / (r omega) is 1 + e times the true one, by the two
+    definitions of slip; a row may pass from one to the other. References: definitions of slip,
+    Wong, Theory of Ground Vehicles, chapter 2; Nagatani et al., online climbing ability, where 1.5
+    per cent of speed is a large part of a small slip.
+    """
+
+    name: ClassVar[str] = "slip-scale"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="travel speed or wheel radius is off, and slip with it",
+        source="definition of slip",
+        kind="sensor",
+        reference={"error": 0.015},
+        signs={"torque": +1, "drawbar_pull": +1},
+        isolate="rolling the wheel unpowered on hard ground: its slip there is nil",
+        calibration=0.01,
+    )
+    error: Annotated[Real, Parameter("1", -0.2, 0.2, "e, of v / (r omega) as reported")] = 0.0
+
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
+        slip = at.slip
+        xp = namespace(slip)
+        driving = slip + (1.0 - slip) * (self.error / (1.0 + self.error))
+        true = xp.where(slip < 0, slip + (1.0 + slip) * self.error, driving)
+        # where the sign of slip changes, the other definition of slip applies
+        true = xp.where((slip < 0) == (true < 0), true, true / (1.0 + xp.abs(true)))
+        return _with_slip(at, true)
+
+
+def _with_slip(at: Operating, slip: Array) -> Operating:
+    most = namespace(slip).full_like(slip, MOST_SLIP)
+    return replace(at, slip=namespace(slip).minimum(namespace(slip).maximum(slip, -most), most))

@@ -1,1 +1,0 @@
-"""Effects whose cause sits in the soil."""
