@@ -162,7 +162,7 @@ def machines(soil: str, folder: Path) -> list[Estimator]:
 
 def shares(files: Sequence[Estimator]) -> str:
     """Correlation between the two sensors' errors, and share that each repeats on one soil."""
-    from soilml.onboard.fusion.joint_errors import joint_errors
+    from soilml.onboard.joint_errors import joint_errors
 
     errors = tuple(f.pooling.held_out for f in files if f.pooling.held_out is not None)
     joint = joint_errors(errors)

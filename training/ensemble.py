@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES, best_linear, shrink_correlation
+from soilml.onboard.fusion_rules import BEST_LINEAR, RULES, best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
 from training.dataset import Dataset
 from training.onnx_graph.builder import Graph

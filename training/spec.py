@@ -12,8 +12,8 @@ from datagen.recipe import packaged_file
 from soilml.config.measurement_noise import take_noise
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
-from soilml.numerics.estimate_fusion import RULES
 from soilml.onboard.features import inputs_of
+from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.quantities import SHEAR, column
 from training.dataset import PER_ROW, check_targets

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from soilml.cli.progress import progress_bar
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.session import Session
+from soilml.onboard.model_file import Session
 
 
 @contextmanager

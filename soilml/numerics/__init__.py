@@ -1,12 +1,5 @@
-"""Numerical methods without soil mechanics: roots, quadrature, sampling, fusion of estimates."""
+"""Numerical methods without soil mechanics: roots, quadrature, sampling."""
 
-from soilml.numerics.estimate_fusion import (
-    FusedEstimate,
-    best_linear,
-    inverse_variance,
-    pairwise,
-    shrink_correlation,
-)
 from soilml.numerics.maximum_entropy import moment_matched_weights, prior_quantiles
 from soilml.numerics.prior import Prior
 from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_start, gauss
@@ -17,12 +10,10 @@ from soilml.numerics.sampling.importance_sampling import ImportanceSample, impor
 from soilml.numerics.subspaces import column_space, project_out
 
 __all__ = [
-    "FusedEstimate",
     "ImportanceSample",
     "Nodes",
     "Prior",
     "QuantileBand",
-    "best_linear",
     "column_space",
     "columns",
     "crowded_ends",
@@ -30,14 +21,11 @@ __all__ = [
     "first_bracket",
     "gauss",
     "importance_sample",
-    "inverse_variance",
     "latin_hypercube",
     "moment_matched_weights",
-    "pairwise",
     "prior_quantiles",
     "project_out",
     "quantile_band",
     "rising_root",
-    "shrink_correlation",
     "systematic_resampling",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar
@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.features import as_numbers
+from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.narrower_prior import LEAST_MASS, within_box
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 
 Floats = NDArray[np.float64]
@@ -288,9 +290,24 @@ class Estimate:
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
         594 Pa, 195 Pa
         """
-        from soilml.onboard.fusion.estimate_within import estimate_within
-
-        return estimate_within(self, box)
+        lower, upper = _box_ends(self, box)
+        prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)
+        given = Estimate.from_prior(self.names, self.units, prior, np.shape(self.in_range))
+        outer = (self.prior.lower, self.prior.upper)
+        arrays: dict[str, Any] = {key: np.array(getattr(self, key)) for key in Estimate.ARRAYS}
+        for at in np.ndindex(np.shape(self.in_range)):
+            found: Any = given
+            if self.in_range[at] or self.reason[at] == Reason.INCONSISTENT:
+                interval = np.stack([self.low[at], self.high[at]])
+                found = within_box(
+                    self.mean[at], self.covariance[at], interval, outer, (lower, upper)
+                )
+                if found.mass < LEAST_MASS:
+                    found, arrays["reason"][at] = given, int(Reason.INCONSISTENT)
+            for key in ("mean", "std", "covariance", "low", "high"):
+                arrays[key][at] = getattr(found, key)[at if found is given else ...]
+            arrays["in_range"][at] &= found is not given
+        return replace(self, prior=prior, **arrays)
 
     def __getitem__(self, name: str) -> tuple[Floats, Floats]:
         """Mean and standard deviation (...) of one quantity; `InputError` for another name."""
@@ -298,3 +315,23 @@ class Estimate:
             raise InputError(f"{name!r} is not estimated; there are: {', '.join(self.names)}")
         i = self.names.index(name)
         return self.mean[..., i], self.std[..., i]
+
+
+def _box_ends(estimate: Estimate, box: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
+    """Ends (q,) of the box; raises `InputError` where they are not in the prior and in order."""
+    lower, upper = estimate.prior.lower.copy(), estimate.prior.upper.copy()
+    for name, ends in box.items():
+        if name not in estimate.names:
+            raise InputError(f"{name!r} is not estimated; there are: {', '.join(estimate.names)}")
+        i = estimate.names.index(name)
+        given = as_numbers(name, ends)
+        if given.shape != (2,):
+            raise InputError(f"{name} within {ends!r}; needed are two values, (least, largest)")
+        low, high = float(given[0]), float(given[1])
+        if not lower[i] <= low < high <= upper[i]:
+            raise InputError(
+                f"{name} within {low:g} to {high:g} {estimate.units[i]}; needed are two values in "
+                f"order within the prior, {lower[i]:g} to {upper[i]:g} {estimate.units[i]}"
+            )
+        lower[i], upper[i] = low, high
+    return lower, upper

@@ -16,16 +16,21 @@ from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
-from soilml.onboard.metadata.fields import read_fields, read_prior, read_probe
-from soilml.onboard.model_file import find_model, open_model
-from soilml.onboard.probe import reproduces
-from soilml.onboard.row_estimates import run_rows
-from soilml.onboard.session import Session
-from soilml.onboard.set_estimate import estimate_of_set
-from soilml.onboard.set_posterior import SetPosterior
+from soilml.onboard.metadata import read_fields, read_prior, read_probe
+from soilml.onboard.model_file import Session, find_model, open_model
+from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 Floats = NDArray[np.float64]
 NoiseModels = Mapping[str, tuple[float, float]]
+
+#: Outputs of the graph for single readings.
+ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
+#: Rows fed to the graph at a time: bounds its working memory, which the runtime keeps.
+ROWS_PER_CALL = 4096
+#: Largest deviation of mean or std from the file's own probe, in prior standard deviations.
+PROBE_TOLERANCE = 1e-4
+#: The same for sets: a rounding difference can change which samples are drawn.
+SET_PROBE_TOLERANCE = 0.05
 
 
 @final
@@ -87,7 +92,7 @@ class Estimator:
         session, metadata = open_model(file)
         try:
             estimator = Estimator(str(file), session=session, **read_fields(metadata))
-            passed = all(reproduces(estimator, **entry) for entry in read_probe(metadata))
+            passed = all(estimator._reproduces(**entry) for entry in read_probe(metadata))
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ModelFileError(f"{file}: its metadata is damaged ({error})") from None
         except Exception as error:  # onnxruntime raises many kinds, none with a public base
@@ -158,10 +163,12 @@ class Estimator:
     def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings (rows,) of one soil.
 
-        Uses the set posterior where the file has one, otherwise `pooled`. Rows that repeat another
-        in every reading count once. Rows out of range are left out, up to a tenth of them; where
-        there are more, `in_range` is false and the estimate is the prior. It is false also where
-        no soil of the prior is consistent with all rows; the estimate is then widened.
+        Uses the set posterior where the file has one. Other files pool their estimates of single
+        rows as Gaussians, which is far less certain than the joint likelihood of many rows. Rows
+        that repeat another in every reading count once. Rows out of range are left out, up to a
+        tenth of them; where there are more, `in_range` is false and the estimate is the prior. It
+        is false also where no soil of the prior is consistent with all rows; the estimate is then
+        widened.
 
         Parameters
         ----------
@@ -191,18 +198,6 @@ class Estimator:
             if rows["slip"].size == 0:
                 raise InputError("no reading given; needed is one or more")
             return self._set_estimate(rows, self.start())[0]
-        return self.pooled(**measured)
-
-    def pooled(self, **measured: Any) -> Estimate:
-        """The estimates of single readings (rows,) of one soil, pooled as Gaussians.
-
-        This is what `run` gives for a file without a set posterior. It is far less certain than
-        the exact joint likelihood of many readings.
-
-        Raises `InputError` as `run` does, and for a file without estimates of single readings.
-        """
-        if self.sets is not None and self.sets.sets_only:
-            raise InputError(f"{self.path} has no estimates of single readings to pool; use run")
         if self.per_row:
             raise InputError(
                 f"{self.path} estimates {self.per_row[0]}, which differs from row to row: rows of "
@@ -298,3 +293,42 @@ class Estimator:
         shape = np.broadcast_shapes(*(np.shape(value) for value in measured.values()))
         single = ({k: v[i : i + 1] for k, v in rows.items()} for i in range(rows["slip"].size))
         return Estimate.stack((self._set_estimate(row, sets.start())[0] for row in single), shape)
+
+    def _reproduces(
+        self, readings: Any, mean: Any, std: Any, in_range: Any, given: Any = None
+    ) -> bool:
+        """Whether the answers to readings agree with those stored in the file.
+
+        With context inputs `given`, which may be none, the readings are a set.
+        """
+        if given is None:
+            answer, tolerance = self(**readings), PROBE_TOLERANCE
+        else:
+            configured = self.on(**given) if given else self
+            answer, tolerance = configured.run(**readings), SET_PROBE_TOLERANCE
+        deviations = np.abs(answer.mean - np.asarray(mean)), np.abs(answer.std - np.asarray(std))
+        agree = all(bool(np.all(part < tolerance * answer.prior_std)) for part in deviations)
+        return np.array_equal(answer.in_range, in_range) and agree
+
+
+def run_rows(session: Session, rows: Mapping[str, Floats]) -> dict[str, NDArray[Any]]:
+    """Mean and std (m, q), covariance (m, q, q), float64, and the flag in_range (m,).
+
+    Parameters
+    ----------
+    session : InferenceSession
+        Of the file.
+    rows : mapping of str to ndarray
+        Readings (m,) by input name.
+    """
+    with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
+        feed = dict(zip(rows, np.array(list(rows.values()), np.float32), strict=True))
+    count = len(next(iter(feed.values())))
+    pieces = [
+        session.run(ROW_OUTPUTS, {n: v[first : first + ROWS_PER_CALL] for n, v in feed.items()})
+        for first in range(0, max(count, 1), ROWS_PER_CALL)
+    ]
+    joined = pieces[0] if len(pieces) == 1 else map(np.concatenate, zip(*pieces, strict=True))
+    mean, std, covariance, in_range = joined
+    values = (mean.astype(np.float64), std.astype(np.float64), covariance.astype(np.float64))
+    return dict(zip(ROW_OUTPUTS, (*values, in_range), strict=True))

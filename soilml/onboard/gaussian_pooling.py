@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.features import READABLE
+from soilml.onboard.held_out_errors import HeldOutErrors
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,15 @@ BINS = 50
 LEAST_INFORMATION = 0.05
 #: A run of which a smaller share of rows lies in the training domain is not estimated.
 LEAST_SHARE_IN_RANGE = 0.9
+
+#: Metadata key of each array of `RunConditions`, and of `RunPattern`.
+CONDITION_KEYS = {"lower": "lower", "upper": "upper", "std": "std"}
+PATTERN_KEYS = {
+    "rows": "rows",
+    "worth": "information",
+    "widening": "std_scale",
+    "reach": "coverage_factor",
+}
 
 
 @dataclass(frozen=True)
@@ -279,3 +289,56 @@ def pool_run(
     std = np.sqrt(np.diag(pooled.covariance))
     parts = (pooled.mean, pooled.covariance, std, np.asarray(True))
     return replace(Estimate.gaussian(*head, *parts, rule.coverage_factor), **count)
+
+
+def read_pooling(entry: Mapping[str, Any]) -> PoolingCalibration:
+    """The pooling calibration from the metadata entry "together".
+
+    Raises `KeyError`, `TypeError` or `ValueError` where it is malformed.
+    """
+    names = tuple(entry["over"])
+    conditions = RunConditions(
+        names=names,
+        **{
+            field: np.asarray(entry[key], float).reshape(len(names))
+            for key, field in CONDITION_KEYS.items()
+        },
+    )
+    if not {*names} <= READABLE.keys():
+        raise ValueError("conditions that are no readings")
+    alone = np.asarray(entry["alone"], float).reshape(-1)
+    patterns = tuple(_read_pattern(kind, len(names), alone.size) for kind in entry["kinds"])
+    return PoolingCalibration(
+        conditions=conditions,
+        patterns=patterns,
+        single_row_coverage_factor=alone,
+        inconsistency_limits=np.asarray(entry["doubt"], float).reshape(2 if patterns else -1),
+        held_out=HeldOutErrors.of(entry["held_out"]) if "held_out" in entry else None,
+    )
+
+
+def _read_pattern(entry: Mapping[str, Any], conditions: int, outputs: int) -> RunPattern:
+    arrays = {field: np.asarray(entry[key], float) for key, field in PATTERN_KEYS.items()}
+    rows = len(arrays["rows"])
+    shapes = [(rows,), (rows,), (rows, outputs), (rows, outputs)]
+    varies = tuple(entry["varies"])
+    if [array.shape for array in arrays.values()] != shapes or len(varies) != conditions:
+        raise ValueError("kinds of another shape")
+    return RunPattern(varies=varies, **arrays)
+
+
+def write_pooling(pooling: PoolingCalibration) -> dict[str, Any]:
+    """The metadata entry "together" of a pooling calibration; the inverse of `read_pooling`."""
+    conditions = pooling.conditions
+    return {
+        "over": conditions.names,
+        **{key: getattr(conditions, field).tolist() for key, field in CONDITION_KEYS.items()},
+        "kinds": [
+            {"varies": pattern.varies}
+            | {key: getattr(pattern, field).tolist() for key, field in PATTERN_KEYS.items()}
+            for pattern in pooling.patterns
+        ],
+        "alone": pooling.single_row_coverage_factor.tolist(),
+        "doubt": pooling.inconsistency_limits.tolist(),
+        **({} if pooling.held_out is None else {"held_out": pooling.held_out.entry()}),
+    }

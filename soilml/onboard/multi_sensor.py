@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.numerics.estimate_fusion import BEST_LINEAR, RULES
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.fusion.correlated_fusion import fuse_rows
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
-from soilml.onboard.fusion.joint_errors import are_comparable
+from soilml.onboard.fusion_rules import BEST_LINEAR, RULES
 from soilml.onboard.gaussian_pooling import pool
+from soilml.onboard.joint_errors import are_comparable, fuse_rows
 from soilml.quantities import Z_90
 
 Floats = NDArray[np.float64]
@@ -72,7 +71,7 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
     rule : str, optional
         One of `ACROSS_FILES`; `correlated` by default, or `prior-once` where the correlation is not
         known. `correlated` weighs by variance under the correlation of the errors, which files
-        trained from the same data carry (`soilml.onboard.fusion.correlated_fusion`): repeated
+        trained from the same data carry (`soilml.onboard.joint_errors`): repeated
         readings of a file share the error that its soil causes. Where one file alone was better on
         the held-out rows, the fused estimate is that file's. `prior-once`,
 
@@ -106,116 +105,77 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
             "them from one data file, or give another rule"
         )
     rule = rule or (CORRELATED if known else PRIOR_ONCE)
-    stacked = _stack_rows(estimates)
-    used = np.stack([e.in_range.reshape(-1) for e in estimates])
-    contradictory = _contradictory(stacked.mean, stacked.covariance, used)
-    used = used & ~contradictory
-    files = [e.errors for e in estimates if e.errors is not None] if rule == CORRELATED else []
-    fused = _fuse_rows(stacked, used, estimates[0].prior, rule, files)
-    found = _as_estimate(fused, used, estimates[0], rule)
-    shape = found.estimate.in_range.shape
-    reason = np.where(contradictory.reshape(shape), Reason.CONTRADICTORY, found.estimate.reason)
-    return replace(found, estimate=replace(found.estimate, reason=reason))
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Mean (..., n, q), covariance (..., n, q, q) and ends of the interval (..., 2, n, q).
-
-    Fused rows also have their disagreement (n,).
-    """
-
-    mean: Floats
-    covariance: Floats
-    ends: Floats
-    disagreement: Floats
-
-
-def _stack_rows(estimates: Sequence[Estimate]) -> _Rows:
-    """All m estimates with their leading dimensions flattened to n rows."""
-    q = len(estimates[0].names)
-    return _Rows(
-        mean=np.stack([e.mean.reshape(-1, q) for e in estimates]),
-        covariance=np.stack([e.covariance.reshape(-1, q, q) for e in estimates]),
-        ends=np.stack([np.stack([e.low, e.high]).reshape(2, -1, q) for e in estimates]),
-        disagreement=np.zeros(estimates[0].in_range.size),
+    first, q, shape = estimates[0], len(estimates[0].names), estimates[0].in_range.shape
+    mean, low, high = (
+        np.stack([getattr(e, key).reshape(-1, q) for e in estimates])
+        for key in ("mean", "low", "high")
     )
-
-
-def _fuse_rows(
-    stacked: _Rows,
-    used: NDArray[np.bool_],
-    prior: PriorSummary,
-    rule: str,
-    files: Sequence[HeldOutErrors],
-) -> _Rows:
-    """Fused rows from the estimates that are used in each, (m, n); the prior where none is."""
-    n = used.shape[1]
-    mean = np.tile(prior.mean, (n, 1))
-    covariance = np.tile(np.diag(prior.std**2), (n, 1, 1))
-    ends = np.stack([mean - Z_90 * prior.std, mean + Z_90 * prior.std])
-    disagreement = np.zeros(n)
+    covariance = np.stack([e.covariance.reshape(-1, q, q) for e in estimates])
+    used = np.stack([e.in_range.reshape(-1) for e in estimates])
+    contradictory = _contradictory(mean, covariance, used)
+    used = used & ~contradictory
+    fused = Estimate.from_prior(first.names, first.units, first.prior, (used.shape[1],))
+    disagreement = np.zeros(used.shape[1])
     for pattern in np.unique(used, axis=1).T:
         rows, members = (used == pattern[:, None]).all(axis=0), np.flatnonzero(pattern)
         if members.size == 1:
-            (only,) = members
-            mean[rows] = stacked.mean[only, rows]
-            covariance[rows] = stacked.covariance[only, rows]
-            ends[:, rows] = stacked.ends[only][:, rows]
-        elif members.size > 1 and rule == CORRELATED:
-            std = np.sqrt(np.diagonal(stacked.covariance[members][:, rows], axis1=2, axis2=3))
-            by = [files[int(i)] for i in members]
-            found = fuse_rows(stacked.mean[members][:, rows], std, by)
-            mean[rows], ends[:, rows] = found.mean, (found.low, found.high)
-            disagreement[rows] = found.disagreement.max(axis=-1)
-            correlation = _mean_correlation(stacked.covariance[members][:, rows])
-            covariance[rows] = correlation * found.std[:, :, None] * found.std[:, None, :]
+            parts = (mean[members[0]], covariance[members[0]], low[members[0]], high[members[0]])
+            found: Sequence[Any] = [part[rows] for part in parts]
         elif members.size > 1:
-            parts = stacked.mean[members][:, rows], stacked.covariance[members][:, rows]
-            mean[rows], covariance[rows] = _fuse(*parts, prior, rule)
-            half = Z_90 * np.sqrt(np.diagonal(covariance[rows], axis1=1, axis2=2))
-            ends[:, rows] = mean[rows] - half, mean[rows] + half
-    return _Rows(mean, covariance, ends, disagreement)
-
-
-def _as_estimate(
-    fused: _Rows, used: NDArray[np.bool_], first: Estimate, rule: str
-) -> MultiSensorEstimate:
-    """The fused rows with the leading dimensions, names and prior of the first estimate."""
-    q, shape, prior = len(first.names), first.in_range.shape, first.prior
-    low, high = np.clip(fused.ends, prior.lower, prior.upper).reshape(2, *shape, q)
+            of_members = mean[members][:, rows], covariance[members][:, rows]
+            if rule == CORRELATED:
+                files = [estimates[int(i)].errors for i in members]
+                *found, disagreement[rows] = _fuse_by_correlation(*of_members, files)
+            else:
+                found = _fuse_by_variance(*of_members, first.prior, rule)
+        else:
+            continue
+        for key, values in zip(("mean", "covariance", "low", "high"), found, strict=True):
+            getattr(fused, key)[rows] = values
+    lower, upper = first.prior.lower, first.prior.upper
     std = np.sqrt(np.diagonal(fused.covariance, axis1=1, axis2=2))
+    in_range = np.asarray(used.any(axis=0).reshape(shape))
+    apart = contradictory.reshape(shape)
     estimate = Estimate(
         names=first.names,
         units=first.units,
-        mean=np.clip(fused.mean, prior.lower, prior.upper).reshape(*shape, q),
+        mean=np.clip(fused.mean, lower, upper).reshape(*shape, q),
         std=std.reshape(*shape, q),
         covariance=fused.covariance.reshape(*shape, q, q),
-        low=low,
-        high=high,
-        in_range=np.asarray(used.any(axis=0).reshape(shape)),
-        prior=prior,
+        low=np.clip(fused.low, lower, upper).reshape(*shape, q),
+        high=np.clip(fused.high, lower, upper).reshape(*shape, q),
+        in_range=in_range,
+        prior=first.prior,
+        reason=np.where(apart, Reason.CONTRADICTORY, np.where(in_range, 0, Reason.OUT_OF_RANGE)),
     )
     return MultiSensorEstimate(
-        estimate,
-        used.reshape(len(used), *shape),
-        rule,
-        np.asarray(fused.disagreement.reshape(shape)),
+        estimate, used.reshape(len(used), *shape), rule, np.asarray(disagreement.reshape(shape))
     )
 
 
-def _fuse(
+def _fuse_by_correlation(
+    mean: Floats, covariance: Floats, files: Sequence[Any]
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Mean, covariance, ends of the interval, and disagreement (n,), of estimates (m, n, ...)."""
+    found = fuse_rows(mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)), files)
+    fused = _mean_correlation(covariance) * found.std[:, :, None] * found.std[:, None, :]
+    return found.mean, fused, found.low, found.high, found.disagreement.max(axis=-1)
+
+
+def _fuse_by_variance(
     mean: Floats, covariance: Floats, prior: PriorSummary, rule: str
-) -> tuple[Floats, Floats]:
-    """Mean (n, q) and covariance (n, q, q) of estimates (m, n, q) and (m, n, q, q)."""
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean (n, q), covariance (n, q, q) and ends of the interval, of estimates (m, n, ...)."""
     if rule == PRIOR_ONCE:
         weights = np.ones((mean.shape[1], mean.shape[0]))
         pooled = pool(np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1), prior, weights)
-        return pooled.mean, pooled.covariance
-    std = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
-    fused = RULES[rule](mean, std)
-    correlation = _mean_correlation(covariance)
-    return fused.mean, correlation * fused.std[:, :, None] * fused.std[:, None, :]
+        centre, fused = pooled.mean, pooled.covariance
+    else:
+        found = RULES[rule](mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)))
+        centre, std = found.mean, found.std
+        fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
+    half = Z_90 * np.sqrt(np.diagonal(fused, axis1=1, axis2=2))
+    return centre, fused, centre - half, centre + half
 
 
 def _mean_correlation(covariance: Floats) -> Floats:

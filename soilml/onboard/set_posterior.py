@@ -6,7 +6,7 @@ is kept in a memory of bounded size, so that a rover can continue where it stopp
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, final
@@ -15,12 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.common_errors import (
-    check_takes_errors,
-    error_columns,
-    read_common_errors,
-    with_common_errors,
-)
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import (
     READABLE,
     as_number,
@@ -28,8 +23,9 @@ from soilml.onboard.features import (
     flatten_readings,
     parts_of_rows,
 )
+from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
 from soilml.onboard.memory import Memory
-from soilml.onboard.session import Session
+from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
@@ -37,12 +33,14 @@ from soilml.onboard.set_contract import (
     LEAST_STD,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
+    MODEL_ERROR_INPUT,
     NOISE_NAMES,
     OPERATING_NOISE,
     OPERATING_STD_INPUTS,
     OPTIONAL_READINGS,
     REQUIRED_READINGS,
     ROW_IN_RANGE,
+    SENSOR_ERROR_COLUMNS,
     SET_OUTPUTS,
     SET_PREFIX,
     SET_SWITCH,
@@ -286,3 +284,98 @@ def _broadcast(name: str, value: Any, shape: tuple[int, ...]) -> Floats:
         if bad.any():
             raise InputError(f"{name} is {array[bad][0]:g}; needed is a finite number, or NaN")
     return array
+
+
+def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
+    """The usual errors from the entry `set` of a file's metadata; none in earlier versions."""
+    if "errors" not in metadata:
+        return {}
+    errors = metadata["errors"]
+    return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
+
+
+def error_columns(metadata: Mapping[str, Any]) -> int:
+    """Columns of errors in a file's residual system, from the entry `set` of its metadata.
+
+    Files of earlier versions know fewer errors.
+    """
+    if "errors" not in metadata:
+        return 1
+    return len(SENSOR_ERROR_COLUMNS) + len(metadata.get("model_errors", ()))
+
+
+def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, float]:
+    """The errors that a file assumes, with those among the given values that a user sets.
+
+    Raises
+    ------
+    InputError
+        If a value is negative or not finite, or if the file takes what has this error as exact.
+    """
+    own = {name: float(given[name]) for name in COMMON_ERROR_INPUTS if name in given}
+    for name, value in own.items():
+        if not 0.0 <= value < np.inf:
+            raise InputError(f"{name} is {value:g}; needed is a standard deviation, zero or more")
+        check_takes_errors(usual, name, value)
+    return {name: own.get(name, value) for name, value in usual.items()}
+
+
+def check_takes_errors(usual: Mapping[str, float], name: str, std: float) -> None:
+    """Raise `InputError` for an error that a file of an earlier version takes no account of."""
+    if name == MODEL_ERROR_INPUT and name not in usual and std > 0.0:
+        raise InputError(
+            f"{name} is {std:g}, but this file takes its model as right; train it again, with "
+            "[set_posterior], to have errors of the model taken into account"
+        )
+    if not usual and std > 0.0:
+        raise InputError(
+            f"{name} is {std:g}, but this file takes slip, load and the scale of torque as exact; "
+            "train it again, with [set_posterior], to have their errors taken into account"
+        )
+
+
+def estimate_of_set(
+    names: tuple[str, ...],
+    units: tuple[str, ...],
+    prior: PriorSummary,
+    outputs: Sequence[Any],
+    memory: Memory,
+) -> Estimate:
+    """The estimate with its reason.
+
+    Parameters
+    ----------
+    names, units, prior
+        As in `Estimate`.
+    outputs : sequence
+        Outputs of the graph in the order of `SET_OUTPUTS`.
+    memory : Memory
+        The memory with these rows.
+    """
+    mean, std, covariance, low, high = (x.astype(np.float64) for x in outputs[:5])
+    in_range, (_, rows, rows_used) = bool(outputs[5][0]), memory.counts.tolist()
+    return Estimate(
+        names=names,
+        units=units,
+        mean=mean,
+        std=std,
+        covariance=covariance,
+        low=low,
+        high=high,
+        in_range=np.asarray(in_range),
+        prior=prior,
+        misfit=np.asarray(float(outputs[6][0])),
+        rows_used=np.asarray(int(rows_used)),
+        rows_set_aside=np.asarray(int(rows - rows_used)),
+        reason=np.asarray(int(_reason(in_range, memory))),
+    )
+
+
+def _reason(in_range: bool, memory: Memory) -> Reason:
+    """Why a set has the estimate that it has, as its graph decides."""
+    if in_range:
+        return Reason.ESTIMATED
+    readings, rows, rows_in_range = memory.counts
+    if not rows_in_range >= rows * np.float32(LEAST_SHARE_IN_RANGE):
+        return Reason.OUT_OF_RANGE
+    return Reason.INCONSISTENT if readings > 0.5 else Reason.NO_INFORMATION

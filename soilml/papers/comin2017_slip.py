@@ -14,7 +14,7 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.estimate_fusion import FusedEstimate, inverse_variance, pairwise
+from soilml.onboard.fusion_rules import FusedEstimate, inverse_variance, pairwise
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating

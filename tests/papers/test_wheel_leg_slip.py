@@ -11,8 +11,8 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.identification import identify
 from soilml.io.table import Table
-from soilml.numerics.estimate_fusion import pairwise
 from soilml.numerics.prior import Prior
+from soilml.onboard.fusion_rules import pairwise
 from soilml.physics.pull_efficiency import CLASSES
 from soilml.systems.wheel_legs.sensing.simulated_stances import FOOT
 from soilml.systems.wheel_legs.walking.geometry import wheel_leg

@@ -63,8 +63,7 @@ def goals(results: Sequence[PairedResult]) -> list[Goal]:
     - model files with a nonlinear regressor and no set posterior: RMSE within 1 % of the limit at
       one row;
     - the Bayes limit itself: 88 to 92 % coverage of 90 % highest-density regions;
-    - the prior, analytic methods, linear regression and pooled estimates are baselines without a
-      goal.
+    - the prior, analytic methods and linear regression are baselines without a goal.
 
     Parameters
     ----------

@@ -27,8 +27,6 @@ Floats = NDArray[np.float64]
 
 #: Label of the prior, and prefix of the labels of analytic methods.
 PRIOR_LABEL, ANALYTIC_PREFIX = "prior", "analytic "
-#: Suffix of a model file's label where its estimates of single rows are pooled.
-POOLED_SUFFIX = ", pooled"
 #: A user's method: slips, torques (N m) and loads (N) of one soil, each (rows,), to the mean (q,)
 #: and the standard deviation (q,) or covariance (q, q) of its parameters, in SI units.
 UserMethod = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -40,7 +38,6 @@ class MethodKind(Enum):
     BAYES_LIMIT = "exact posterior of the same set"
     PRIOR = "prior alone"
     SET_POSTERIOR = "model file, posterior of all rows of a set"
-    POOLED = "model file, estimates of single rows pooled although it has a set posterior"
     REGRESSION = "model file without a set posterior, with a nonlinear regressor"
     LINEAR_REGRESSION = "model file without a set posterior, linear regressors alone"
     ANALYTIC = "analytic identification"
@@ -181,34 +178,22 @@ def prior_method(priors: Sequence[Prior]) -> Method:
     return Method(PRIOR_LABEL, MethodKind.PRIOR, "-", (), lambda rows: estimate)
 
 
-def model_file_methods(label: str, estimator: Estimator) -> list[Method]:
-    """The methods that a model file offers: one, or two where it has two ways to combine rows.
+def model_file_method(label: str, estimator: Estimator) -> Method:
+    """A model file as a method: `Estimator.run`.
 
-    `Estimator.run` is the answer of the file. Where that is its set posterior, and the file also
-    estimates single rows, pooling those by the fusion rule is a method of its own.
+    A single row is estimated by a plain call where the file is not for sets.
     """
     inputs = ", ".join(estimator.inputs)
     channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
-    kind = classify_estimator(estimator)
+    plain = estimator.sets is None or estimator.sets.sets_only
 
-    def by(combine: Callable[..., Estimate], plain_call: bool) -> Callable[[Table], MethodEstimate]:
-        """`combine` as a method; with `plain_call` a single row is estimated by a plain call."""
+    def estimate(rows: Table) -> MethodEstimate:
+        readings = {name: rows[column(name)] for name in estimator.inputs}
+        if plain and len(rows) == 1:
+            return onboard_estimate(estimator(**{n: v[0] for n, v in readings.items()}))
+        return onboard_estimate(estimator.run(**readings))
 
-        def estimate(rows: Table) -> MethodEstimate:
-            readings = {name: rows[column(name)] for name in estimator.inputs}
-            if plain_call and len(rows) == 1:
-                return onboard_estimate(estimator(**{n: v[0] for n, v in readings.items()}))
-            return onboard_estimate(combine(**readings))
-
-        return estimate
-
-    if estimator.sets is None or estimator.sets.sets_only:
-        return [Method(label, kind, inputs, channels, by(estimator.run, True))]
-    pooled = f"{label}{POOLED_SUFFIX}"
-    return [
-        Method(pooled, MethodKind.POOLED, inputs, channels, by(estimator.pooled, True)),
-        Method(label, kind, inputs, channels, by(estimator.run, False)),
-    ]
+    return Method(label, classify_estimator(estimator), inputs, channels, estimate)
 
 
 def onboard_estimate(estimate: Estimate) -> MethodEstimate:

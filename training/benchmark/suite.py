@@ -24,7 +24,7 @@ from training.benchmark.methods import (
     MethodKind,
     UserMethod,
     analytic_method,
-    model_file_methods,
+    model_file_method,
     prior_method,
     user_methods,
 )
@@ -59,7 +59,7 @@ def benchmark_methods(
             )
     methods = [prior_method([recipe.case.prior[n] for n in SHEAR])]
     for label, estimator in (estimators or {}).items():
-        methods += model_file_methods(label, estimator)
+        methods.append(model_file_method(label, estimator))
     methods += user_methods(functions or {})
     methods += [analytic_method(recipe.case, name, SHEAR) for name in analytic]
     labels = [LIMIT_LABEL, POSTERIOR_LABEL, *(m.label for m in methods)]

@@ -32,7 +32,7 @@ from training.benchmark.methods import (
     MethodKind,
     analytic_method,
     interval_coverage,
-    model_file_methods,
+    model_file_method,
     prior_method,
 )
 
@@ -191,7 +191,7 @@ def compare(
     table = _scorable_rows(table, names)
     fast = [prior_method(prior)]
     for label, estimator in estimators.items():
-        fast += model_file_methods(label, estimator)
+        fast.append(model_file_method(label, estimator))
     slow = [analytic_method(case, name, names) for name in METHODS]
     scores = []
     for size, sets in _sets_by_size(table).items():

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
+from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.quantities import Z_90
 from training.calibration.recalibration import Metrics, compute_metrics
 from training.calibration.row_pooling import (

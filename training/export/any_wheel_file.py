@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from soilml import __version__
-from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
-from soilml.onboard.metadata.pooling_entry import write_pooling
+from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, write_pooling
 from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column

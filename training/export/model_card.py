@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.held_out_errors import HeldOutErrors
 from training.calibration.recalibration import Metrics
 from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.validation import table_of

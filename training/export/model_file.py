@@ -18,7 +18,7 @@ from soilml.errors import SoilmlError
 from soilml.io.atomic_files import atomic_output
 from soilml.io.toml_settings import Settings
 from soilml.onboard.features import READABLE, compute_features
-from soilml.onboard.metadata.pooling_entry import write_pooling
+from soilml.onboard.gaussian_pooling import write_pooling
 from soilml.onboard.model_file import FORMAT, metadata_checksum, serialise_metadata
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES

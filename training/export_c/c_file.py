@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml import __version__
-from soilml.onboard.metadata.fields import read_fields
+from soilml.onboard.metadata import read_fields
 from soilml.onboard.set_contract import MEMORY_INPUTS
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 from training.export_c.c_text import array, number

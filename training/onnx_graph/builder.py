@@ -272,6 +272,6 @@ def _read_by(node: Any) -> set[str]:
 
 def session_of(model: Any) -> Any:
     """An onnxruntime session of a model, on one thread."""
-    from soilml.onboard.session import create_session
+    from soilml.onboard.model_file import create_session
 
     return create_session(model.SerializeToString())

@@ -37,12 +37,11 @@ from soilml.errors import InputError, TableError
 from soilml.identification.trained_estimator import narrower_priors
 from soilml.io.read_table import FILLED, RUNS
 from soilml.io.table import ALL, Table
-from soilml.numerics.estimate_fusion import COVARIANCE_INTERSECTION
 from soilml.onboard.estimate import Estimate
-from soilml.onboard.estimator import Estimator
-from soilml.onboard.fusion.joint_errors import are_comparable
+from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
+from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
+from soilml.onboard.joint_errors import are_comparable
 from soilml.onboard.multi_sensor import CORRELATED, fuse_estimates
-from soilml.onboard.row_estimates import ROWS_PER_CALL
 from soilml.optional_imports import need
 from soilml.quantities import column
 from soilml.report.page import Report

@@ -1,6 +1,5 @@
 """A soil that is followed along a drive: readings as they come, checked one by one."""
 
-from soilml.onboard.tracking.soil_tracker import SoilTracker
-from soilml.onboard.tracking.tracker_state import Event, TrackerState
+from soilml.onboard.tracking.soil_tracker import Event, SoilTracker, TrackerState
 
 __all__ = ["Event", "SoilTracker", "TrackerState"]

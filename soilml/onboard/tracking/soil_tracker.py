@@ -3,33 +3,87 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Any, final
 
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.features import READABLE, as_number
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
-from soilml.onboard.tracking.joint_fit import JointFit, Rows, fit_memory, fit_rows
-from soilml.onboard.tracking.misfit_limits import (
+from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, Arrays, FilterState, RowWindow
+from soilml.onboard.tracking.misfit import (
     ERROR_DEGREES,
+    JointFit,
+    Rows,
     chi_squared_limit,
     excess_noise,
+    fit_memory,
+    fit_rows,
     over_median,
     usual_excess,
 )
-from soilml.onboard.tracking.row_window import RowWindow
-from soilml.onboard.tracking.rows_in_question import GIVE_UP_AFTER
-from soilml.onboard.tracking.tracker_memory import Arrays, TrackerMemory
-from soilml.onboard.tracking.tracker_state import Event, TrackerState
 
 #: Blocks of recent rows that are compared with all earlier ones, one number after another.
 RECENT_BLOCKS = (2, 4, 8)
-#: Rows that a tracker remembers unless told otherwise.
-USUAL_LENGTH = 100
+#: Rows that a tracker remembers by default.
+DEFAULT_LENGTH = 100
+
+
+class Event(IntEnum):
+    """What a row was found to be. Numbers are never reused."""
+
+    #: Agrees with the rows before, and is used.
+    ACCEPTED = 0
+    #: Disagrees with the rows before: a glitch, or the first row of another soil. Not used.
+    SET_ASIDE = 1
+    #: With this row there are enough of another soil; the rows before them are forgotten.
+    SOIL_CHANGED = 2
+    #: Recent rows together disagree with earlier ones, which are forgotten.
+    DRIFT = 3
+    #: A sensor repeats its reading while slip or load change. Not used.
+    STUCK = 4
+    #: All readings are those of the row before, which counts once. Not used.
+    REPEATED = 5
+    #: Not a number, impossible, or out of the range of the file. Not used.
+    UNUSABLE = 6
+
+
+@dataclass(frozen=True)
+class TrackerState:
+    """The soil after a row of a drive.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        From the rows that are remembered; the prior where there are none.
+    event : Event
+        What the row was found to be.
+    words : str
+        The same as a sentence.
+    rows_since_change : int
+        Rows used since the start, or since the first row of the present soil.
+    rows_remembered : int
+        The last ones of them, on which the estimate rests.
+    rows_in_question : int
+        Rows set aside of late. They are glitches, or the first ones of another soil: the estimate
+        may be that of the soil before while this is not zero.
+    drifting : bool
+        Whether a drift was found within as many rows as are remembered at most: the estimate may
+        lag behind, and it is wrong if what drifts is a sensor.
+    """
+
+    estimate: Estimate
+    event: Event
+    words: str
+    rows_since_change: int
+    rows_remembered: int
+    rows_in_question: int
+    drifting: bool
 
 
 @final
@@ -71,16 +125,16 @@ class SoilTracker:
     length: int
     state: TrackerState
     _empty: Memory
-    _memory: TrackerMemory
+    _filter: FilterState
     _fit: JointFit
 
-    def __init__(self, estimator: Estimator, length: int = USUAL_LENGTH) -> None:
+    def __init__(self, estimator: Estimator, length: int = DEFAULT_LENGTH) -> None:
         if isinstance(length, bool) or not isinstance(length, int | np.integer) or length < 16:
             raise InputError(f"length is {length!r}; needed is a whole number of 16 or more rows")
         self.estimator = estimator
         self.length = int(length)
         self._empty = estimator.start()
-        self._begin(TrackerMemory(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
 
     def read(self, **measured: float) -> TrackerState:
         """The state after one more row.
@@ -97,29 +151,29 @@ class SoilTracker:
         row = self._row(measured)
         if isinstance(row, str):
             return self._answer(Event.UNUSABLE, row)
-        repeated = self._memory.repeated
+        repeated = self._filter.repeated
         if repeated.repeats(row):
             return self._answer(Event.REPEATED, "all readings are those of the row before")
-        self._memory = replace(self._memory, repeated=repeated.with_row(row))
-        if stuck := self._memory.repeated.stuck:
-            question = self._memory.question.without_reading(stuck, float(row[stuck][0]))
-            self._memory = replace(self._memory, question=question)
+        self._filter = replace(self._filter, repeated=repeated.with_row(row))
+        if stuck := self._filter.repeated.stuck:
+            question = self._filter.question.without_reading(stuck, float(row[stuck][0]))
+            self._filter = replace(self._filter, question=question)
             words = f"{stuck} repeats {row[stuck][0]:g} while slip or load change: not used"
             return self._answer(Event.STUCK, words)
         return self._check(row)
 
     def restart(self) -> TrackerState:
         """Forget all rows, because the soil is known to be another one."""
-        self._begin(TrackerMemory(RowWindow.empty(self._empty, self.length)))
+        self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
         return self.state
 
     def save(self) -> Arrays:
         """All that is remembered as arrays, for `numpy.savez`; see `restore`."""
-        return self._memory.as_arrays(self.estimator.memory_id)
+        return self._filter.as_arrays(self.estimator.memory_id)
 
     @staticmethod
     def restore(
-        estimator: Estimator, arrays: Mapping[str, Any], length: int = USUAL_LENGTH
+        estimator: Estimator, arrays: Mapping[str, Any], length: int = DEFAULT_LENGTH
     ) -> SoilTracker:
         """The tracker that `save` wrote, also in another process.
 
@@ -136,19 +190,19 @@ class SoilTracker:
         0
         """
         tracker = SoilTracker(estimator, length)
-        memory = TrackerMemory.from_arrays(arrays, estimator.memory_id, tracker._empty)
-        if memory.window.rows_per_block != tracker._memory.window.rows_per_block:
+        state = FilterState.from_arrays(arrays, estimator.memory_id, tracker._empty)
+        if state.window.rows_per_block != tracker._filter.window.rows_per_block:
             raise InputError(
                 f"length is {length}, but this state of a tracker has blocks of "
-                f"{memory.window.rows_per_block} rows: give the length that it was made with"
+                f"{state.window.rows_per_block} rows: give the length that it was made with"
             )
-        tracker._begin(memory)
+        tracker._begin(state)
         return tracker
 
-    def _begin(self, memory: TrackerMemory) -> None:
-        """Continue from a memory."""
-        self._memory = memory
-        self._fit = fit_memory(self.estimator, memory.window.memory)
+    def _begin(self, state: FilterState) -> None:
+        """Continue from a state of the filter."""
+        self._filter = state
+        self._fit = fit_memory(self.estimator, state.window.memory)
         self._answer(Event.ACCEPTED, "no row was read since the start")
 
     def _row(self, measured: Mapping[str, Any]) -> Rows | str:
@@ -167,7 +221,7 @@ class SoilTracker:
 
     def _check(self, row: Rows) -> TrackerState:
         """Compare a row with those remembered."""
-        before, window = self._fit, self._memory.window
+        before, window = self._fit, self._filter.window
         fit = fit_rows(self.estimator, row, window.memory)
         readings = fit.readings - before.readings
         if readings < 0.5:
@@ -175,18 +229,18 @@ class SoilTracker:
             return self._answer(Event.UNUSABLE, words)
         misfit = fit.misfit - before.misfit
         limit = self._excess(before.misfit, before.readings) * chi_squared_limit(readings)
-        memory = self._memory.with_increase(over_median(misfit, readings))
+        state = self._filter.with_increase(over_median(misfit, readings))
         if misfit > limit and window.blocks:
-            question = memory.question.with_row(row, True)
-            self._memory = replace(memory, question=question)
+            question = state.question.with_row(row, True)
+            self._filter = replace(state, question=question)
             return self._other_soil(f"its misfit {misfit:.0f} is above {limit:.0f}")
-        question = memory.question.with_row(row, False) if memory.question.rows else memory.question
-        since_drift = memory.rows_since_drift
-        self._memory = replace(
-            memory,
+        question = state.question.with_row(row, False) if state.question.rows else state.question
+        since_drift = state.rows_since_drift
+        self._filter = replace(
+            state,
             window=window.with_rows(fit.memory),
             question=question,
-            rows_since_change=memory.rows_since_change + 1,
+            rows_since_change=state.rows_since_change + 1,
             rows_since_drift=since_drift + 1 if 0 <= since_drift < self.length else -1,
         )
         self._fit = fit
@@ -194,7 +248,7 @@ class SoilTracker:
 
     def _other_soil(self, words: str) -> TrackerState:
         """Whether the rows in question are of another soil."""
-        question = self._memory.question
+        question = self._filter.question
         for rows in question.candidates():
             fit = fit_rows(self.estimator, rows, self._empty)
             degrees = max(fit.readings - len(self.estimator.names), 1.0)
@@ -208,9 +262,9 @@ class SoilTracker:
 
     def _begin_with(self, rows: Rows, fit: JointFit, agree: bool) -> TrackerState:
         """Forget all but some rows in question."""
-        count, earlier = len(rows["slip"]), self._memory.window.memory.rows
+        count, earlier = len(rows["slip"]), self._filter.window.memory.rows
         window = RowWindow.empty(self._empty, self.length).with_rows(fit.memory)
-        self._memory = self._memory.of_another_soil(window)
+        self._filter = self._filter.of_another_soil(window)
         self._fit = fit
         each_other = "agree" if agree else "do not agree either"
         words = f"the last {count} rows {each_other} with each other, and not with {earlier} before"
@@ -218,11 +272,11 @@ class SoilTracker:
 
     def _look_for_drift(self) -> TrackerState:
         """Compare recent rows with earlier ones, and forget what is too old."""
-        memory, words = self._memory, "agrees with the rows before"
-        window, blocks = memory.window, len(memory.window.blocks)
+        state, words = self._filter, "agrees with the rows before"
+        window, blocks = state.window, len(state.window.blocks)
         splits = [count for count in RECENT_BLOCKS if count < blocks]
-        if splits and not memory.question.rows:
-            first = blocks - splits[memory.rows_since_change % len(splits)]
+        if splits and not state.question.rows:
+            first = blocks - splits[state.rows_since_change % len(splits)]
             recent = window.since(first)
             old = fit_memory(self.estimator, window.before(first))
             new = fit_memory(self.estimator, recent.memory)
@@ -231,7 +285,7 @@ class SoilTracker:
             excess = self._excess(apart, self._fit.readings, 2 * unknowns)
             limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES)
             if self._fit.misfit - apart > limit:
-                self._memory = replace(memory, window=recent, rows_since_drift=0)
+                self._filter = replace(state, window=recent, rows_since_drift=0)
                 self._fit = new
                 words = (
                     f"the last {recent.memory.rows} rows together differ from {old.memory.rows} "
@@ -239,25 +293,25 @@ class SoilTracker:
                 )
                 return self._answer(Event.DRIFT, words)
         if window.is_full:
-            self._memory = replace(memory, window=window.since(1))
-            self._fit = fit_memory(self.estimator, self._memory.window.memory)
+            self._filter = replace(state, window=window.since(1))
+            self._fit = fit_memory(self.estimator, self._filter.window.memory)
         return self._answer(Event.ACCEPTED, words)
 
     def _excess(self, misfit: float, readings: float, unknowns: int | None = None) -> float:
         """Variance of residuals over that of the stated noise, 1 or more: of a fit, or of rows."""
         unknowns = len(self.estimator.names) if unknowns is None else unknowns
-        usual = usual_excess(self._memory.increases)
+        usual = usual_excess(self._filter.increases)
         return max(excess_noise(misfit, readings, unknowns), usual)
 
     def _answer(self, event: Event, words: str) -> TrackerState:
-        memory = self._memory
+        state = self._filter
         self.state = TrackerState(
             estimate=self._fit.estimate,
             event=event,
             words=words,
-            rows_since_change=memory.rows_since_change,
-            rows_remembered=memory.window.memory.rows,
-            rows_in_question=memory.question.count,
-            drifting=memory.rows_since_drift >= 0,
+            rows_since_change=state.rows_since_change,
+            rows_remembered=state.window.memory.rows,
+            rows_in_question=state.question.count,
+            drifting=state.rows_since_drift >= 0,
         )
         return self.state

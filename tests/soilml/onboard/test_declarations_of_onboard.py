@@ -1,7 +1,7 @@
 """What the room declares: numbers that logs hold."""
 
 from soilml.onboard.estimate import Reason
-from soilml.onboard.tracking.tracker_state import Event
+from soilml.onboard.tracking.soil_tracker import Event
 
 
 def test_numbers_of_flags_and_events_stay():

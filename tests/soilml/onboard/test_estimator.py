@@ -9,7 +9,7 @@ import pytest
 
 from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
-from soilml.onboard.metadata.pooling_entry import read_pooling, write_pooling
+from soilml.onboard.gaussian_pooling import read_pooling, write_pooling
 from soilml.onboard.model_file import find_model, released_models
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_joint_errors import Sensors
 
-from soilml.numerics.estimate_fusion import best_linear
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
-from soilml.onboard.fusion.joint_errors import (
+from soilml.onboard.fusion_rules import best_linear
+from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.joint_errors import (
     DISAGREEMENT,
     LEAST_AVERAGES,
     JointErrors,
@@ -17,8 +17,7 @@ from soilml.onboard.fusion.joint_errors import (
     _reach,
     joint_errors,
 )
-from soilml.onboard.fusion.narrower_prior import _without_prior, within_box
-from soilml.onboard.fusion.truncated_normal import truncated_normal
+from soilml.onboard.narrower_prior import _without_prior, truncated_normal, within_box
 
 ONE = np.ones(2)
 RULE = JointErrors(

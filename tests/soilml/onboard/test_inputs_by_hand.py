@@ -20,7 +20,7 @@ from soilml.onboard.multi_sensor import (
     CONTRADICTION,
     SAME_PRIOR,
     _contradictory,
-    _fuse,
+    _fuse_by_variance,
     _mean_correlation,
     fuse_estimates,
 )
@@ -163,10 +163,12 @@ def test_correlations_are_averaged_and_standard_deviations_fused():
     correlation = _mean_correlation(covariance)
     assert correlation[0] == pytest.approx(np.asarray([[1.0, 0.2], [0.2, 1.0]]))
     mean = np.asarray([[[1.0, 10.0]], [[2.0, 12.0]]])
-    fused_mean, fused = _fuse(mean, covariance, PRIOR, "inverse-variance")
+    fused_mean, fused, low, high = _fuse_by_variance(mean, covariance, PRIOR, "inverse-variance")
     std = np.asarray([np.sqrt(0.8), np.sqrt(0.5)])
     assert fused_mean[0] == pytest.approx([(1.0 / 4.0 + 2.0) / 1.25, 11.0])
     assert fused[0] == pytest.approx(correlation[0] * np.outer(std, std))
+    assert 0.5 * (low + high) == pytest.approx(fused_mean)
+    assert (high - low)[0] == pytest.approx(2.0 * 1.645 * std, rel=1e-3)
 
 
 def test_fused_rows_keep_shape_ends_and_reasons():

@@ -7,8 +7,8 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
-from soilml.onboard.fusion.joint_errors import are_comparable, joint_errors
+from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.2]), np.asarray([-0.9]), np.asarray([1.5]))

@@ -7,9 +7,8 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.memory import Memory, check_memory
-from soilml.onboard.tracking.row_window import RowWindow
-from soilml.onboard.tracking.tracker_memory import TrackerMemory
-from soilml.onboard.tracking.tracker_state import Event
+from soilml.onboard.tracking.filter_state import FilterState, RowWindow
+from soilml.onboard.tracking.soil_tracker import Event
 
 
 def test_a_memory_must_have_finite_numbers_of_its_file():
@@ -33,19 +32,19 @@ def test_a_memory_must_have_finite_numbers_of_its_file():
 def test_a_state_of_a_tracker_must_have_finite_numbers(part):
     start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
     window = RowWindow.empty(start, 48).with_rows(replace(start, system=np.ones((2, 3))))
-    arrays = TrackerMemory(window).as_arrays("file")
-    again = TrackerMemory.from_arrays(arrays, "file", start)
+    arrays = FilterState(window).as_arrays("file")
+    again = FilterState.from_arrays(arrays, "file", start)
     assert again.window.memory.system.tolist() == window.memory.system.tolist()
     assert (again.rows_since_change, again.rows_since_drift, again.increases) == (0, -1, ())
     arrays[part] = arrays[part].astype(float)
     arrays[part][0, 1] = np.inf
     with pytest.raises(InputError, match="numbers that are not finite"):
-        TrackerMemory.from_arrays(arrays, "file", start)
+        FilterState.from_arrays(arrays, "file", start)
 
 
 def test_increases_of_the_last_sixteen_rows_are_kept():
     start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
-    memory = TrackerMemory(RowWindow.empty(start, 48), rows_since_change=7, rows_since_drift=3)
+    memory = FilterState(RowWindow.empty(start, 48), rows_since_change=7, rows_since_drift=3)
     for i in range(20):
         memory = memory.with_increase(float(i))
     assert memory.increases == tuple(float(i) for i in range(4, 20))
@@ -68,7 +67,7 @@ def test_the_numbers_of_events_are_fixed():
 def test_rows_in_question_are_remembered_with_their_flags():
     start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
     row = {"slip": np.asarray([0.1]), "load": np.asarray([60.0])}
-    memory = TrackerMemory(RowWindow.empty(start, 48))
+    memory = FilterState(RowWindow.empty(start, 48))
     question = memory.question.with_row(row, True).with_row(row, False)
     repeated = memory.repeated.with_row(row)
     arrays = replace(memory, question=question, repeated=repeated).as_arrays("file")
@@ -76,9 +75,9 @@ def test_rows_in_question_are_remembered_with_their_flags():
     empty = memory.as_arrays("file")
     assert empty["disagree"].dtype == np.bool_ and empty["disagree"].size == 0
     assert empty["lengths"].dtype == empty["numbers"].dtype == np.int64
-    again = TrackerMemory.from_arrays(arrays, "file", start)
+    again = FilterState.from_arrays(arrays, "file", start)
     assert again.question.disagree == (True, False) and len(again.question.rows) == 2
     question = question.with_row(row, True).with_row(row, True)
     stray = replace(memory, question=question, repeated=repeated)
-    again = TrackerMemory.from_arrays(stray.as_arrays("file"), "file", start)
+    again = FilterState.from_arrays(stray.as_arrays("file"), "file", start)
     assert again.question.in_succession == question.in_succession == 2

@@ -7,7 +7,6 @@ import pytest
 from conftest import simulated_run
 
 from soilml.errors import InputError
-from soilml.onboard.common_errors import error_columns
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
@@ -15,6 +14,7 @@ from soilml.onboard.set_contract import (
     MODEL_ERROR_INPUT,
     SENSOR_ERROR_COLUMNS,
 )
+from soilml.onboard.set_posterior import error_columns
 from soilml.physics.operating_point import Operating
 
 EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)

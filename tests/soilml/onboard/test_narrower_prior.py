@@ -12,7 +12,7 @@ from soilml.cli import main
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Reason
-from soilml.onboard.fusion.truncated_normal import truncated_normal
+from soilml.onboard.narrower_prior import truncated_normal
 from soilml.quantities import SHEAR
 
 EXACT = {"slip_bias": 0.0, "load_gain": 0.0, "torque_gain": 0.0}

@@ -6,10 +6,15 @@ import pytest
 from soilml.numerics.chi_squared import chi_squared_quantile
 from soilml.onboard import Estimator
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.fusion.narrower_prior import NO_INFORMATION, _without_prior, within_box
-from soilml.onboard.fusion.truncated_normal import _quantiles, truncated_normal
 from soilml.onboard.gaussian_pooling import LEAST_STD_RATIO, RowInformation, RunConditions
-from soilml.onboard.tracking.misfit_limits import (
+from soilml.onboard.narrower_prior import (
+    NO_INFORMATION,
+    _quantiles,
+    _without_prior,
+    truncated_normal,
+    within_box,
+)
+from soilml.onboard.tracking.misfit import (
     chi_squared_limit,
     excess_noise,
     over_median,

@@ -8,8 +8,7 @@ from onnx.external_data_helper import set_external_data
 
 from soilml.errors import ModelFileError
 from soilml.onboard import Estimator
-from soilml.onboard.model_file import metadata_checksum, serialise_metadata
-from soilml.onboard.session import refers_to_files
+from soilml.onboard.model_file import metadata_checksum, refers_to_files, serialise_metadata
 from soilml.onboard.set_contract import INTERFACE
 
 

@@ -26,7 +26,6 @@ from training.benchmark.methods import (
     MethodKind,
     classify_estimator,
     gaussian_estimate,
-    model_file_methods,
 )
 from training.benchmark.suite import (
     LIMIT_LABEL,
@@ -213,14 +212,6 @@ def test_the_exact_posterior_meets_the_goals_and_the_prior_misses_them(results):
     by_criterion = {g.criterion: g for g in goals(prior) if g.method == "mine"}
     assert not by_criterion["every size: RMSE / limit <= 1.05"].met
     assert not next(g for what, g in by_criterion.items() if what.startswith("18 rows")).met
-
-
-def test_a_set_posterior_with_single_row_estimates_is_two_methods(small_model, recipe):
-    (only,) = model_file_methods("small", Estimator.load(small_model))
-    assert (only.label, only.kind) == ("small", MethodKind.REGRESSION)
-    both = model_file_methods("wheel", Estimator.load(EXPORTED / "wheel.onnx"))
-    assert [m.label for m in both] == ["wheel, pooled", "wheel"]
-    assert [m.kind for m in both] == [MethodKind.POOLED, MethodKind.SET_POSTERIOR]
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 
 from soilml import Estimator
-from soilml.numerics.estimate_fusion import RULES
+from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.features import compute_features
 from training.dataset import read_dataset
 from training.export.model_file import export_model

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError
-from soilml.numerics.estimate_fusion import FusedEstimate, best_linear, inverse_variance, pairwise
+from soilml.onboard.fusion_rules import FusedEstimate, best_linear, inverse_variance, pairwise
 from soilml.systems.wheel_legs.sensing.simulated_stances import StanceReadings
 from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, PRESSURE
 

@@ -16,9 +16,8 @@ from driven_days import SLIP_STD, Kind, simulate_day
 from soilml import Estimator, SoilTracker
 from soilml.errors import InputError
 from soilml.onboard.tracking import Event, soil_tracker
-from soilml.onboard.tracking.misfit_limits import chi_squared_limit
-from soilml.onboard.tracking.row_window import RowWindow
-from soilml.onboard.tracking.tracker_memory import TrackerMemory
+from soilml.onboard.tracking.filter_state import FilterState, RowWindow
+from soilml.onboard.tracking.misfit import chi_squared_limit
 
 
 @pytest.fixture(scope="module")
@@ -237,7 +236,7 @@ def test_drift_is_a_misfit_of_all_rows_above_that_of_their_parts(
     tracker = SoilTracker(estimator)
     start = tracker.estimator.start()
     window = RowWindow((start,) * 4, start, 4)
-    tracker._memory = TrackerMemory(window, rows_since_change=16)
+    tracker._filter = FilterState(window, rows_since_change=16)
     part = SimpleNamespace(misfit=10.0, readings=13.0, memory=start)
     monkeypatch.setattr(soil_tracker, "fit_memory", lambda *_: part)
     monkeypatch.setattr(SoilTracker, "_answer", lambda self, event, words: event)
@@ -245,4 +244,4 @@ def test_drift_is_a_misfit_of_all_rows_above_that_of_their_parts(
     misfit = 20.0 + factor * chi_squared_limit(4.0)
     tracker._fit = SimpleNamespace(misfit=misfit, readings=26.0)
     assert tracker._look_for_drift() == event
-    assert (tracker._memory.window.blocks == window.blocks) == (event == Event.ACCEPTED)
+    assert (tracker._filter.window.blocks == window.blocks) == (event == Event.ACCEPTED)

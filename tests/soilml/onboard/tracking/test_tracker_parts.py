@@ -8,16 +8,20 @@ import pytest
 from scipy.stats import chi2, norm
 
 from soilml.onboard.memory import Memory
-from soilml.onboard.tracking.misfit_limits import (
+from soilml.onboard.tracking.filter_state import (
+    BLOCKS,
+    MOST_ROWS,
+    RepeatedReadings,
+    RowsInQuestion,
+    RowWindow,
+)
+from soilml.onboard.tracking.misfit import (
     QUANTILE,
     chi_squared_limit,
     excess_noise,
     over_median,
     usual_excess,
 )
-from soilml.onboard.tracking.repeated_readings import RepeatedReadings
-from soilml.onboard.tracking.row_window import BLOCKS, RowWindow
-from soilml.onboard.tracking.rows_in_question import MOST_ROWS, RowsInQuestion
 
 
 def row(torque, slip=0.3, load=60.0):

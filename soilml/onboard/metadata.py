@@ -16,7 +16,7 @@ import numpy as np
 
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.features import READABLE
-from soilml.onboard.metadata.pooling_entry import read_pooling
+from soilml.onboard.gaussian_pooling import read_pooling
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import QUANTITIES
 

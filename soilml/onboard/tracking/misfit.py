@@ -1,12 +1,19 @@
-"""How large a misfit must be before rows are taken for those of different soils."""
+"""The misfit of a set of rows, and how large it must be for rows of different soils."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from soilml.errors import InputError
 from soilml.numerics.chi_squared import chi_squared_quantile
+from soilml.onboard.estimate import Estimate
+from soilml.onboard.estimator import Estimator
+from soilml.onboard.memory import Memory
+from soilml.onboard.set_posterior import estimate_of_set
 
 #: Standard normal quantile beyond which a misfit is not chance: 1 in 10 000.
 QUANTILE = 3.72
@@ -15,10 +22,45 @@ QUANTILE = 3.72
 ERROR_DEGREES = 1.0
 #: Readings, and rows, with the stated noise that are assumed before the first one.
 ASSUMED_READINGS, ASSUMED_ROWS = 8.0, 3
-#: Rows whose misfit tells how far the model is usually off.
+#: Rows from whose misfit the size of the model error is estimated.
 ROWS_JUDGED = 16
 #: Most variance of the residuals over that of the stated noise for which a model is still used.
 MOST_EXCESS = 10.0
+#: Row inputs of the graph (m,) by name.
+Rows = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """The estimate from a set of rows, and the memory with the new rows, not packed."""
+
+    estimate: Estimate
+    memory: Memory
+
+    @property
+    def misfit(self) -> float:
+        """Least sum of squared residuals."""
+        return float(self.estimate.misfit)
+
+    @property
+    def readings(self) -> float:
+        """Readings that take part."""
+        return float(self.memory.counts[0])
+
+
+def fit_rows(estimator: Estimator, rows: Rows, memory: Memory) -> JointFit:
+    """The fit to the rows of a packed memory and to further ones (m,); m may be 0."""
+    if estimator.sets is None:
+        raise InputError(f"{estimator.path} has no set posterior; train it with [set_posterior]")
+    found, after = estimator.sets.update(estimator.session, rows, memory)
+    names, units, prior = estimator.names, estimator.units, estimator.prior
+    return JointFit(estimate_of_set(names, units, prior, found, after), after)
+
+
+def fit_memory(estimator: Estimator, memory: Memory) -> JointFit:
+    """The fit to the rows of a memory."""
+    nothing: dict[str, list[float]] = {"slip": [], "torque": [], "load": []}
+    return fit_rows(estimator, estimator.sets.rows(nothing) if estimator.sets else {}, memory)
 
 
 def chi_squared_limit(degrees: float) -> float:
@@ -30,7 +72,7 @@ def excess_noise(misfit: float, readings: float, unknowns: int) -> float:
     """Variance of the residuals of a fit over that of the stated noise.
 
     A model that is wrong by some per cent leaves residuals above the noise of the sensors in every
-    row. Only what exceeds them tells that a row is of another soil.
+    row. Only what exceeds them is evidence of another soil.
     """
     freedom = max(readings - unknowns, 0.0) + ASSUMED_READINGS
     return (misfit + ASSUMED_READINGS) / freedom

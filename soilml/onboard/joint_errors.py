@@ -1,4 +1,4 @@
-"""How the errors of several model files belong together, from their common held-out rows."""
+"""Fusion by the correlation of the errors of model files, which their held-out rows show."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.estimate_fusion import best_linear
-from soilml.onboard.fusion.held_out_errors import HeldOutErrors
+from soilml.onboard.fusion_rules import best_linear
+from soilml.onboard.held_out_errors import HeldOutErrors
 
 Floats = NDArray[np.float64]
 
@@ -232,3 +232,57 @@ def _positive(correlation: Floats) -> Floats:
     repaired = (vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T
     size = np.sqrt(np.diag(repaired))
     return np.asarray(repaired / np.outer(size, size))
+
+
+@dataclass(frozen=True)
+class FusedRows:
+    """Mean, standard deviation, ends of the 90 % interval, and disagreement, each (n, q).
+
+    The disagreement is the largest difference between two files, in standard deviations of that
+    difference; 0 for readings of one file.
+    """
+
+    mean: Floats
+    std: Floats
+    low: Floats
+    high: Floats
+    disagreement: Floats
+
+
+def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> FusedRows:
+    """Fuse m readings by variance and the correlation of their errors.
+
+    Readings of the same file are averaged first: what they have in common of their error, which
+    the file carries, does not average out. The averages of different files are then fused by
+    `JointErrors`.
+
+    Parameters
+    ----------
+    mean, std : ndarray, shape (m, n, q)
+        Estimates of the m readings.
+    files : sequence of HeldOutErrors
+        Of the file that each reading was estimated by, (m,); `are_comparable` must hold.
+
+    Raises
+    ------
+    ValueError
+        Where the files have too few held-out rows in common.
+    """
+    distinct = tuple(dict.fromkeys(files))
+    members = [[i for i, other in enumerate(files) if other == file] for file in distinct]
+    repeated = [file.repeated(len(m)) for file, m in zip(distinct, members, strict=True)]
+    ratio = np.stack([r for r, _ in repeated])  # (files, q)
+    means = np.stack([mean[m].mean(axis=0) for m in members])
+    stds = np.stack([std[m].mean(axis=0) for m in members]) * ratio[:, None, :]
+    if len(distinct) == 1:
+        half = repeated[0][1] * stds[0]
+        return FusedRows(means[0], stds[0], means[0] - half, means[0] + half, 0.0 * half)
+    rules = joint_errors(distinct)
+    if rules is None:
+        raise ValueError("the files have too few held-out rows in common")
+    count = float(np.exp(np.mean([np.log(len(m)) for m in members])))
+    columns = []
+    for k, rule in enumerate(rules):
+        fused, spread, disagreement = rule.fuse(means[..., k], stds[..., k], ratio[:, k], count)
+        columns.append((fused, spread, *rule.interval(fused, spread, count), disagreement))
+    return FusedRows(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import minimize
 
 from soilml.errors import InputError
-from soilml.numerics.estimate_fusion import (
+from soilml.onboard.fusion_rules import (
     RULES,
     best_linear,
     covariance_intersection,

@@ -10,7 +10,7 @@ from compiled_c import ROOT
 from soilml import Estimator
 from soilml.cli import main
 from soilml.errors import ModelFileError
-from soilml.onboard.metadata.fields import is_plain_name
+from soilml.onboard.metadata import is_plain_name
 from soilml.onboard.model_file import metadata_checksum, released_models, serialise_metadata
 
 RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,60,2.6\n"

@@ -1,1 +1,0 @@
-"""Fusion of estimates whose errors are known from common held-out rows."""

@@ -1,0 +1,321 @@
+"""State of a tracker: the rows remembered, rows in question, readings that repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.onboard.memory import Memory
+from soilml.onboard.set_contract import ABSENT_STD, OPTIONAL_READINGS
+from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
+
+#: Blocks of a window that is full; one more grows until the oldest is forgotten.
+BLOCKS = 16
+#: Rows after which one that disagreed is a glitch.
+MOST_ROWS = 8
+#: Rows that must disagree with those before, and agree with each other, for another soil.
+LEAST_ROWS = 3
+#: Rows in succession that disagree with those before, after which these are given up even if the
+#: new ones do not agree with each other.
+GIVE_UP_AFTER = 25
+#: Sensors that can be found stuck. Slip and load are often set, and then constant by intention.
+WATCHED = ("torque", *OPTIONAL_READINGS)
+#: Exact repetitions in succession after which a sensor is stuck.
+REPETITIONS = 2
+Arrays = dict[str, NDArray[Any]]
+
+#: Version of the arrays.
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class RowWindow:
+    """Memories of consecutive rows, and the memory of all of them.
+
+    All rows of a window have the same weight, as in the likelihood. With weights that fade
+    exponentially, the posterior would claim twice the variance that the estimate has.
+
+    Parameters
+    ----------
+    blocks : tuple of Memory
+        Consecutive rows, the oldest first; the last grows.
+    memory : Memory
+        All rows of the blocks, packed.
+    rows_per_block : int
+        Rows after which another block begins.
+    """
+
+    blocks: tuple[Memory, ...]
+    memory: Memory
+    rows_per_block: int
+
+    @staticmethod
+    def empty(start: Memory, length: int) -> RowWindow:
+        """A window that remembers between `length` rows and a block more."""
+        return RowWindow((), start, -(-length // BLOCKS))
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the oldest block is to be forgotten."""
+        return len(self.blocks) > BLOCKS + 1
+
+    def with_rows(self, after: Memory) -> RowWindow:
+        """The window with further rows, from its memory after them, not packed."""
+        system = after.system[len(self.memory.system) :]
+        added = replace(after, system=system, counts=after.counts - self.memory.counts)
+        if not self.blocks or self.blocks[-1].rows >= self.rows_per_block:
+            blocks = (*self.blocks, added)
+        else:
+            blocks = (*self.blocks[:-1], join((self.blocks[-1], added)))
+        return replace(self, blocks=blocks, memory=after.packed())
+
+    def since(self, block: int) -> RowWindow:
+        """The window without the blocks before this one."""
+        blocks = self.blocks[block:]
+        return replace(self, blocks=blocks, memory=join(blocks))
+
+    def before(self, block: int) -> Memory:
+        """The memory of the rows before this block."""
+        return join(self.blocks[:block])
+
+
+def join(memories: Sequence[Memory]) -> Memory:
+    """The memory of the rows of one or more others."""
+    system = np.concatenate([memory.system for memory in memories])
+    counts = np.stack([memory.counts for memory in memories]).sum(axis=0).astype(np.float32)
+    return replace(memories[0], system=system, counts=counts).packed()
+
+
+@dataclass(frozen=True)
+class RowsInQuestion:
+    """The last rows since the first of them that disagreed with those before.
+
+    Parameters
+    ----------
+    rows : tuple of Rows
+        At most `MOST_ROWS` rows.
+    disagree : tuple of bool
+        Whether each of them disagrees; the first does.
+    in_succession : int
+        Rows without one that agrees, up to now.
+    """
+
+    rows: tuple[Rows, ...] = ()
+    disagree: tuple[bool, ...] = ()
+    in_succession: int = 0
+
+    @property
+    def count(self) -> int:
+        """Rows that disagree."""
+        return sum(self.disagree)
+
+    def with_row(self, row: Rows, disagrees: bool) -> RowsInQuestion:
+        """These rows and another one."""
+        rows, flags = (*self.rows, row)[-MOST_ROWS:], (*self.disagree, disagrees)[-MOST_ROWS:]
+        first = flags.index(True) if any(flags) else len(flags)
+        return RowsInQuestion(
+            rows[first:], flags[first:], self.in_succession + 1 if disagrees else 0
+        )
+
+    def without_reading(self, name: str, value: float) -> RowsInQuestion:
+        """These rows without those of one reading, which proved to be stuck."""
+        found = RowsInQuestion()
+        for row, disagrees in zip(self.rows, self.disagree, strict=True):
+            if row[name][0] != value:
+                found = found.with_row(row, disagrees)
+        return found
+
+    def candidates(self) -> list[Rows]:
+        """Rows (m,) that may be the first of another soil: all, and the last ones.
+
+        The last ones are those since the last row that agreed with the rows before, as rows of
+        another soil do at some slips and loads.
+        """
+        if self.count < LEAST_ROWS:
+            return []
+        last = min(self.in_succession, len(self.rows))
+        if last == len(self.rows):
+            last = LEAST_ROWS
+        lengths = {len(self.rows), last} if last >= LEAST_ROWS else {len(self.rows)}
+        return [joined(self.rows[-n:]) for n in sorted(lengths, reverse=True)]
+
+
+def joined(rows: Sequence[Rows]) -> Rows:
+    """Several rows as one set of row inputs."""
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
+@dataclass(frozen=True)
+class RepeatedReadings:
+    """The row before, and how often each watched reading was repeated in succession."""
+
+    previous: Rows | None = None
+    times: tuple[int, ...] = (0,) * len(WATCHED)
+
+    def repeats(self, row: Rows) -> bool:
+        """Whether a row is the row before once more."""
+        before = self.previous
+        return before is not None and all(
+            row[n][0] == before[n][0] for n in ("slip", "load", *WATCHED)
+        )
+
+    def with_row(self, row: Rows) -> RepeatedReadings:
+        """The counts after another row."""
+        before = self.previous
+        if before is None:
+            return RepeatedReadings(row)
+        return RepeatedReadings(
+            row,
+            tuple(
+                times + 1 if _measured(row, n) and row[n][0] == before[n][0] else 0
+                for n, times in zip(WATCHED, self.times, strict=True)
+            ),
+        )
+
+    @property
+    def stuck(self) -> str | None:
+        """The first sensor that is stuck."""
+        names = (n for n, t in zip(WATCHED, self.times, strict=True) if t >= REPETITIONS)
+        return next(names, None)
+
+
+def _measured(row: Rows, name: str) -> bool:
+    return bool(row[f"{name}_std"][0] < ABSENT_STD)
+
+
+@dataclass(frozen=True)
+class FilterState:
+    """State of a tracker after a row.
+
+    Parameters
+    ----------
+    window : RowWindow
+        The rows that the estimate rests on.
+    question : RowsInQuestion
+        Rows that may be of another soil.
+    repeated : RepeatedReadings
+        Which readings repeat.
+    increases : tuple of float
+        What each of the last rows added to the misfit, over its median for sound rows.
+    rows_since_change : int
+        Rows used since the soil changed.
+    rows_since_drift : int
+        Rows used since a drift was last found; -1: never, on this soil.
+    """
+
+    window: RowWindow
+    question: RowsInQuestion = field(default_factory=RowsInQuestion)
+    repeated: RepeatedReadings = field(default_factory=RepeatedReadings)
+    increases: tuple[float, ...] = ()
+    rows_since_change: int = 0
+    rows_since_drift: int = -1
+
+    def with_increase(self, value: float) -> FilterState:
+        """The state after a row that added so much to the misfit, over its median."""
+        return replace(self, increases=(*self.increases, value)[-ROWS_JUDGED:])
+
+    def of_another_soil(self, window: RowWindow) -> FilterState:
+        """The state with rows of another soil alone; the size of the model error is kept."""
+        kept = len(self.increases) - len(self.question.rows)
+        return FilterState(
+            window,
+            repeated=self.repeated,
+            increases=self.increases[: max(kept, 0)],
+            rows_since_change=window.memory.rows,
+        )
+
+    def as_arrays(self, identity: str) -> Arrays:
+        """Everything as arrays of numbers and text, for `numpy.savez`."""
+        blocks = self.window.blocks
+        empty = self.window.memory.system[:0]
+        previous = [] if self.repeated.previous is None else [self.repeated.previous]
+        rows = [*previous, *self.question.rows]
+        names = list(rows[0]) if rows else []
+        return {
+            "format": np.asarray(FORMAT),
+            "model": np.asarray(identity),
+            "system": np.concatenate([empty, *(block.system for block in blocks)]),
+            "counts": np.reshape([block.counts for block in blocks], (len(blocks), 3)),
+            "lengths": np.asarray([len(block.system) for block in blocks], dtype=np.int64),
+            "names": np.asarray(names, dtype=np.str_),
+            "rows": np.reshape([row[n][0] for row in rows for n in names], (len(rows), len(names))),
+            "disagree": np.asarray(self.question.disagree, dtype=np.bool_),
+            "increases": np.asarray(self.increases, dtype=np.float64),
+            "repeated": np.asarray(self.repeated.times, dtype=np.int64),
+            "numbers": np.asarray(
+                [
+                    self.window.rows_per_block,
+                    self.question.in_succession,
+                    self.rows_since_change,
+                    self.rows_since_drift,
+                ],
+                dtype=np.int64,
+            ),
+        }
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
+        """The state that `as_arrays` wrote for the file of this identity.
+
+        Parameters
+        ----------
+        arrays : mapping
+            From `as_arrays`.
+        identity : str
+            Of the file.
+        start : Memory
+            A memory of the file without rows.
+
+        Raises `InputError` for arrays of another file or version, or damaged ones.
+        """
+        try:
+            return _read(arrays, identity, start)
+        except InputError:
+            raise
+        except Exception as error:  # whatever a damaged array raises
+            raise InputError(
+                f"this state of a tracker is damaged ({error}): begin with SoilTracker(estimator)"
+            ) from None
+
+
+def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
+    if int(arrays["format"]) != FORMAT:
+        raise InputError(
+            f"this state of a tracker has format {int(arrays['format'])}; this version of soilml "
+            f"reads format {FORMAT}: begin with SoilTracker(estimator)"
+        )
+    if str(arrays["model"]) != identity:
+        raise InputError(
+            f"this state of a tracker is of {str(arrays['model'])!r}, which is another file, "
+            f"wheel, prior or error of sensors than {identity!r}: begin with SoilTracker(estimator)"
+        )
+    ends = np.cumsum(arrays["lengths"])
+    system = np.asarray(arrays["system"], dtype=start.system.dtype)
+    if system.shape != (ends[-1] if len(ends) else 0, start.system.shape[1]):
+        raise ValueError(f"its system has shape {system.shape}")
+    for part in (system, np.asarray(arrays["counts"], dtype=np.float64)):
+        if not (np.abs(part) < np.finfo(np.float32).max).all():
+            raise ValueError("it has numbers that are not finite, or too large")
+    parts = zip(np.split(system, ends[:-1]), arrays["counts"], strict=True) if len(ends) else ()
+    blocks = tuple(
+        replace(start, system=part, counts=np.asarray(count, np.float32)) for part, count in parts
+    )
+    per_block, in_succession, since_change, since_drift = (int(n) for n in arrays["numbers"])
+    window = RowWindow(blocks, join(blocks) if blocks else start, per_block)
+    rows: list[Rows] = [
+        {str(n): np.asarray([float(v)]) for n, v in zip(arrays["names"], row, strict=True)}
+        for row in arrays["rows"]
+    ]
+    flags = tuple(bool(flag) for flag in arrays["disagree"])
+    previous = rows[0] if rows else None
+    question = RowsInQuestion(tuple(rows[1:]), flags, in_succession)
+    if len(question.rows) != len(flags):
+        raise ValueError(f"it has {len(question.rows)} rows in question and {len(flags)} flags")
+    repeated = RepeatedReadings(previous, tuple(int(n) for n in arrays["repeated"]))
+    increases = tuple(float(value) for value in arrays["increases"])
+    return FilterState(window, question, repeated, increases, since_change, since_drift)
