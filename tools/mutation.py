@@ -39,8 +39,7 @@ ROOT = Path(__file__).parents[1]
 ROOMS = {
     "physics": ("soilml/physics", "tests/soilml/physics", ""),
     "identification": ("soilml/identification", "tests/soilml/identification", "/plot"),
-    "fusion": ("soilml/onboard/fusion", "tests/soilml/onboard", ""),
-    "onboard": ("soilml/onboard", "tests/soilml/onboard", "/fusion/"),
+    "onboard": ("soilml/onboard", "tests/soilml/onboard", ""),
     "gap": ("soilml/gap", "tests/soilml/gap", "/html/|_figure"),
 }
 TESTS = "not network and not long and not browser"

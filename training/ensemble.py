@@ -122,7 +122,7 @@ def add_rowwise_fusion(
     Parameters
     ----------
     rule : str
-        One of `soilml.numerics.estimate_fusion.RULES`.
+        One of `soilml.onboard.fusion_rules.RULES`.
     graph : Graph
         The graph to which nodes are added.
     means, stds : list of str

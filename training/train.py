@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
 from soilml.errors import InputError
-from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.estimate import PriorSummary
+from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_within_prior
 from soilml.quantities import Z_90
 from training.available_memory import available_memory

@@ -253,7 +253,7 @@ def test_a_file_without_set_posterior_takes_no_noise(pooling):
 def test_chunks_of_single_readings_are_one_answer(pooling, monkeypatch):
     rows = many(1000)
     expected = pooling(**rows)
-    monkeypatch.setattr("soilml.onboard.row_estimates.ROWS_PER_CALL", 64)
+    monkeypatch.setattr("soilml.onboard.estimator.ROWS_PER_CALL", 64)
     found = pooling(**rows)
     for name in ("mean", "std", "covariance", "in_range"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-6)

@@ -9,8 +9,8 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 
 from soilml import Estimator
-from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.features import compute_features
+from soilml.onboard.fusion_rules import RULES
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
