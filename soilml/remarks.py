@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 Severity = Literal["note", "warning"]
+
+#: Code of a remark that names the measurement to make next.
+NEXT_ROW = "next-row"
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,10 @@ class Remark:
 
     def __str__(self) -> str:
         return self.text
+
+    def under(self, head: str) -> Remark:
+        """The same with a head before its text, such as `run a: `."""
+        return replace(self, text=f"{head}{self.text}")
 
     def as_json(self) -> dict[str, Any]:
         """The remark in a file of results."""

@@ -62,7 +62,7 @@ docs/cluster.md describes generation on several machines.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "recipe",
@@ -127,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     from datagen.generate import generate
     from datagen.partitions import generate_folder
     from datagen.recipe import read_recipe
-    from soilml.cli.option_values import available_effects
+    from soilml.cli.options import available_effects
     from soilml.cli.progress import progress_bar
     from soilml.fitting.declared_discrepancy import ignored_discrepancy
     from soilml.physics.computing_device import computing_on

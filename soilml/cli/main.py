@@ -45,10 +45,10 @@ EPILOG = "`soilml COMMAND --help` explains one command with an example."
 #: The commands of this distribution, in the order of the help text; they are present where the
 #: packages can be imported, installed or not. Others come by the entry point `soilml.commands`.
 COMMANDS = {
-    "init": "soilml.cli.commands.setup.init",
-    "models": "soilml.cli.commands.setup.models",
-    "doctor": "soilml.cli.commands.setup.doctor",
-    "completion": "soilml.cli.commands.setup.completion",
+    "init": "soilml.cli.commands.init",
+    "models": "soilml.cli.commands.models",
+    "doctor": "soilml.cli.commands.doctor",
+    "completion": "soilml.cli.commands.completion",
     "serve": "soilml.serve.command",
     "import": "soilml.cli.commands.import_",
     "soils": "soilml.cli.commands.soils",
@@ -128,7 +128,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             description=module.DESCRIPTION,
             formatter_class=layout,
         )
-        module.add(sub)
+        module.add_arguments(sub)
         if command == name:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog

@@ -1,7 +1,7 @@
-"""Options and arguments that several commands share: their declarations.
+"""Options and arguments that several commands share: their declarations and their values.
 
-This module and those of `soilml.cli.commands` import nothing that takes time, so that help and
-errors of usage answer at once.
+This module and those of commands import what takes time inside functions, so that help and errors
+of usage answer at once.
 """
 
 from __future__ import annotations
@@ -9,10 +9,23 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from soilml.cli.output_names import REPORT_FILES
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number, read_whole_number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from soilml.physics.effects import Effect
+
+#: Files of the folder of --report.
+REPORT_FILES = ("report.html", "report.json")
+#: Rows beyond which a table would not fit into the memory of a small machine.
+MAX_ROWS = 10_000_000
+#: A longer option value is cut in an error message.
+_MAX_SHOWN = 80
 
 
 class InputFile(str):
@@ -23,6 +36,27 @@ class InputFile(str):
     """
 
     __slots__ = ()
+
+
+def add_model_and_runs(parser: argparse.ArgumentParser, *, need_runs: bool = True) -> None:
+    """Declare MODEL.toml and RUNS.csv."""
+    parser.add_argument(
+        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
+    )
+    parser.add_argument(
+        "runs",
+        type=InputFile,
+        metavar="RUNS.csv",
+        nargs=None if need_runs else "?",
+        help="measured rows, CSV or Parquet",
+    )
+
+
+def add_by_option(parser: argparse.ArgumentParser) -> None:
+    """Declare `--by`, which `tables.result_by_group` follows."""
+    parser.add_argument(
+        "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
+    )
 
 
 def add_effects_option(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +76,15 @@ def add_report_option(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="folder for report.html, a page with picture, table and warnings, and report.json",
     )
+
+
+def need_for_report(args: argparse.Namespace, command: str) -> None:
+    """Raise `MissingLibraryError` where `--report` is given and lacks a library."""
+    if args.report is not None:
+        from soilml.optional_imports import need
+
+        need("jinja2", f"{command} --report")
+        need("matplotlib", f"{command} --report")
 
 
 def report_outputs(args: argparse.Namespace) -> list[Path]:
@@ -82,20 +125,20 @@ def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--where` and `--ignore-extra`, which `table_reading.read_rows` follows."""
+    """Declare `--where` and `--ignore-extra`, which `tables.read_rows` follows."""
     parser.add_argument("--where", metavar="COLUMN=VALUE", help="use only the rows with this value")
     add_ignore_extra_option(parser)
 
 
 def add_seed_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--seed`, which `option_values.check_seed` checks."""
+    """Declare `--seed`, which `check_seed` checks."""
     parser.add_argument(
         "--seed", type=whole_number, default=0, help="seed of the random numbers (default: 0)"
     )
 
 
 def add_cost_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--cost`, which `option_values.parse_costs` reads."""
+    """Declare `--cost`, which `parse_costs` reads."""
     parser.add_argument(
         "--cost",
         metavar="KIND=NUMBER",
@@ -136,3 +179,64 @@ def positive_number(text: str) -> int:
     if not text.isascii() or not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
     return int(text)
+
+
+def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
+    """The catalogue of effects by name, with those of the file of `--effects`."""
+    from soilml.physics.effects import EFFECTS
+
+    if args.effects is None:
+        return dict(EFFECTS)
+    from soilml.physics.user_effects import load_effects
+
+    return {**EFFECTS, **load_effects(args.effects)}
+
+
+def check_seed(args: argparse.Namespace) -> None:
+    """Raise `InputError` for a negative `--seed`."""
+    if args.seed < 0:
+        raise InputError(f"--seed is {args.seed}; needed is a whole number, 0 or more")
+
+
+def parse_costs(args: argparse.Namespace) -> dict[str, float]:
+    """The costs of `--cost` by kind; raises `InputError` for a text that is not KIND=NUMBER."""
+    costs = {}
+    for text in args.cost:
+        kind, _, number = text.rpartition("=")
+        try:
+            costs[kind] = read_number(number)
+        except ValueError:
+            kind = ""
+        if not kind:
+            raise InputError(f"--cost {text!r}: needed is KIND=NUMBER, such as reverse=2")
+    return costs
+
+
+def parse_names(text: str | None) -> list[str] | None:
+    """The names of `a,b,c`; None where the option is absent."""
+    return None if text is None else [name.strip() for name in text.split(",")]
+
+
+def parse_numbers(option: str, text: str) -> NDArray[np.float64]:
+    """The numbers of `start:stop:count` or `a,b,c`; raises `InputError` naming the option."""
+    import numpy as np
+
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            if read_whole_number(count) > MAX_ROWS:
+                raise InputError(f"{option} is {text!r}; at most {MAX_ROWS} values are possible")
+            with np.errstate(all="ignore"):
+                values = np.linspace(
+                    read_number(start), read_number(stop), read_whole_number(count)
+                ).round(12)
+        else:
+            values = np.asarray([read_number(part.strip()) for part in text.split(",")])
+    except InputError:
+        raise
+    except ValueError:
+        values = np.zeros(0)
+    if values.size == 0 or not np.all(np.isfinite(values)):
+        shown = text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
+        raise InputError(f"{option} is {shown!r}; needed is start:stop:count or values with commas")
+    return values

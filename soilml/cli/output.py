@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import math
+import argparse
 import re
 import sys
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from soilml.cli.options import REPORT_FILES, input_files
 from soilml.errors import InputError
-from soilml.io.atomic_files import atomic_output
+from soilml.io.atomic_files import atomic_output, write_files
 from soilml.io.cell_text import escaped
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
+from soilml.report.page import Provenance, Report
+from soilml.report.result_files import Content, report_texts
 from soilml.report.terminal import rounded, shown_column
 
 _ENDING = re.compile(r"_(std|p05|p95)$")
@@ -74,20 +76,34 @@ def write_stdout(text: str) -> None:
     sys.stdout.write(text)
 
 
-def json_text(content: Any) -> str:
-    """The content as indented JSON; numbers that are not finite become null, as JSON has none."""
-    return json.dumps(finite_or_null(content), indent=2, allow_nan=False) + "\n"
+def origin_of(args: argparse.Namespace, files: Iterable[str] = ()) -> Provenance:
+    """The command and its input files, of which `files` are some that no argument names."""
+    return Provenance.of(getattr(args, "command_line", []), [*input_files(args), *files])
 
 
-def finite_or_null(value: Any) -> Any:
-    """The content with None for every number that is not finite."""
-    if isinstance(value, dict):
-        return {key: finite_or_null(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite_or_null(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+def write_with_report(
+    args: argparse.Namespace,
+    contents: Mapping[str | None, Content],
+    build: Callable[[], tuple[Report, Mapping[str, Any]]],
+    read: Iterable[str] = (),
+) -> None:
+    """Write the outputs of a command, and those of --report, as one set.
+
+    Parameters
+    ----------
+    contents
+        What is written to each path; None as a path is an option that was not given.
+    build
+        Gives the report and the result in SI units; called where --report is given.
+    read
+        Input files that no argument names.
+    """
+    files = {Path(path): content for path, content in contents.items() if path is not None}
+    if args.report is not None:
+        report, content = build()
+        names = (REPORT_FILES[0], REPORT_FILES[1])
+        files |= report_texts(report, origin_of(args, read), content, names, Path(args.report))
+    write_files(files, folders=[args.report])
 
 
 def format_columns(columns: Mapping[str, Any], width: int = WIDTH) -> str:

@@ -9,8 +9,14 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, cast
+
+if TYPE_CHECKING:
+    from soilml.onboard.estimator import Estimator
+    from soilml.onboard.model_file import Session
 
 #: Seconds before the first line, and between two lines, where standard error is no terminal.
 FIRST_LINE, BETWEEN_LINES = 2.0, 20.0
@@ -86,6 +92,28 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
             progress.update(tasks[text], completed=done, total=total)  # type: ignore[arg-type]
 
         yield update
+
+
+@contextmanager
+def row_progress(text: str, estimator: Estimator, rows: int) -> Iterator[Estimator]:
+    """The same estimator, which moves a bar on; it will give about `rows` rows to its graph."""
+    with progress_bar(text, rows) as done:
+        counted = _CountedRows(estimator.session, done)
+        yield replace(estimator, session=cast("Session", counted))
+
+
+class _CountedRows:
+    """A session that tells how many rows it was given."""
+
+    def __init__(self, session: Session, done: Callable[[int], None]) -> None:
+        self._session, self._done, self._rows = session, done, 0
+
+    def run(self, outputs: Sequence[str], feed: Mapping[str, Any]) -> list[Any]:
+        """Run the graph; its first input has a number for each row."""
+        found: list[Any] = self._session.run(outputs, feed)
+        self._rows += len(next(iter(feed.values())))
+        self._done(self._rows)
+        return found
 
 
 def _lines(text: str, total: int | None, first: float | None = None) -> Callable[[int], None]:

@@ -7,7 +7,7 @@ then that of the case, which comes from the user's model file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -138,12 +138,25 @@ def gear_differences(case: Case, other: Case) -> Iterator[str]:
     if type(case.model.gear) is not type(other.model.gear):
         yield f"gear type {others!r}, the model file has {own!r}"
         return
-    yield from _fixed_differences(case, other, gear=True)
+    yield from _fixed_differences(case, other, _is_of_gear, SIZE_TOLERANCE)
 
 
 def value_differences(case: Case, other: Case) -> Iterator[str]:
     """Differences of the fixed values of soil and effects; what `other` varies has no value."""
-    yield from _fixed_differences(case, other, gear=False)
+    yield from soil_value_differences(case, other)
+    yield from effect_value_differences(case, other)
+
+
+def soil_value_differences(case: Case, other: Case) -> Iterator[str]:
+    """Differences of the fixed values of the soil."""
+    yield from _fixed_differences(case, other, lambda path: "." not in path, VALUE_TOLERANCE)
+
+
+def effect_value_differences(case: Case, other: Case) -> Iterator[str]:
+    """Differences of the fixed values of effects, whose paths are such as slip-sinkage.n1."""
+    yield from _fixed_differences(
+        case, other, lambda path: "." in path and not _is_of_gear(path), VALUE_TOLERANCE
+    )
 
 
 def effect_differences(case: Case, other: Case) -> Iterator[str]:
@@ -168,14 +181,17 @@ def prior_differences(case: Case, other: Case, names: Sequence[str]) -> Iterator
             yield f"prior {others.as_setting()} of {name}, the model file has {own.as_setting()}"
 
 
-def _fixed_differences(case: Case, other: Case, gear: bool) -> Iterator[str]:
-    tolerance = SIZE_TOLERANCE if gear else VALUE_TOLERANCE
+def _is_of_gear(path: str) -> bool:
+    return path.startswith("gear.")
+
+
+def _fixed_differences(
+    case: Case, other: Case, compared: Callable[[str], bool], tolerance: float
+) -> Iterator[str]:
     values = other.parameters()
     for path, (_, value) in case.parameters().items():
         fixed = path in values and path not in other.prior
-        if path.startswith("gear.") != gear or not fixed:
-            continue
-        if not _is_close(value, values[path][1], tolerance):
+        if compared(path) and fixed and not _is_close(value, values[path][1], tolerance):
             yield f"{path} {values[path][1]:g}, the model file has {value:g}"
 
 

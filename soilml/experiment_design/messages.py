@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from soilml.experiment_design.design import Advice, RatedRow
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.remarks import NEXT_ROW, Remark
 
 Floats = NDArray[np.float64]
 
@@ -27,18 +28,24 @@ def abstention_message(name: str, remaining_fraction: float, rows: str = "these 
     )
 
 
-def next_row_messages(advice: Advice, rows: str = "these rows") -> list[str]:
-    """A line for each parameter that is not identified, and one of the best row for all.
+def next_row_remarks(advice: Advice, rows: str = "these rows") -> list[Remark]:
+    """A remark on each parameter that is not identified, and one on the best row for all.
 
     `rows` as for `abstention_message`.
     """
     current = advice.current_fraction
-    texts = [
-        f"{abstention_message(name, fraction, rows)}. {_most_informative(advice, name)}"
+    remarks = [
+        Remark(
+            NEXT_ROW,
+            f"{abstention_message(name, fraction, rows)}. {_most_informative(advice, name)}",
+            (name,),
+            "note",
+        )
         for name, fraction, ok in zip(advice.names, current, is_identified(current), strict=True)
         if not ok
     ]
-    return [*texts, f"best next row for all parameters: {row_message(advice, advice.best())}"]
+    best = f"best next row for all parameters: {row_message(advice, advice.best())}"
+    return [*remarks, Remark(NEXT_ROW, best, advice.names, "note")]
 
 
 def row_message(advice: Advice, choice: RatedRow) -> str:
@@ -79,7 +86,7 @@ def _sequence(advice: Advice, i: int) -> str:
     return f"{len(advice.sequence)} rows leave {fraction:.0%}: {rows}"
 
 
-def as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
+def _row_as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
     """A row, and the fraction of each prior expected to remain after it."""
     c = choice.candidate
     return {
@@ -92,11 +99,15 @@ def as_json(advice: Advice, choice: RatedRow) -> dict[str, object]:
     }
 
 
-def summary(advice: Advice) -> dict[str, object]:
-    """The best next rows: for all parameters, for each, and the best repetition."""
+def advice_as_json(advice: Advice) -> dict[str, object]:
+    """Which parameters are identified, and the best next rows: for all, for each, repeated."""
     repetition = advice.best_repetition()
+    identified = is_identified(advice.current_fraction).tolist()
     return {
-        "next": as_json(advice, advice.best()),
-        "next_for": {name: as_json(advice, advice.best(name)) for name in advice.names},
-        "repeat": None if repetition is None else as_json(advice, repetition),
+        "identified": dict(zip(advice.names, identified, strict=True)),
+        "advice": {
+            "next": _row_as_json(advice, advice.best()),
+            "next_for": {name: _row_as_json(advice, advice.best(name)) for name in advice.names},
+            "repeat": None if repetition is None else _row_as_json(advice, repetition),
+        },
     }

@@ -12,13 +12,13 @@ from typing import Any
 
 from soilml.errors import SoilmlError
 
-#: The function `answer(request, tell)` of each kind of job, by its module.
+#: Module and function (request, tell) that answer each kind of job.
 KINDS = {
-    "look": "soilml.serve.answers.dropped_file",
-    "map": "soilml.serve.answers.log_map",
-    "import": "soilml.serve.answers.imported_log",
-    "estimate": "soilml.serve.answers.estimate",
-    "gap": "soilml.serve.answers.gap_verdict",
+    "look": ("logs", "look"),
+    "map": ("logs", "guess_map"),
+    "import": ("logs", "import_logs"),
+    "estimate": ("estimate", "answer"),
+    "gap": ("gap", "answer"),
 }
 
 
@@ -38,10 +38,11 @@ def main(folder: str) -> int:
     def tell(stage: str, share: float | None = None) -> None:
         say({"stage": stage, "share": share})
 
-    from soilml.cli.output import finite_or_null
+    from soilml.report.result_files import finite_or_null
 
     try:
-        answer = importlib.import_module(KINDS[request["kind"]]).answer
+        module, function = KINDS[request["kind"]]
+        answer = getattr(importlib.import_module(f"soilml.serve.answers.{module}"), function)
         say({"result": finite_or_null(answer(request, tell))})
     except SoilmlError as error:
         say({"error": " ".join(str(error).split())})

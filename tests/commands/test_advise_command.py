@@ -16,7 +16,8 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.cli.advice_text import _trained_for, advice_after_estimate
+from soilml.experiment_design.advice_after_results import _trained_for, advice_after_estimate
+from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
 
@@ -107,7 +108,11 @@ def test_the_posterior_says_what_is_told_and_what_to_drive_next(folder, capsys):
     assert main(command) == 0
     captured = capsys.readouterr()
     content = json.loads(captured.out)
-    assert content["told"] == {"cohesion": False, "friction_angle": False, "shear_modulus": True}
+    assert content["identified"] == {
+        "cohesion": False,
+        "friction_angle": False,
+        "shear_modulus": True,
+    }
     left = content["advice"]["next_for"]["cohesion"]["remaining_fraction"]["cohesion"]
     assert left < content["advice"]["repeat"]["remaining_fraction"]["cohesion"] - 0.2
     assert main([*command, "--out", "o.json"]) == 0
@@ -115,7 +120,7 @@ def test_the_posterior_says_what_is_told_and_what_to_drive_next(folder, capsys):
     assert "cohesion: not identified by these rows, 99% of the prior's width remains" in said
     assert "Most informative next: slip" in said
     assert main([*command[:3], "--out", "o.json"]) == 0  # least squares: no samples, no advice
-    assert "told" not in json.loads((folder / "o.json").read_text())
+    assert "identified" not in json.loads((folder / "o.json").read_text())
     capsys.readouterr()
     assert main([*command, "--by", "run"]) == 0
     assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
@@ -176,7 +181,7 @@ def test_short_and_long_runs_at_one_load_ask_for_another(small_model, rows):
     readings = {"slip": [0.2] * rows, "load": [60.0] * rows, "torque": [2.9] * rows}
     one = estimator.run(**readings)
     arrays = {name: np.asarray(values) for name, values in readings.items()}
-    said = advice_after_estimate(estimator, one.mean, one.covariance, arrays)
+    said = texts(advice_after_estimate(estimator, one.mean, one.covariance, arrays))
     cohesion = next(line for line in said if line.startswith("cohesion"))
     left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
     assert left < again - 20 and " at 60 N" not in cohesion
@@ -195,7 +200,7 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
         "import argparse\n"
         "from soilml.cli.commands import estimate\n"
         "parser = argparse.ArgumentParser()\n"
-        "estimate.add(parser)\n"
+        "estimate.add_arguments(parser)\n"
         "estimate.run(parser.parse_args())\n"
     )
     command = [sys.executable, "-c", code, str(small_model), "runs.csv", "--by", "run"]

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from soilml.cli import main
-from soilml.cli.execution.setup.completion import FILES, candidates
+from soilml.cli.commands.completion import FILES, candidates
 from soilml.cli.main import COMMANDS, parser
 
 

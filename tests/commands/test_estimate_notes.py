@@ -4,17 +4,21 @@ import numpy as np
 import pytest
 
 from soilml import Estimator
-from soilml.cli import row_progress
-from soilml.cli.estimate_text import MOST_LINES, notes_on_runs
+from soilml.cli import progress
+from soilml.onboard.presentation import MOST_LINES, remarks_on_runs
+from soilml.remarks import Remark
 
 
-def test_many_runs_that_are_told_the_same_have_one_line():
-    told = [(f"r{i}", "the estimate is the prior") for i in range(MOST_LINES + 1)]
-    assert notes_on_runs("run", told) == ["run r0, r1, r2 and 8 more: the estimate is the prior"]
-    few = notes_on_runs("run", [*told[:MOST_LINES], ("other", "believe neither answer")])
-    assert few[0] == "run r0: the estimate is the prior" and len(few) == MOST_LINES + 1
-    assert few[-1] == "run other: believe neither answer"
-    assert notes_on_runs("run", []) == []
+def test_many_runs_with_the_same_remark_have_one_line():
+    same, other = Remark("out-of-range", "the estimate is the prior"), Remark("other", "neither")
+    many = [(f"r{i}", same) for i in range(MOST_LINES + 1)]
+    (one,) = remarks_on_runs("run", many)
+    assert one.text == "run r0, r1, r2 and 8 more: the estimate is the prior"
+    assert one.about == tuple(name for name, _ in many) and one.code == "out-of-range"
+    few = remarks_on_runs("run", [*many[:MOST_LINES], ("other", other)])
+    assert few[0].text == "run r0: the estimate is the prior" and len(few) == MOST_LINES + 1
+    assert few[-1].text == "run other: neither" and few[-1].about == ("other",)
+    assert remarks_on_runs("run", []) == []
 
 
 @pytest.mark.parametrize("name", ["wheel", "wheel_linear"])
@@ -31,11 +35,11 @@ def test_progress_counts_the_rows_that_the_graph_is_given(monkeypatch, name):
         def __exit__(self, *error):
             pass
 
-    monkeypatch.setattr(row_progress, "progress_bar", Bar)
+    monkeypatch.setattr(progress, "progress_bar", Bar)
     estimator = Estimator.load(name)
     slip = np.linspace(0.1, 0.5, 300)
     rows = {"slip": slip, "torque": 1.0 + 3.0 * slip, "load": np.full(300, 60.0)}
-    with row_progress.row_progress("estimating", estimator, 600) as counted:
+    with progress.row_progress("estimating", estimator, 600) as counted:
         inside, found = counted.rows_in_range(**rows), counted.run(**rows)
     assert done == sorted(done) and done[-1] == 600
     assert inside.shape == (300,)

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from soilml.cli.output import json_text, show, tell
+from soilml.cli.output import show, tell
+from soilml.report.result_files import json_text
 
 
 def test_numbers_that_are_not_finite_become_null_and_texts_stay():

@@ -2,8 +2,8 @@
 
 import pytest
 
-from soilml.cli import progress, table_reading
-from soilml.cli.table_reading import read_long_table
+from soilml.cli import progress, tables
+from soilml.cli.tables import read_long_table
 from soilml.errors import TableError
 
 
@@ -59,7 +59,7 @@ def test_work_of_unknown_length_says_one_line(monkeypatch, capsys):
 def test_a_long_table_is_read_with_progress(tmp_path, monkeypatch, capsys, clock):
     file = tmp_path / "runs.csv"
     file.write_text("run,slip,load_N\n" + "a,0.2,60\n" * 40_000)
-    monkeypatch.setattr(table_reading, "_LONG", 1000)
+    monkeypatch.setattr(tables, "_LONG", 1000)
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
     assert len(read_long_table(str(file), ("run",))) == 40_000
     (line,) = capsys.readouterr().err.splitlines()

@@ -93,7 +93,8 @@ def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kin
     assert sums["runs.csv"] in seen.text
     plain = " ".join(seen.text.replace("\N{NO-BREAK SPACE}", " ").split()).lower()
     for said in (*entry["answer"], *entry["warnings"], *entry["next"]):
-        assert " ".join(said.split()).lower() in plain
+        text = said["text"] if isinstance(said, dict) else said
+        assert " ".join(text.split()).lower() in plain
 
 
 def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
@@ -114,7 +115,7 @@ def test_no_file_is_written_where_the_page_fails(folder, monkeypatch, capsys):
         raise KeyboardInterrupt
 
     before = sorted(folder.rglob("*"))
-    monkeypatch.setattr("soilml.cli.reports.report_files.page", fails)
+    monkeypatch.setattr("soilml.report.page.page", fails)
     assert main([*COMMANDS["identify"], "--report", "found", "--out", "all.json"]) == 130
     assert "no output was written" in capsys.readouterr().err
     assert sorted(folder.rglob("*")) == before

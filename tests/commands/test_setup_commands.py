@@ -88,7 +88,7 @@ def test_a_short_name_serves_estimate(tmp_path, capsys):
 def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkeypatch):
     assert main(["doctor"]) == 0
     assert "nothing is wrong" in capsys.readouterr().out
-    monkeypatch.setattr("soilml.cli.execution.setup.doctor._version", lambda name: "1.2.3")
+    monkeypatch.setattr("soilml.cli.commands.doctor._version", lambda name: "1.2.3")
     assert main(["doctor"]) == 1
     said = capsys.readouterr().out
     assert "! scipy is 1.2.3; needed is 1.15 or newer: pip install -U scipy" in said

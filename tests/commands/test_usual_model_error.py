@@ -45,11 +45,14 @@ def test_a_run_has_both_answers(runs, capsys, whole_file):
     assert float(row["shear_modulus_m_usual_p95"]) == pytest.approx(usual.high[2], rel=1e-4)
     assert float(row["cohesion_Pa_usual_std"]) > 1.2 * float(row["cohesion_Pa_std"])
     assert row["in_range"] == row["in_range_usual"] == "1"
-    assert "believe the columns with _usual, unless this model was checked" in said
-    assert "run bent: the model as it is does not explain the rows, nor does it" in said
+    assert (
+        "use the intervals that include model errors (_usual), unless this model was verified"
+        in said
+    )
+    assert "run bent: the model taken as exact does not explain the rows, nor does it" in said
 
 
 def test_a_declared_discrepancy_takes_the_place_of_the_second_answer(runs, capsys, whole_file):
     Path("own.toml").write_text(MODEL + '[discrepancy]\ntorque_Nm = "2 %"\n')
     rows, said = answers(capsys, str(whole_file), "runs.csv", "--case", "own.toml")
-    assert not [key for key in rows["sound"] if "usual" in key] and "two answers" not in said
+    assert not [key for key in rows["sound"] if "usual" in key] and "two intervals" not in said

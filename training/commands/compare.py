@@ -58,7 +58,7 @@ time per estimate.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "files",
@@ -168,9 +168,10 @@ def _write(
     read: Sequence[Path],
 ) -> None:
     """Write page, JSON, CSV and picture as one set; `read` are the model files."""
-    from soilml.cli.reports.report_files import origin_of, report_texts
+    from soilml.cli.output import origin_of
     from soilml.io.atomic_files import write_files
     from soilml.io.text_tables import csv_text
+    from soilml.report.result_files import report_texts
 
     origin = origin_of(args, [str(path) for path in read])
     files = report_texts(page, origin, content, (names[0], names[1]), folder)
@@ -225,7 +226,7 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from soilml.cli.table_reading import read_long_table
+    from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case_of_one_gear
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.onboard.estimator import Estimator

@@ -37,7 +37,7 @@ docs/c-export.md describes them, with an example in C and one in C++.
 MOST_ROWS = 4096
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
     parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")

@@ -26,7 +26,7 @@ uses MODEL.onnx itself; soilml export-c writes C that needs no library.
 MOST_ROWS = 4096
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
     parser.add_argument("out", metavar="OUT.onnx", help="file to write")

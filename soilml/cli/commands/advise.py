@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
-    InputFile,
     add_effects_option,
     add_gear_option,
+    add_model_and_runs,
     add_row_options,
     whole_number,
 )
+from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
+
+if TYPE_CHECKING:
+    from soilml.config.case import Case
+    from soilml.experiment_design import Advice, RatedRow
+    from soilml.fitting.observations import Observations
 
 HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
@@ -38,20 +48,13 @@ the measured ones are tried. A point is excluded where a twentieth or more of
 the posterior samples does not carry the wheel. Model errors are considered where
 [discrepancy] declares them.
 """
+#: Largest number of rows planned in a sequence, and of operating points (slips times loads).
+MAX_COUNT, MAX_POINTS = 5, 1000
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
-    )
-    parser.add_argument(
-        "runs",
-        type=InputFile,
-        metavar="RUNS.csv",
-        nargs="?",
-        help="rows measured so far, CSV or Parquet",
-    )
+    add_model_and_runs(parser, need_runs=False)
     parser.add_argument(
         "--slips", metavar="A,B,...", help="candidate slips: A,B,... or start:stop:count"
     )
@@ -80,8 +83,125 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     return [*output_files(args.out, ".csv"), *output_files(args.picture, ".png")]
 
 
+def _with_noise_of_rows(case: Case, data: Observations) -> Case:
+    """The case with the noise of the rows' columns where it declares none: their median."""
+    import numpy as np
+
+    from soilml.config.measurement_noise import Noise
+    from soilml.quantities import column
+
+    noise = dict(case.noise)
+    for channel in data.channels:
+        key = column(channel.name)
+        if key not in noise and channel.declared:
+            std = float(np.nanmedian(channel.std[np.isfinite(channel.reading)]))
+            noise[key] = Noise(constant=std)
+            print(f"the noise of further {key} is taken from {key}_std: {std:.3g}", file=sys.stderr)
+    return replace(case, noise=noise)
+
+
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
-    from soilml.cli.execution.advise import run
+    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.output import tell, write_columns
+    from soilml.cli.progress import working
+    from soilml.cli.tables import print_table_hints, read_rows
+    from soilml.config.case import read_case_of_one_gear
+    from soilml.experiment_design import advise, candidate_grid, samples_of_prior, samples_of_rows
+    from soilml.experiment_design.advice_after_results import mean_covariates
+    from soilml.experiment_design.messages import next_row_remarks
+    from soilml.fitting.free_parameters import select_free
+    from soilml.fitting.observations import read_observations
+    from soilml.io.read_table import RUNS
+    from soilml.optional_imports import need
+    from soilml.remarks import Remark, texts
 
-    return run(args)
+    if args.picture is not None:
+        need("matplotlib", "advise --picture")
+    if not 1 <= args.count <= MAX_COUNT:
+        raise InputError(f"--count is {args.count}; needed is a whole number from 1 to {MAX_COUNT}")
+    if args.where is not None and args.runs is None:
+        raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    free = select_free(case, parse_names(args.free))
+    slips, loads = (
+        None if text is None else parse_numbers(option, text).tolist()
+        for option, text in (("--slips", args.slips), ("--loads", args.loads))
+    )
+    if args.runs is None:
+        ranges, at = candidate_grid(slips, loads), None
+    else:
+        table = read_rows(args, RUNS)
+        print_table_hints(table, case)
+        data = read_observations(case, table)
+        case = _with_noise_of_rows(case, data)
+        ranges, at = candidate_grid(slips, loads, data.load), data.at
+    if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
+        raise InputError(
+            f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
+            f"at most {MAX_POINTS} operating points are possible"
+        )
+    with working("rating the rows that could be next"):
+        if at is None:
+            samples = samples_of_prior(free, case=case)
+        else:
+            samples = samples_of_rows(case, data, free)
+        known = {} if at is None else mean_covariates(at)
+        advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
+    if args.picture is not None:
+        from soilml.experiment_design.plot import save_maps
+
+        save_maps(args.picture, advice, at)
+    if args.all:
+        ranked = sorted(advice.choices, key=lambda c: c.overall)
+        write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
+    else:
+        write_columns(_columns(advice, _best_rows(advice)), args.out)
+    remarks = [] if at is None else [*next_row_remarks(advice), *data.notes]
+    if case.discrepancy:
+        text = "the [discrepancy] of a next row counts as independent of that of other rows: "
+        remarks.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))
+    if advice.excluded_points:
+        text = (
+            f"{advice.excluded_points} of {len(ranges.slips) * len(ranges.loads)} operating points "
+            "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
+        )
+        remarks.append(Remark("not-carried", text))
+    tell("\n".join(texts(remarks)))
+    return 0
+
+
+def _best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
+    """The rows of the table: reason and candidate."""
+    rows = [("best in all", advice.best())]
+    rows += [
+        (f"best in all with {own[1]}", advice.best(None, own)) for own in advice.channel_sets[1:]
+    ]
+    rows += [(f"best for {name}", advice.best(name)) for name in advice.names]
+    repeat = advice.best_repetition()
+    if repeat is not None:
+        rows.append(("best repeat", repeat))
+    if len(advice.sequence) > 1:
+        rows += [
+            (f"row {i} of {len(advice.sequence)}", c) for i, c in enumerate(advice.sequence, 1)
+        ]
+    return rows
+
+
+def _columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
+    """The table's columns."""
+    import numpy as np
+
+    from soilml.experiment_design.candidate_rows import channel_label
+
+    choices = [choice for _, choice in rows]
+    columns: dict[str, Any] = {
+        "row": [why.replace("_", " ") for why, _ in rows],
+        "channels": [channel_label(c.candidate.channels) for c in choices],
+        "slip": np.asarray([c.candidate.slip for c in choices]),
+        "load_N": np.asarray([c.candidate.load for c in choices]),
+    }
+    for i, name in enumerate(advice.names):
+        columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
+    columns["all_left"] = np.asarray([c.overall for c in choices])
+    return columns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
@@ -11,7 +12,10 @@ from soilml.cli.options import (
     add_effects_option,
     add_ignore_extra_option,
 )
-from soilml.io.atomic_files import output_files
+from soilml.io.atomic_files import output_files, save_text
+
+if TYPE_CHECKING:
+    pass
 
 HELP = "missing effects that planned runs could identify"
 DESCRIPTION = """\
@@ -35,7 +39,7 @@ add are ranked by the effects that they gain per cost.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.toml", help="gear, soil and noise")
     parser.add_argument(
@@ -57,6 +61,26 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
-    from soilml.cli.execution.audit import run
+    from soilml.cli.options import available_effects, parse_costs, parse_names
+    from soilml.cli.output import show, tell
+    from soilml.cli.progress import working
+    from soilml.cli.tables import read_long_table
+    from soilml.config.case import read_case
+    from soilml.fitting.declared_discrepancy import ignored_discrepancy
+    from soilml.gap import audit
+    from soilml.gap.presentation import audit_text
+    from soilml.report.result_files import json_text
 
-    return run(args)
+    effects = available_effects(args)
+    case = read_case(args.model, effects)
+    design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
+    with working(f"auditing {len(design)} rows"):
+        found = audit(
+            case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
+        )
+    if args.out is not None:
+        save_text(args.out, json_text(found.as_json()))
+    show(audit_text(found))
+    for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
+        tell(line.text)
+    return 0

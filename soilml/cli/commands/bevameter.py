@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import math
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    InputFile,
-    add_effects_option,
-    add_ignore_extra_option,
-)
-from soilml.io.atomic_files import output_files
+from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option
+from soilml.errors import InputError, MissingLibraryError, TableError
+from soilml.io.atomic_files import output_files, save_text
+
+if TYPE_CHECKING:
+    from soilml.identification.bevameter import BevameterResult
+    from soilml.io.table import Table
 
 HELP = "soil parameters from plate-sinkage and shear tests, without a wheel"
 DESCRIPTION = """\
@@ -39,9 +43,17 @@ the prior that --out writes for identify and gap, with [[soil.test]]: what the
 tests say of the parameters together. With --model, SOIL.toml is that model file
 with this soil; without it, [soil] with priors and tests alone.
 """
+#: Bounds of columns that differ from those of measured runs: a plate starts without load.
+LIMITS = {
+    "load_N": (-math.inf, math.inf, "a load in N"),
+    "sinkage_m": (-1.0, 2.0, "a sinkage in m, below 2"),
+    "angle_rad": (-6.3, 6.3, "an angle in rad, of less than a turn"),
+    "normal_stress_Pa": (0.0, math.inf, "a normal stress above zero, in Pa"),
+    "inner_radius_m": (-1e-9, 10.0, "a radius in m"),
+}
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "tables",
@@ -74,6 +86,102 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
-    from soilml.cli.execution.bevameter import run
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import show
+    from soilml.cli.progress import working
+    from soilml.config.case import read_case
+    from soilml.identification.bevameter import bevameter
+    from soilml.identification.bevameter.model_file import missing_values, model_file_text
+    from soilml.optional_imports import need
+    from soilml.report.result_files import json_text
 
-    return run(args)
+    if args.picture is not None:
+        need("matplotlib", "bevameter --picture")
+    case = None if args.model is None else read_case(args.model, available_effects(args))
+    plates, shear = _tables(args)
+    with working("fitting the tests"):
+        result = bevameter(plates, shear, case)
+    if args.picture is not None:
+        from soilml.identification.bevameter.plot import save_picture
+
+        save_picture(args.picture, result)
+    if args.json is not None:
+        save_text(args.json, json_text(result.as_json()))
+    if args.out is not None:
+        save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
+        if case is None and (missing := missing_values(result)):
+            print(
+                f"{args.out} lacks {', '.join(missing)}: add them, or give --model", file=sys.stderr
+            )
+    show(_text(result))
+    return 0
+
+
+def _table(path: str, ignore_extra: bool) -> Table:
+    """A table of tests; where it has other names and units, it is told what they are taken for."""
+    from soilml.cli.output import tell
+    from soilml.io.read_table import check_table, read_table
+    from soilml.log_import.soil_tests import read_soil_tests
+    from soilml.optional_imports import need
+
+    try:
+        return read_table(
+            path, ("test",), filled=("test",), ignore_extra=ignore_extra, limits=LIMITS
+        )
+    except TableError as error:
+        try:
+            need("pint", "bevameter")
+            found = read_soil_tests(path)
+        except MissingLibraryError:
+            found = None
+        if found is None:
+            raise error from None
+    tell(f"! {found}")
+    return check_table(found.table, Path(path), ("test",), ("test",), LIMITS)
+
+
+def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None]:
+    """The plate tests and the shear tests, told apart by their columns."""
+    found: dict[str, Table] = {}
+    for path in args.tables:
+        table = _table(path, args.ignore_extra)
+        if "shear_stress_Pa" in table or "torque_Nm" in table:
+            kind = "shear"
+        elif "sinkage_m" in table:
+            kind = "plate"
+        else:
+            raise TableError(
+                f"{path} is no table of tests: plate tests have sinkage_m, shear tests have "
+                f"shear_stress_Pa or torque_Nm; found: {', '.join(table.columns)}"
+            )
+        if kind in found:
+            raise InputError(
+                f"{path} and {found[kind].source} are both {kind} tests; put them in one table"
+            )
+        found[kind] = table
+    return found.get("plate"), found.get("shear")
+
+
+def _text(result: BevameterResult) -> str:
+    from soilml.io.text_tables import format_table
+    from soilml.report.terminal import shown_unit, significant
+
+    rows = [
+        (
+            name,
+            significant(factor * e.value),
+            _range(e.mean_range, factor),
+            _range(e.place_range, factor),
+            unit,
+        )
+        for name, e in result.estimates().items()
+        for factor, unit in [shown_unit(e.unit, e.value)]
+    ]
+    head = ("parameter", "value", "95 % of the mean", "95 % at another place", "unit")
+    return "\n".join([format_table(head, rows), *(f"! {text}" for text in result.remarks)])
+
+
+def _range(ends: tuple[float, float], factor: float) -> str:
+    from soilml.report.terminal import significant
+
+    return f"{significant(factor * ends[0], 3)} .. {significant(factor * ends[1], 3)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from soilml.cli.options import add_effects_option
+from soilml.errors import InputError, did_you_mean
 
 HELP = "list the effects that a model can include, or show one"
 DESCRIPTION = """\
@@ -16,7 +17,7 @@ List the effects that [[effect]] in a model file may name.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("name", nargs="?", help="name of the effect to show")
     add_effects_option(parser)
@@ -24,6 +25,53 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
-    from soilml.cli.execution.effects import run
+    from soilml.cli.options import available_effects
+    from soilml.io.text_tables import format_table
+    from soilml.parameters import declared
+    from soilml.physics.effects.base import STAGES
+    from soilml.physics.operating_point import COVARIATES
+    from soilml.report.terminal import shown_unit, significant
 
-    return run(args)
+    effects = available_effects(args)
+    if args.name is None:
+        listed = [
+            (name, cls.about.kind, cls.about.size, cls.about.text) for name, cls in effects.items()
+        ]
+        print(format_table(("effect", "of the", "size", "what it is"), listed, text_columns=4))
+        return 0
+    if args.name not in effects:
+        raise InputError(
+            f"no effect {args.name!r}; {did_you_mean(args.name, effects)}there are: "
+            f"{', '.join(effects)}"
+        )
+    cls = effects[args.name]
+    acts = ", ".join(stage.removeprefix("on_") for stage in STAGES if cls.overrides(stage))
+    neutral = cls()
+    rows = [
+        (
+            name,
+            p.text,
+            significant(factor * getattr(neutral, name)),
+            f"{significant(factor * p.lower)} .. {significant(factor * p.upper)}",
+            unit,
+        )
+        for name, p in declared(cls).items()
+        for factor, unit in [shown_unit(p.unit)]
+    ]
+    about = cls.about
+    print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
+    if about.needs:
+        print(f"needs: {', '.join(COVARIATES[field] for field in about.needs)}")
+    print(f"distinguished from others by: {about.isolate}\nsource: {about.source}\n")
+    print(format_table(("parameter", "what", "default", "bounds", "unit"), rows, text_columns=2))
+    print(
+        f"\n{_dedented(cls.__doc__ or '')}\n\nIn a model file:\n\n[[effect]]\nname = {args.name!r}"
+    )
+    for name, value in cls.about.reference.items():
+        print(f"{name} = {value:g}")  # in SI units, as a model file has it
+    return 0
+
+
+def _dedented(text: str) -> str:
+    lines = text.strip().splitlines()
+    return "\n".join([lines[0], *[line.removeprefix("    ") for line in lines[1:]]])

@@ -3,10 +3,31 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_report_option, add_row_options, report_outputs
+from soilml.cli.options import (
+    InputFile,
+    add_report_option,
+    add_row_options,
+    need_for_report,
+    report_outputs,
+)
+from soilml.errors import InputError, TableError
 from soilml.io.atomic_files import output_files
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from soilml.config.case import Case
+    from soilml.io.table import Table
+    from soilml.onboard.estimate import Estimate
+    from soilml.onboard.estimator import Estimator
+    from soilml.remarks import Remark
+    from soilml.report.page import Report
 
 #: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
 FUSION_RULES = (
@@ -16,7 +37,6 @@ FUSION_RULES = (
     "inverse-variance",
     "pairwise",
 )
-
 HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
@@ -39,14 +59,13 @@ One row gives one equation for three unknowns, so the estimate of a single row
 is close to the prior. --by run pools all rows of a run, which is far more
 accurate, and --by all those of all runs, which must then be on one soil.
 sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
-slip_std and load_N_std included. The estimate of a run is the prior
-where more than a tenth of its rows is out of range, and widened as far as the
-misfit says where no soil explains them all. A run gets two answers: as if the
-model of wheel and soil were right, and, in columns with _usual, with the errors
-that such a model usually has; a [discrepancy] of --case takes the place of the
-second answer. A row with a blank reading, or
-whose status is not ok, gets a blank estimate. Slip differs from row to row and
-has no --by.
+slip_std and load_N_std included. The estimate of a run is the prior where more
+than a tenth of its rows is out of range, and widened as far as the misfit says
+where no soil explains them all. A run gets two intervals: with the model of
+wheel and soil taken as exact, and, in columns with _usual, with typical model
+errors; a [discrepancy] of --case takes the place of the second. A row with a
+blank reading, or whose status is not ok, gets a blank estimate. Slip differs
+from row to row and has no --by.
 
 --with fuses, row by row, model files that estimate the same parameters from
 other sensors: slip files of one data file by the correlation of their errors,
@@ -59,7 +78,7 @@ print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="trained model file")
     parser.add_argument(
@@ -104,6 +123,278 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Estimate and write the table."""
-    from soilml.cli.execution.estimate import run
+    from soilml.optional_imports import need
 
-    return run(args)
+    need("onnxruntime", "estimate")
+    need_for_report(args, "estimate")
+    import numpy as np
+
+    from soilml.cli.output import save_columns, show, tell, write_with_report
+    from soilml.cli.tables import print_table_hints, read_rows
+    from soilml.config.case import read_case_of_one_gear
+    from soilml.identification.wheel_check import check_table_wheel, estimators_for_case
+    from soilml.io.read_table import FILLED, RUNS
+    from soilml.onboard.estimator import Estimator
+    from soilml.onboard.presentation import (
+        check_size,
+        description,
+        estimate_report,
+        trained_radius,
+    )
+    from soilml.onboard.table_estimates import complete_rows, excluded_rows, unused_std_remarks
+    from soilml.quantities import column
+    from soilml.remarks import texts
+
+    estimators = [Estimator.load(file) for file in (args.model, *args.others)]
+    _check_options(args, estimators)
+    if args.runs is None and args.case is None:
+        show("\n".join(description(estimator).text for estimator in estimators))
+        return 0
+    case = None
+    if args.case is not None:
+        case = read_case_of_one_gear(args.case, gear=args.gear, with_bias=True)
+    estimators, remarks = estimators_for_case(
+        estimators, case, args.case, pooled=args.by is not None
+    )
+    remarks = [*map(description, estimators), *remarks]
+    if args.runs is None:
+        show("\n".join(texts(remarks)))
+        return 0
+    read = {name: column(name) for estimator in estimators for name in estimator.inputs}
+    needed = tuple(key for key in RUNS if key in ("run", *read.values()))
+    filled = [key for key in FILLED if key in needed]
+    table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
+    for estimator in estimators:
+        check_table_wheel(estimator, table)
+    print_table_hints(table, case, trained_radius(estimators[0]))
+    complete = [complete_rows(estimator, table) for estimator in estimators]
+    usable = [rows & table.answered for rows in complete]
+    if not np.any(usable):
+        wanted = ", ".join(column(n) for n in estimators[0].inputs)
+        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
+    if args.by is None:
+        columns, own = _row_estimates(estimators, table, usable, args.rule, case)
+    else:
+        columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
+    remarks += own
+    if args.by is None or estimators[0].sets is None:
+        remarks += unused_std_remarks(estimators[0], table)
+    some = np.any(complete, axis=0)
+    remarks += excluded_rows(table, ~some, "missing-reading", "lack a reading")
+    unanswered = some & ~table.answered
+    remarks += excluded_rows(table, unanswered, "status-not-ok", "have a status that is not ok")
+    if args.report is not None:
+        check_size(len(columns["in_range"]))
+
+    def build() -> tuple[Report, dict[str, Any]]:
+        content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
+        files = args.model, args.runs
+        page = estimate_report(columns, remarks, estimators[0], args.by, files)
+        return page, {**content, "notes": [remark.as_json() for remark in remarks]}
+
+    write_with_report(
+        args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
+    )
+    _tell_columns(columns, args.out)
+    tell("\n".join(texts(remarks)))
+    return 0
+
+
+def _tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
+    """Write or print the columns of both intervals; on a terminal, as two tables."""
+    import numpy as np
+
+    from soilml.cli.output import is_terminal, show, tell_columns
+    from soilml.onboard.presentation import TYPICAL, is_typical_column
+
+    second = [name for name in columns if is_typical_column(name)]
+    if not second or out is not None or not is_terminal():
+        tell_columns(columns, out)
+        return
+    tell_columns({name: columns[name] for name in columns if name not in second}, None)
+    show(f"\nwith typical errors of the model: columns with _{TYPICAL} in a file\n")
+    group = next(iter(columns))
+    typical = {name.replace(f"_{TYPICAL}", ""): columns[name] for name in second}
+    typical["in_range"] = np.asarray(typical["in_range"], dtype=bool)
+    tell_columns({group: columns[group]} | typical, None)
+
+
+def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
+    """Raise `InputError` for options that cannot be combined."""
+    from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
+    from soilml.onboard.joint_errors import are_comparable
+    from soilml.onboard.multi_sensor import CORRELATED
+    from soilml.onboard.table_estimates import check_independent
+
+    if args.runs is None and any((args.by, args.where, args.out, args.report)):
+        raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
+    if args.rule is not None and not args.others:
+        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
+    if args.by is not None and args.others:
+        raise InputError("--with fuses single rows; omit --by")
+    known = are_comparable([e.pooling.held_out for e in estimators])
+    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+        check_independent(estimators)
+    if args.by is not None and estimators[0].per_row:
+        raise InputError(
+            f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
+            "a run; omit --by"
+        )
+
+
+def _row_estimates(
+    estimators: list[Estimator],
+    table: Table,
+    usable: list[NDArray[np.bool_]],
+    rule: str | None,
+    case: Case | None,
+) -> tuple[dict[str, Any], list[Remark]]:
+    """Columns with a line for every row, blank where no model has all its readings, and remarks."""
+    import numpy as np
+
+    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.onboard.multi_sensor import fuse_estimates
+    from soilml.onboard.presentation import estimate_columns, median_row, width_remarks
+    from soilml.onboard.table_estimates import row_readings
+    from soilml.quantities import column
+    from soilml.remarks import Remark
+
+    estimates = [_all_rows(*parts, table, case) for parts in zip(estimators, usable, strict=True)]
+    answered = np.any(usable, axis=0)
+    inputs = dict.fromkeys(name for estimator in estimators for name in estimator.inputs)
+    columns: dict[str, Any] = {"run": table["run"]}
+    columns |= {column(name): table[column(name)] for name in inputs}
+    estimate, files = estimates[0], None
+    if len(estimators) > 1:
+        combined = fuse_estimates(estimates, rule)
+        estimate, files = combined.estimate, combined.used.sum(axis=0)
+    for key, values in estimate_columns(estimate).items():
+        columns[key] = np.where(answered, values, np.nan)
+    columns["in_range"] = answered & estimate.in_range
+    if files is not None:
+        columns["files"] = files
+    hint = "pool rows with --by run"
+    if estimators[0].per_row:
+        hint = "measure with other sensors too, or train for a narrower prior of the soil,"
+    remarks = width_remarks(estimate, "a single row", "does", hint)
+    if len(estimators) > 1:
+        remarks.append(Remark("fused", f"fused by the rule {combined.rule}", severity="note"))
+    elif estimate.in_range.any():
+        row = median_row(estimate)
+        readings = row_readings(estimators[0], table.rows(np.asarray([row])))
+        advised = advice_after_estimate(
+            estimators[0], estimate.mean[row], estimate.covariance[row], readings
+        )
+        head = f"after {table.place(row)} alone, a typical row: "
+        remarks += [best.under(head) for best in advised[-1:]]
+    outside = int(np.count_nonzero(answered & ~estimate.in_range))
+    if outside:
+        why = "" if files is None else ", or the files contradict each other there"
+        text = f"{outside} of {int(answered.sum())} rows are out of range{why}: "
+        remarks.append(Remark("out-of-range", f"{text}their estimate is the prior"))
+    return columns, remarks
+
+
+def _all_rows(
+    estimator: Estimator, usable: NDArray[np.bool_], table: Table, case: Case | None
+) -> Estimate:
+    """An estimate for every row; one that is not usable counts as out of range."""
+    from soilml.cli.progress import progress_bar
+    from soilml.identification.wheel_check import readings_with_discrepancy
+    from soilml.onboard.table_estimates import estimates_of_rows, joint_readings, row_readings
+
+    rows = table.rows(usable)
+    readings = row_readings(estimator, rows)
+    if estimator.sets is not None and estimator.sets.sets_only:
+        readings = readings_with_discrepancy(
+            estimator, joint_readings(estimator, rows), case, together=False
+        )
+    with progress_bar(f"estimating {len(rows)} rows", len(rows)) as done:
+        return estimates_of_rows(estimator, readings, usable, done)
+
+
+def _estimates_of_runs(
+    estimator: Estimator,
+    readings: list[dict[str, Any]],
+    by: str,
+    box: dict[str, tuple[float, float]],
+    *,
+    typical: bool,
+) -> tuple[NDArray[np.int64], Estimate]:
+    """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
+    from soilml.cli.progress import row_progress
+    from soilml.onboard.table_estimates import estimates_of_runs
+
+    rows = sum(len(next(iter(one.values()))) for one in readings)
+    text = f"estimating by {by}{' with typical model errors' if typical else ''}"
+    with row_progress(text, estimator, rows if typical else 2 * rows) as counted:
+        return estimates_of_runs(counted, readings, box, count=not typical)
+
+
+def _group_estimates(
+    estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str, case: Case | None
+) -> tuple[dict[str, Any], list[Remark]]:
+    """Columns with a line for every value of a column, from all its usable rows, and remarks."""
+    import numpy as np
+
+    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.identification.trained_estimator import narrower_priors
+    from soilml.identification.wheel_check import readings_with_discrepancy
+    from soilml.io.table import ALL
+    from soilml.onboard.presentation import (
+        estimate_columns,
+        refusal_remarks,
+        typical_columns,
+        typical_remarks,
+        widest_row,
+        width_remarks,
+    )
+    from soilml.onboard.set_contract import MODEL_ERROR_INPUT
+    from soilml.onboard.table_estimates import channel_remarks, joint_readings, row_readings
+
+    order = [name for name, _ in table.groups(by)]
+    groups = list(table.rows(usable).groups(by))
+    names = [name for name, _ in groups]
+    readings = [
+        readings_with_discrepancy(estimator, joint_readings(estimator, rows), case, together=True)
+        for _, rows in groups
+    ]
+    box = {} if case is None else narrower_priors(estimator, case)
+    in_range, estimate = _estimates_of_runs(estimator, readings, by, box, typical=False)
+    position = {name: i for i, name in enumerate(names)}
+    answered = np.asarray([name in position for name in order])
+    index = np.asarray([position.get(name, 0) for name in order])
+    counts = np.asarray([len(rows) for _, rows in groups])
+    columns: dict[str, Any] = {
+        by: np.asarray(order),
+        "rows": np.where(answered, counts[index], 0),
+        "rows_in_range": np.where(answered, in_range[index], 0),
+    }
+    for key, values in estimate_columns(estimate).items():
+        columns[key] = np.where(answered, values[index], np.nan)
+    columns["in_range"] = answered & estimate.in_range[index]
+    remarks = channel_remarks(estimator, joint_readings(estimator, table.rows(usable)))
+    whose = "all rows" if by == ALL else f"all rows of a {by}"
+    better = "measure other loads and slips"
+    if by != ALL and len(groups) > 1:
+        better += f", or take those of one soil together, such as --by {ALL},"
+    remarks += width_remarks(estimate, whose, "do", better)
+    if estimate.in_range.any():
+        name, rows = groups[i := widest_row(estimate)]
+        head = "" if by == ALL else f"{by} {name}: "
+        remarks += [
+            one.under(head)
+            for one in advice_after_estimate(
+                estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
+            )
+        ]
+    remarks += refusal_remarks(by, names, counts - in_range, counts, estimate)
+    # a file that takes its model as exact, of which no case states the error
+    errors = {} if estimator.sets is None else estimator.sets.common_errors
+    if errors.get(MODEL_ERROR_INPUT) == 0.0 and not (case is not None and case.discrepancy):
+        with_error = estimator.on(model_error=1.0)
+        _, typical = _estimates_of_runs(with_error, readings, by, box, typical=True)
+        for key, values in typical_columns(typical).items():
+            columns[key] = np.where(answered, values[index], np.nan)
+        remarks += typical_remarks(by, names, estimate, typical)
+    return columns, remarks

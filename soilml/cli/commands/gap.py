@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
-    InputFile,
     add_cost_option,
     add_effects_option,
     add_ignore_extra_option,
+    add_model_and_runs,
     add_seed_option,
     folder_outputs,
 )
-from soilml.cli.output_names import GAP_FILES, GAP_SUSPECTED
+from soilml.errors import InputError
+from soilml.io.atomic_files import write_files
+from soilml.io.cell_text import read_number
 
+if TYPE_CHECKING:
+    from soilml.physics.effects.base import Effect
+
+#: Files of the folder, and a further one where causes are suspected but not named.
+FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
+SUSPECTED_FILE = "model_suspected.toml"
 HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs. Where they disagree by more than noise
@@ -49,14 +59,9 @@ ranked by what they discriminate per cost.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
-    )
-    parser.add_argument(
-        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
-    )
+    add_model_and_runs(parser)
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the four files")
     parser.add_argument(
         "--holdout",
@@ -81,11 +86,69 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder exists already."""
-    return folder_outputs("--out", args.out, (*GAP_FILES, GAP_SUSPECTED))
+    return folder_outputs("--out", args.out, (*FILES, SUSPECTED_FILE))
 
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from soilml.cli.execution.gap import run
+    from soilml.cli.options import available_effects, check_seed, parse_costs, parse_names
+    from soilml.cli.output import origin_of, show, tell
+    from soilml.cli.progress import progress_bar
+    from soilml.cli.tables import print_table_hints, read_long_table
+    from soilml.config.case import read_case
+    from soilml.config.sensor_bias import checked_sensors
+    from soilml.io.read_table import RUNS
+    from soilml.optional_imports import need
 
-    return run(args)
+    for library in ("scipy", "jinja2", "matplotlib"):
+        need(library, "gap")
+    from soilml.gap import gap
+    from soilml.gap.presentation import gap_files, gap_text
+
+    check_seed(args)
+    effects = available_effects(args)
+    case = read_case(args.model, effects, with_bias=True)
+    checked = checked_sensors(case.bias) | _calibration(args.checked, effects)
+    case = replace(case, bias={})
+    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    print_table_hints(table, case)
+    with progress_bar(f"analysing {len(table)} rows", 100) as done:
+        report = gap(
+            case,
+            table,
+            free=parse_names(args.free),
+            holdout=args.holdout,
+            effects=effects,
+            calibration=checked,
+            costs=parse_costs(args),
+            seed=args.seed,
+            progress=lambda share: done(round(100 * share)),
+        )
+    texts = gap_files(report, str(args.model), str(args.runs), origin_of(args))
+    folder = Path(args.out)
+    # a suspected model of an earlier analysis would contradict this one
+    earlier = [folder / SUSPECTED_FILE] if SUSPECTED_FILE not in texts else []
+    files = {folder / name: text for name, text in texts.items()}
+    write_files(files, folders=[folder], remove=earlier)
+    show(gap_text(report))
+    tell(f"\n{', '.join(str(name) for name in files)}")
+    return 0
+
+
+def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        kinds = {n for n, e in effects.items() if e.about.kind in ("sensor", "rig")}
+        if name not in kinds:
+            names = ", ".join(sorted(kinds))
+            raise InputError(f"--checked {text!r}: needed is EFFECT=STD, with one of {names}")
+        try:
+            found[name] = read_number(value)
+        except ValueError:
+            found[name] = 0.0
+        if not 0.0 < found[name] < float("inf"):
+            raise InputError(
+                f"--checked {text!r}: the standard deviation must be a number above zero"
+            )
+    return found

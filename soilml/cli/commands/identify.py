@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
-    InputFile,
+    add_by_option,
     add_effects_option,
+    add_model_and_runs,
     add_report_option,
     add_row_options,
+    need_for_report,
     report_outputs,
 )
 from soilml.io.atomic_files import output_files
+
+if TYPE_CHECKING:
+    from soilml.identification.presentation import Identification
+    from soilml.io.table import Table
 
 HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
@@ -48,14 +56,9 @@ range open. Read the warnings.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
-    )
-    parser.add_argument(
-        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
-    )
+    add_model_and_runs(parser)
     parser.add_argument(
         "--method", default="nonlinear", help="nonlinear (default), linear, newton or posterior"
     )
@@ -63,9 +66,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
     )
     add_effects_option(parser)
-    parser.add_argument(
-        "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
-    )
+    add_by_option(parser)
     add_row_options(parser)
     parser.add_argument("--out", metavar="FILE.json", help="write the result to this file")
     add_report_option(parser)
@@ -78,6 +79,49 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Identify and write the result."""
-    from soilml.cli.execution.identify import run
+    from soilml.cli.options import available_effects, parse_names
+    from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
+    from soilml.cli.tables import print_table_hints, read_rows, result_by_group, tell_failures
+    from soilml.config.case import read_case
+    from soilml.io.read_table import RUNS
+    from soilml.optional_imports import need
+    from soilml.report.result_files import json_text
 
-    return run(args)
+    need("scipy", "identify")
+    need_for_report(args, "identify")
+    from soilml.experiment_design.advice_after_results import advice_after_fit
+    from soilml.experiment_design.messages import advice_as_json, next_row_remarks
+    from soilml.identification import identify
+    from soilml.identification.presentation import Identification, identify_report
+    from soilml.identification.typical_errors import fit_with_typical_errors
+
+    case = read_case(args.model, available_effects(args), with_bias=True)
+    table = read_rows(args, RUNS)
+    print_table_hints(table, case)
+    free = parse_names(args.free)
+
+    def solve(rows: Table) -> Identification:
+        fit = identify(case, rows, free, args.method)
+        advice = advice_after_fit(case, rows, free, fit) if fit.method == "posterior" else None
+        fit = replace(fit, samples=None)  # those of thousands of runs are not held together
+        typical = fit_with_typical_errors(case, rows, free, args.method, fit)
+        if advice is None:
+            return Identification(fit, typical)
+        return Identification(fit, typical, tuple(next_row_remarks(advice)), advice_as_json(advice))
+
+    found, failed = result_by_group(args, table, "identifying", solve)
+    runs = {name: result.as_json() for name, result in found.items()}
+    content = runs[""] if args.by is None else {"by": args.by, "runs": runs, "failed": failed}
+    text, files = json_text(content), (args.model, args.runs)
+    write_with_report(
+        args,
+        {args.out: text},
+        lambda: (identify_report(case, found, failed, args.by, files), content),
+    )
+    if args.out is not None or args.report is not None or is_terminal():
+        heads = {name: f"{args.by} {name}: " if name else "" for name in found}
+        show("\n\n".join(heads[name] + result.text() for name, result in found.items()))
+    else:
+        write_stdout(text)
+    tell_failures(args.by, failed)
+    return 0

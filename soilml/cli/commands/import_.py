@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import InputFile
-from soilml.cli.output_names import IMPORT_SUFFIXES
 from soilml.errors import InputError
-from soilml.io.atomic_files import output_files
+from soilml.io.atomic_files import output_files, save_text, write_files
 
+if TYPE_CHECKING:
+    from soilml.log_import.result import ImportedLog
+
+#: Endings of the table, its report and the errors that all rows share.
+SUFFIXES = (".csv", ".report.html", ".report.json", ".bias.toml")
 HELP = "bring logs of a rig or a rover into a table of runs"
 DESCRIPTION = """\
 Bring raw logs into the table RUNS.csv that identify, estimate and gap read:
@@ -32,9 +38,15 @@ RUNS.report.json, and RUNS.bias.toml: the errors that all rows share, as [bias]
 of a model file. A map that cannot be right is refused with the likely cause;
 --accept imports it as it is.
 """
+#: Columns of the table on the terminal; the file has all.
+_SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "drawbar_pull_N",
+          "sinkage_m")  # fmt: skip
+_MOST_SHOWN = 40
+#: Most logs that the next command names.
+_MOST_NAMED = 4
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("files", type=InputFile, metavar="LOG", nargs="+", help="logs, of any kind")
     parser.add_argument(
@@ -62,7 +74,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     if others and len(others) < len(args.files):
         print(f"! {args.out} is a table of runs and no log: it is written anew", file=sys.stderr)
         args.files = others
-    return output_files(args.out, *IMPORT_SUFFIXES)
+    return output_files(args.out, *SUFFIXES)
 
 
 def _is_that_table(file: str, out: str | None) -> bool:
@@ -77,6 +89,91 @@ def _is_that_table(file: str, out: str | None) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Write the map, or the table and its report."""
-    from soilml.cli.execution.import_ import run
+    from soilml.cli.output import is_terminal, origin_of, tell
+    from soilml.cli.progress import stage_progress
+    from soilml.io.text_tables import csv_text
+    from soilml.log_import.workflow import import_log
+    from soilml.optional_imports import need
+    from soilml.report.result_files import json_text
 
-    return run(args)
+    need("pint", "import")
+    if args.init:
+        return _init(args)
+    if args.out is not None:
+        for library in ("jinja2", "matplotlib"):
+            need(library, "import")
+    with stage_progress() as progress:
+        found = import_log(args.files, args.map, accept=args.accept, progress=progress)
+        html, entry = "", {}
+        if args.out is not None:
+            from soilml.log_import.page import page, summary
+
+            origin = origin_of(args)
+            html = page(found, progress, origin)
+            entry = {"report": summary(found).as_json(origin)}
+    _print_remarks(found)
+    if args.out is None:
+        _print_table(found)
+        return 0
+    files = output_files(args.out, *SUFFIXES)
+    texts = (
+        csv_text(found.table.columns),
+        html,
+        json_text(found.as_json() | entry),
+        found.bias_toml(),
+    )
+    write_files(dict(zip(files, texts, strict=True)))
+    if is_terminal():
+        _print_table(found)
+    tell(
+        f"{_counted(len(found.table), 'row')} of {_counted(found.runs, 'run')} written to "
+        f"{args.out}; report: {files[1]}; errors that all rows share, for the model file: "
+        f"{files[3]}. Next: soilml identify MODEL.toml {args.out}"
+    )
+    return 0
+
+
+def _counted(number: int, name: str) -> str:
+    return f"{number} {name}{'s' * (number != 1)}"
+
+
+def _init(args: argparse.Namespace) -> int:
+    from soilml.cli.output import tell, write_stdout
+    from soilml.log_import.guesses.map_text import init_map
+
+    text = init_map(args.files)
+    if args.out is None:
+        write_stdout(text)
+        return 0
+    save_text(args.out, text)
+    changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
+    lines = "1 line needs" if changes == 1 else f"{changes} lines need"
+    todo = f"{lines} a look (CHANGE, NEEDED)" if changes else "look at its guesses"
+    logs = [str(file) for file in args.files]
+    shown = shlex.join(logs) if len(logs) <= _MOST_NAMED else "LOG..."
+    tell(f"{args.out} written; {todo}; then: soilml import {shown} --map {args.out} --out runs.csv")
+    return 0
+
+
+def _print_remarks(found: ImportedLog) -> None:
+    from soilml.cli.output import tell
+
+    for text in (*found.implausible, *found.remarks):
+        tell(f"! {text}")
+    if not found.series:
+        return
+    short = sum(stop.stop - stop.start for _, stop in found.left_out())
+    tell(f"{short:.0f} s were left out; the report says why")
+
+
+def _print_table(found: ImportedLog) -> None:
+    from soilml.cli.output import format_columns, is_terminal, write_stdout
+    from soilml.io.text_tables import csv_text
+
+    table = found.table
+    if not is_terminal():
+        write_stdout(csv_text(table.columns))
+        return
+    columns = {name: table[name][:_MOST_SHOWN] for name in _SHOWN if name in table}
+    more = f"and {len(table) - _MOST_SHOWN} more\n" if len(table) > _MOST_SHOWN else ""
+    write_stdout(f"{format_columns(columns)}\n{more}")

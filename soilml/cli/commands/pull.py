@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from soilml.cli.options import (
     InputFile,
+    add_by_option,
     add_effects_option,
     add_gear_option,
+    add_model_and_runs,
     add_report_option,
     add_row_options,
+    need_for_report,
     number,
     report_outputs,
 )
+from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
+
+if TYPE_CHECKING:
+    from soilml.config.case import Case
+    from soilml.io.table import Table
+    from soilml.onboard.estimator import Estimator
+    from soilml.report.page import Report
+    from soilml.traction.presentation import Plotted, Presentation
+
+Result = TypeVar("Result", bound="Plotted")
 
 HELP = "drawbar pull against slip, and the slope that can be climbed"
 DESCRIPTION = """\
@@ -50,16 +65,13 @@ measurement. A value with a warning that it is not known is no more accurate
 than the prior. The CSV file has a row for each load and slip, in SI units.
 --report writes a page to read and print.
 """
+#: Largest number of loads.
+MAX_LOADS = 8
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil, priors and noise"
-    )
-    parser.add_argument(
-        "runs", type=InputFile, metavar="RUNS.csv", help="measured rows, CSV or Parquet"
-    )
+    add_model_and_runs(parser)
     parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
     parser.add_argument("--slope", metavar="A,B,...", help="slopes of a rover in degrees")
     parser.add_argument(
@@ -78,14 +90,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_effects_option(parser)
     add_gear_option(parser)
-    parser.add_argument(
-        "--by", metavar="COLUMN", help="one result for each value of this column, such as run"
-    )
+    add_by_option(parser)
     add_row_options(parser)
     parser.add_argument(
         "--as-usual",
         action="store_true",
-        help="allow for the errors that sensors and models usually have, as in identify",
+        help="allow for typical errors of sensors and model, as in identify",
     )
     parser.add_argument("--out", metavar="FILE.csv", help="write the curves to this file")
     parser.add_argument("--picture", metavar="FILE.png", help="draw the curves and bands")
@@ -103,6 +113,150 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
-    from soilml.cli.execution.pull import run
+    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.tables import print_table_hints, read_rows, result_by_group
+    from soilml.config.case import read_case, read_case_of_one_gear
+    from soilml.io.read_table import RUNS
+    from soilml.traction.presentation import PRESENTATION
+    from soilml.traction.report import pull_report
 
-    return run(args)
+    _check(args)
+    table = read_rows(args, RUNS)
+    options: dict[str, Any] = {
+        "slip_limit": args.slip_limit,
+        "free": parse_names(args.free),
+        "as_usual": args.as_usual,
+    }
+    if args.load is None and args.gear is None:
+        whole = read_case(args.model, available_effects(args), with_bias=True)
+        if whole.rover is not None:
+            print_table_hints(table, whole)
+            return _run_rover(args, whole, table, options)
+    for option in ("slope", "gravity"):
+        if getattr(args, option) is not None:
+            raise InputError(
+                f"--{option} needs a model file with [rover], and neither --load nor --gear"
+            )
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear, True)
+    print_table_hints(table, case)
+    loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
+    if len(loads or ()) > MAX_LOADS:
+        raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
+    options |= {"loads": loads, "estimator": _estimator(args)}
+    found, failed = result_by_group(
+        args, table, "predicting", lambda rows: pull_report(case, rows, **options)
+    )
+    _write_results(args, found, PRESENTATION, failed)
+    return 0
+
+
+def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict[str, Any]) -> int:
+    """The same for a whole rover."""
+    import numpy as np
+
+    from soilml.cli.options import parse_numbers
+    from soilml.cli.tables import result_by_group
+    from soilml.config.wheeled_rover import read_gravity
+    from soilml.traction.rover.presentation import rover_presentation
+    from soilml.traction.rover.report import rover_report, with_gravity
+
+    if args.gravity is not None:
+        case = with_gravity(case, read_gravity(args.gravity))
+    slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
+    options |= {"slopes": slopes, "estimator": _estimator(args)}
+    found, failed = result_by_group(
+        args, table, "predicting", lambda rows: rover_report(case, rows, **options)
+    )
+    assert case.rover is not None
+    _write_results(args, found, rover_presentation(case.rover), failed)
+    return 0
+
+
+def _estimator(args: argparse.Namespace) -> Estimator | None:
+    """The trained file of --from."""
+    if args.trained is None:
+        return None
+    from soilml.optional_imports import need
+
+    need("onnxruntime", "pull")
+    from soilml.onboard.estimator import Estimator
+
+    return Estimator.load(args.trained)
+
+
+def _check(args: argparse.Namespace) -> None:
+    from soilml.optional_imports import need
+
+    if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
+        raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip between 0 and 1")
+    need_for_report(args, "pull")
+    if args.picture is not None:
+        need("matplotlib", "pull --picture")
+        if args.by is not None:
+            raise InputError(
+                "--picture draws one soil; select it with --where run=NAME instead of --by"
+            )
+    if args.trained is not None and args.as_usual:
+        raise InputError("--as-usual applies to the posterior, not to the file of --from")
+    if args.trained is not None and args.free is not None:
+        raise InputError(
+            "--free applies to the posterior; the parameters of --from are those of the model file"
+        )
+
+
+def _write_results(
+    args: argparse.Namespace,
+    found: Mapping[str, Result],
+    how: Presentation[Result],
+    failed: Mapping[str, str],
+) -> None:
+    """Write --out, --picture and --report as one set; then text, or CSV into a pipe.
+
+    Parameters
+    ----------
+    found
+        Results by group of --by; one under "" without groups.
+    failed
+        Why other groups have none.
+    """
+    import numpy as np
+
+    from soilml.cli.output import is_terminal, show, tell, write_stdout, write_with_report
+    from soilml.cli.tables import tell_failures
+    from soilml.io.text_tables import csv_text
+    from soilml.report.figure_style import save_png
+
+    parts: list[dict[str, Any]] = []
+    for name, one in found.items():
+        own = how.columns(one)
+        count = len(next(iter(own.values())))
+        parts.append(({args.by: np.full(count, name)} if args.by else {}) | dict(own))
+    columns = {key: np.concatenate([np.asarray(p[key]) for p in parts]) for key in parts[0]}
+
+    def draw(path: Path) -> None:
+        (only,) = found.values()
+        rows, across, size = how.panels(only)
+        save_png(only.plot, rows, across, size, path)
+
+    def build() -> tuple[Report, Mapping[str, Any]]:
+        content = {
+            "columns": {name: values.tolist() for name, values in columns.items()},
+            "warnings": {
+                name: [remark.as_json() for remark in how.warnings(one)]
+                for name, one in found.items()
+            },
+            "failed": dict(failed),
+        }
+        return how.page(found, args.by, (args.model, args.runs)), content
+
+    table = csv_text(columns)
+    write_with_report(args, {args.out: table, args.picture: draw}, build)
+    heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
+    if args.out is None and args.report is None and not is_terminal():
+        write_stdout(table)
+        for name, one in found.items():
+            for remark in how.warnings(one):
+                tell(f"{heads[name]}{remark}")
+    else:
+        show("\n\n".join(heads[name] + how.text(one) for name, one in found.items()))
+    tell_failures(args.by, failed)

@@ -3,6 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import json
+from typing import TYPE_CHECKING
+
+from soilml.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from soilml.physics.soils import SoilEntry
 
 HELP = "list the published soils, or show one with its source"
 DESCRIPTION = """\
@@ -14,7 +21,7 @@ that is not printed in the paper and is assumed.
 """
 
 
-def add(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("name", nargs="?", help="PAPER/SOIL, the name of the soil to show")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -22,6 +29,73 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
-    from soilml.cli.execution.soils import run
+    from soilml.physics.soils import soil_catalogue
 
-    return run(args)
+    catalogue = soil_catalogue()
+    if args.name is not None and args.name not in catalogue:
+        raise InputError(
+            f"no soil {args.name!r}; {did_you_mean(args.name, catalogue)}`soilml soils` lists them"
+        )
+    chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
+    if args.json:
+        print(json.dumps({name: _as_json(entry) for name, entry in chosen.items()}, indent=1))
+    elif args.name is None:
+        print(_list(list(chosen.values())))
+    else:
+        print(_one(catalogue[args.name]))
+    return 0
+
+
+def _list(entries: list[SoilEntry]) -> str:
+    from soilml.io.text_tables import format_table
+
+    header = ("soil", "c kPa ", "phi deg ", "K mm ", "n ", "what")
+    rows = []
+    for entry in entries:
+        values = (
+            f"{_text(entry, field)}{'*' if field in entry.assumed else ' '}"
+            for field in ("cohesion", "friction_angle", "shear_modulus", "n")
+        )
+        rows.append((entry.name, *values, entry.text))
+    notes = (
+        "* not printed in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
+        "--json all."
+    )
+    return f"{format_table(header, rows, last_left=True)}\n{notes}"
+
+
+def _text(entry: SoilEntry, field: str) -> str:
+    """The value of a parameter in the unit of a terminal."""
+    from soilml.parameters import declared
+    from soilml.physics.soils import Soil
+    from soilml.report.terminal import shown_unit, significant
+
+    value = float(getattr(entry.soil, field))
+    return significant(shown_unit(declared(Soil)[field].unit, value)[0] * value)
+
+
+def _one(entry: SoilEntry) -> str:
+    from soilml.io.text_tables import format_table
+    from soilml.parameters import declared
+    from soilml.physics.soils import Soil
+    from soilml.report.terminal import shown_unit
+
+    rows = []
+    for name, parameter in declared(Soil).items():
+        note = "assumed" if name in entry.assumed else "published"
+        if name not in entry.assumed and name not in entry.published:
+            note = "default"
+        if entry.published.get(name, 0.0) < 0.0 == getattr(entry.soil, name):
+            note = f"published as {entry.published[name]:g}: models use 0"
+        unit = shown_unit(parameter.unit, float(getattr(entry.soil, name)))[1]
+        rows.append((name, parameter.text, note, _text(entry, name), unit))
+    table = format_table(("field", "what", "from", "value", "unit"), rows, text_columns=3)
+    return f"{entry.name}: {entry.text}\n{entry.source}\n\n{table}"
+
+
+def _as_json(entry: SoilEntry) -> dict[str, object]:
+    from soilml.parameters import declared
+    from soilml.physics.soils import Soil
+
+    values = {name: getattr(entry.soil, name) for name in declared(Soil)}
+    return {"text": entry.text, "source": entry.source, "assumed": entry.assumed, "values": values}

@@ -1,28 +1,117 @@
-"""The case that the page has chosen: a wheel and a soil of the lists, or a model file."""
+"""The case that the page has chosen: a wheel and a soil of its lists, or a model file."""
 
 from __future__ import annotations
 
 import tempfile
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from soilml.config.case import Case, read_case
+from soilml.config.measurement_noise import Noise
+from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
+from soilml.numerics.prior import Prior
 from soilml.parameters import located
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.gears import Track, Wheel
 from soilml.physics.gears.base import Gear
 from soilml.physics.model import Model
-from soilml.physics.soils import soil
-from soilml.serve.answers.choices import FIRST_SOIL, FIRST_WHEEL, WHEELS
+from soilml.physics.soils import soil, soil_catalogue
 
 #: Name of a model file in messages.
 MODEL_FILE = "MODEL.toml"
 #: Kinds of effects that the page offers; those of sensors belong to a log.
 _OPERATING: tuple[str, ...] = ("slip", "load")
 OFFERED_KINDS = ("soil", "wheel", "rig")
+#: Priors and noise of a model file that the page writes: those of `soilml init`.
+PRIOR = {
+    "cohesion": Prior(0.0, 5000.0),
+    "friction_angle": Prior(0.35, 0.80),
+    "shear_modulus": Prior(0.003, 0.05, log=True),
+}
+NOISE = {
+    "torque_Nm": Noise(share=0.02),
+    "drawbar_pull_N": Noise(share=0.02, constant=0.5),
+    "sinkage_m": Noise(constant=0.001),
+}
+_COMMENTS = (
+    "Wheel and soil as chosen on the page; docs/model-file.md explains every section. SI units.",
+    "[soil.prior] is what may be true before the log: cohesion, friction angle and shear modulus",
+    "are identified in it. [noise] is one standard deviation of each sensor: correct both.",
+)
+
+
+@dataclass(frozen=True)
+class WheelChoice:
+    """A running gear of the list, with the load (N) that it usually carries."""
+
+    label: str
+    source: str
+    gear: Callable[[], Gear]
+    load: float
+
+
+#: Running gears by the name that the page sends.
+WHEELS: dict[str, WheelChoice] = {
+    "example": WheelChoice(
+        "Wheel of the README, 150 × 120 mm",
+        "radius 150 mm, width 120 mm: the wheel of the examples and of the released model files",
+        lambda: Wheel(radius=0.15, width=0.12),
+        60.0,
+    ),
+    "nagatani2009": WheelChoice(
+        "Force-sensor wheel, 55 × 64 mm",
+        "Nagatani et al. 2009: wheel with force sensors in its rim",
+        lambda: Wheel(radius=0.055, width=0.064),
+        28.92,
+    ),
+    "kls1": WheelChoice(
+        "Wheel of the KLS-1 tests, 85 × 80 mm",
+        "the smooth wheel of the tests on the lunar simulant KLS-1",
+        lambda: Wheel(radius=0.085, width=0.080),
+        58.9,
+    ),
+    "comin2017": WheelChoice(
+        "Wheel beside the wheel-legs, 150 × 180 mm",
+        "Comin and Saaj 2017: the wheel that wheel-legs are compared with",
+        lambda: Wheel(radius=0.15, width=0.18),
+        490.5,
+    ),
+    "wang2018": WheelChoice(
+        "Track of the tracked robot, 600 mm long",
+        "Wang et al. 2018: one of two tracks of a robot of 130 kg",
+        lambda: Track(radius=0.1, width=0.08, base=0.6),
+        637.6,
+    ),
+}
+#: What the page shows first.
+FIRST_WHEEL, FIRST_SOIL = "example", "wong1989/dry_sand"
+
+
+def choices() -> dict[str, Any]:
+    """The lists of the page."""
+    from soilml import __version__
+
+    return {
+        "version": __version__,
+        "wheels": [
+            {"id": key, "label": wheel.label, "note": wheel.source} for key, wheel in WHEELS.items()
+        ],
+        "soils": [
+            {"id": name, "label": f"{entry.text} – {name}", "note": _source(entry)}
+            for name, entry in soil_catalogue().items()
+        ],
+        "first": {"wheel": FIRST_WHEEL, "soil": FIRST_SOIL},
+    }
+
+
+def _source(entry: Any) -> str:
+    assumed = f"; assumed, not printed there: {', '.join(entry.assumed)}" if entry.assumed else ""
+    return f"{entry.source}{assumed}"
 
 
 def whole_case(request: dict[str, Any]) -> Case:
@@ -102,3 +191,17 @@ def _is_default(effect: Effect) -> bool:
         return False
     default = located(type(effect)())
     return all(default[path][1] == entry[1] for path, entry in located(effect).items())
+
+
+def model_text(request: dict[str, Any]) -> dict[str, str]:
+    """The text of a model file: the one that was given, once checked, or the sliders' own.
+
+    Raises `InputError` as `forward_case` does.
+    """
+    given = request.get("model")
+    if isinstance(given, str) and given.strip() and not request.get("values"):
+        whole_case(request)
+        return {"text": given}
+    case, _ = with_sliders(forward_case(request), request)
+    own = replace(case, prior=case.prior or PRIOR, noise=case.noise or NOISE)
+    return {"text": case_as_toml(own, _COMMENTS)}

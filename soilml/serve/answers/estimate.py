@@ -6,26 +6,27 @@ from typing import Any
 
 import numpy as np
 
-from soilml.cli.advice_text import advice_after_fit
-from soilml.cli.output import json_text
-from soilml.cli.reports.rover import rover_text
-from soilml.cli.table_remarks import table_remarks
-from soilml.cli.usual_errors.usual_fit import usual_fit
 from soilml.config.case import Case, read_case
 from soilml.config.write_case import case_as_toml
-from soilml.errors import SoilmlError
+from soilml.errors import InputError, SoilmlError
 from soilml.experiment_design import Advice
-from soilml.experiment_design.messages import abstention_message, next_row_messages, row_message
+from soilml.experiment_design.advice_after_results import advice_after_fit
+from soilml.experiment_design.messages import abstention_message, next_row_remarks, row_message
 from soilml.fitting.free_parameters import select_free
 from soilml.identification import Fit, identify
+from soilml.identification.typical_errors import fit_with_typical_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
+from soilml.log_import.checks.table_remarks import table_remarks
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
-from soilml.remarks import texts
-from soilml.serve.answers.dropped_file import table_summary
-from soilml.serve.answers.job_output import Tell, setting_file, write_files
-from soilml.serve.answers.pull_curves import pull_curves, pull_of_gears
-from soilml.traction.report import pull_report
+from soilml.remarks import Remark, texts
+from soilml.report.result_files import json_text
+from soilml.serve.answers.job_files import Tell, setting_file, write_files
+from soilml.serve.answers.logs import table_summary
+from soilml.traction.by_load import LoadPrediction
+from soilml.traction.report import PullReport, pull_report
+from soilml.traction.rover.presentation import rover_text
 from soilml.traction.rover.report import rover_report
 
 #: SI unit -> shown unit and its factor.
@@ -49,37 +50,36 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     remarks = table_remarks(table, case)
     tell(f"estimating the soil from {len(table)} rows")
     fit = identify(case, table, None, "posterior")
-    tell("allowing for the errors that sensors and models usually have")
-    usual = usual_fit(case, table, None, "posterior", fit)
+    tell("allowing for typical errors of model and sensors")
+    both = fit_with_typical_errors(case, table, None, "posterior", fit)
+    typical = None if both is None else both.typical
     tell("looking for the next measurement")
     advice = advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
-    pull = _pull(case, table, as_usual=usual is not None)
-    pull["as_usual"] = usual is not None
-    pull["warnings"] = [w for w in pull.get("warnings", []) if w not in texts(fit.warnings)]
-    best = fit if usual is None else usual.usual
+    pull = _pull(case, table, as_usual=both is not None)
+    pull["as_usual"] = both is not None
+    pull["warnings"] = texts(w for w in pull.get("warnings", []) if w not in fit.warnings)
+    best = fit if typical is None else typical
     found = case.with_values(dict(zip(best.names, map(float, best.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
-    texts = {
+    written = {
         "identify.json": json_text(
-            fit.as_json() | ({} if usual is None else {"as_usual": usual.as_json()})
+            fit.as_json() | ({} if both is None else {"as_usual": both.as_json()})
         ),
         "model.toml": case_as_toml(found, [f"Soil as estimated from {rows}; priors unchanged."]),
     }
     return {
         **table_summary(table),
         "remarks": remarks,
-        "parameters": parameters(case, fit, None if usual is None else usual.usual),
-        "believe": "" if usual is None else usual.note(),
+        "parameters": parameters(case, fit, typical),
+        "use": "" if both is None else both.remark().text,
         "words": words(fit, advice),
-        "warnings": [
-            r.text for r in fit.warnings if r.code not in ("not-identified", "weakly-identified")
-        ],
+        "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),
         "next": "" if advice is None else row_message(advice, advice.best()),
         "misfit": fit.misfit,
         "channels": [COLUMNS[name].name.replace("_", " ") for name in fit.channels],
         "pull": pull,
-        "files": write_files(texts),
+        "files": write_files(written),
     }
 
 
@@ -140,7 +140,7 @@ def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
 def words(fit: Fit, advice: Advice | None) -> list[str]:
     """What the rows do not determine, and what to measure next."""
     if advice is not None:
-        return next_row_messages(advice)
+        return texts(next_row_remarks(advice))
     left = fit.remaining_fraction.items()
     return [abstention_message(name, part) for name, part in left if part > NOT_IDENTIFIED_ABOVE]
 
@@ -155,3 +155,56 @@ def _pull(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
         return pull_curves(pull_report(case, table, as_usual=as_usual))
     except SoilmlError as error:
         return {"reason": " ".join(str(error).split())}
+
+
+def pull_curves(report: PullReport) -> dict[str, Any]:
+    """The curves of each load, with pull in N and slope in degrees."""
+    slip, load, pull = report.measured_pull
+    return {
+        "loads": [_curves(one) for one in report.by_load],
+        "measured": {"slip": slip.tolist(), "load": load.tolist(), "pull": pull.tolist()},
+        "warnings": list(report.warnings),
+    }
+
+
+def pull_of_gears(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
+    """The curves of each gear that was driven, on the soil that its own rows show.
+
+    Raises `InputError` where rows do not name their gear.
+    """
+    if "gear" not in table:
+        raise InputError("MODEL.toml has several gears, and the table no column gear")
+    text = "the soil below each wheel is that of its own rows"
+    own_soil = Remark("soil-per-gear", text, tuple(case.gears), "note")
+    loads, warnings = [], [own_soil]
+    for name in case.gears:
+        rows = table.rows(table["gear"] == name)
+        if len(rows):
+            own = pull_curves(pull_report(case.of_gear(name), rows, as_usual=as_usual))
+            loads += [one | {"gear": name, "measured": own["measured"]} for one in own["loads"]]
+            warnings += own["warnings"]
+    if not loads:
+        raise InputError(f"no row has a gear of MODEL.toml: {', '.join(case.gears)}")
+    return {"loads": loads, "warnings": list(dict.fromkeys(warnings))}
+
+
+def _curves(one: LoadPrediction) -> dict[str, Any]:
+    after, before = one.posterior, one.prior
+    return {
+        "load": after.load,
+        "slip": after.slip.tolist(),
+        "pull": _band(quantile_band(after.pull)),
+        "prior_pull": _band(quantile_band(before.pull)),
+        "slope": _band(quantile_band(np.rad2deg(after.slope))),
+        "prior_slope": _band(quantile_band(np.rad2deg(before.slope))),
+        "largest_pull": _band(quantile_band(after.largest_pull)),
+        "best_slip": _band(quantile_band(after.best_slip)),
+        "steepest_slope": _band(quantile_band(np.rad2deg(after.steepest_slope))),
+        "known": [left <= NOT_IDENTIFIED_ABOVE for left in one.remaining_fraction],
+        "warnings": texts(one.warnings),
+    }
+
+
+def _band(found: QuantileBand) -> list[Any]:
+    """Lower end, median, upper end."""
+    return [np.asarray(v).tolist() for v in (found.lower, found.middle, found.upper)]

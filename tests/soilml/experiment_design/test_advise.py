@@ -16,11 +16,12 @@ from soilml.experiment_design import (
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.messages import next_row_messages, summary
+from soilml.experiment_design.messages import advice_as_json, next_row_remarks
 from soilml.fitting.free_parameters import select_free
 from soilml.fitting.observations import read_observations
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
+from soilml.remarks import texts
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
@@ -135,7 +136,7 @@ def test_messages_name_parameters_that_are_not_identified(case):
     text = abstention_message("friction_angle", 0.92)
     assert text == "friction angle: not identified by these rows, 92% of the prior's width remains"
     found = after(case, [0.6] * 3, [60.0] * 3, count=2)
-    said = " | ".join(next_row_messages(found))
+    said = " | ".join(texts(next_row_remarks(found)))
     assert "cohesion: not identified by these rows" in said and "a repetition leaves" in said
     assert (
         "Most informative next: slip" in said and "best next row for all parameters: slip" in said
@@ -145,11 +146,11 @@ def test_messages_name_parameters_that_are_not_identified(case):
 def test_messages_name_several_rows_where_one_does_not_suffice(case):
     loud = replace(case, noise={"torque_Nm": Noise(share=0.4)})
     found = advise(loud, samples_of_prior(select_free(loud, None), 400), GRID, count=3)
-    assert "3 rows leave" in " ".join(next_row_messages(found))
+    assert "3 rows leave" in " ".join(texts(next_row_remarks(found)))
 
 
 def test_the_summary_has_slip_load_channels_and_every_fraction(case):
-    content = summary(after(case, [0.2], [60.0]))
+    content = advice_as_json(after(case, [0.2], [60.0]))["advice"]
     assert set(content) == {"next", "next_for", "repeat"}
     assert content["repeat"]["slip"] == 0.2 and content["next"]["channels"] == ["torque"]
     assert set(content["next_for"]) == set(content["next"]["remaining_fraction"]) == set(SOIL)

@@ -5,7 +5,7 @@ import pytest
 from gap_sets import case_of
 
 from soilml import Operating, identify
-from soilml.cli.table_remarks import print_table_hints
+from soilml.cli.tables import print_table_hints
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.fitting.channel_predictions import forces

@@ -212,7 +212,7 @@ def test_a_closed_form_takes_the_model_as_right(case):
     assert "bias-ignored" in {remark.code for remark in fit.warnings}
 
 
-def test_the_command_gives_both_answers_and_says_which_one_to_believe(
+def test_the_command_gives_both_intervals_and_says_which_one_to_use(
     case, model_file, tmp_path, capsys
 ):
     text = model_file.read_text() + "\n[bias]\nslip = 0.01\n"
@@ -226,8 +226,8 @@ def test_the_command_gives_both_answers_and_says_which_one_to_believe(
     assert main(["identify", *files, "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "errors that all rows share are included in std: slip 0.01" in shown
-    assert "as usual" in shown
-    assert "believe the second answer" in shown
+    assert "with typical model and sensor errors" in shown
+    assert "use the interval that includes typical errors" in shown
     assert '"as_usual"' in out.read_text()
 
 

@@ -5,10 +5,8 @@ import pytest
 
 from soilml import EFFECTS, Model, Operating, Wheel, read_case, soil
 from soilml.errors import InputError
-from soilml.serve.answers.choices import WHEELS, choices
-from soilml.serve.answers.controls import controls
-from soilml.serve.answers.forward import forward
-from soilml.serve.answers.model_text import model_text
+from soilml.serve.answers.chosen_case import WHEELS, choices, model_text
+from soilml.serve.answers.forward import controls, forward
 
 MODEL = """\
 [gear]

@@ -6,7 +6,7 @@ import socket
 import pytest
 from served_page import page as page
 
-from soilml.serve.web.uploads import LARGEST_FILE, plain_name
+from soilml.serve.uploads import LARGEST_FILE, plain_name
 
 
 def error_of(answer):

@@ -8,7 +8,7 @@ import pytest
 from served_page import page as page
 
 from soilml.errors import InputError
-from soilml.serve.web.uploads import LARGEST_FILE, LARGEST_SUM, Uploads
+from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM, Uploads
 
 COUNT = LARGEST_SUM // LARGEST_FILE
 

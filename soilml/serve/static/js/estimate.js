@@ -67,8 +67,8 @@ function show({ id, result }) {
   const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.usual_si ?? p.si]));
   const place = byId("estimate-result");
   place.replaceChildren(
-    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue, the first answer: what the log leaves, 90 % of it, if the model file is right. Brown, the second: the same with the errors that sensors and models usually have; the large figures and the pull below are from it, where there is one.`),
-    ...(result.believe ? [element("p", { class: "next" }, `${result.believe[0].toUpperCase()}${result.believe.slice(1)}.`)] : []),
+    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, with the model file taken as exact. Brown: the 90 % interval with typical errors of model and sensors; the large figures and the pull below are from it, where there is one.`),
+    ...(result.use ? [element("p", { class: "next" }, `${result.use[0].toUpperCase()}${result.use.slice(1)}.`)] : []),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
     ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
       wordList([...result.remarks, ...result.warnings], "remark")].filter(Boolean),
@@ -88,7 +88,7 @@ function show({ id, result }) {
 function band(parameter) {
   const { label, symbol, unit } = parameter;
   const { value, band: [low, high], left, identified, weak } = deserved(parameter);
-  const told = !identified
+  const state = !identified
     ? `not identified: ${percent(left)} of the prior's width remains`
     : `${weak ? "weakly identified" : "identified"}: ${percent(left)} of the prior's width remains`;
   return element("article", { class: "band" },
@@ -96,21 +96,21 @@ function band(parameter) {
       element("span", { class: "value" }, identified ? `${withUnit(value, unit)} ` : "not known ",
         element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))),
     picture(parameter),
-    element("p", { class: `told ${identified ? "yes" : "no"}` }, told), firstWords(parameter));
+    element("p", { class: `state ${identified ? "yes" : "no"}` }, state), firstWords(parameter));
 }
 
-/** The answer to act on: the second one, with the errors that sensors and models usually have. */
+/** The interval to act on: the one with typical errors of model and sensors. */
 function deserved(parameter) {
   if (!parameter.usual_band) return parameter;
   return { value: parameter.usual, band: parameter.usual_band, left: parameter.usual_left,
     identified: parameter.usual_identified, weak: parameter.usual_weak };
 }
 
-/** The first answer, where the second one is the large figure. */
+/** The interval of the exact model, where the other one is the large figure. */
 function firstWords({ usual_band: usual, value, band: ends, identified: known, left, unit }) {
   if (!usual) return null;
   const shown = known ? `${withUnit(value, unit)} (90 %: ${range(...ends, unit)})` : `not known (90 %: ${range(...ends, unit)})`;
-  return element("p", { class: "told first" }, `if the model file is right: ${shown}, ${percent(left)} of the prior's width remains`);
+  return element("p", { class: "state first" }, `with the model file taken as exact: ${shown}, ${percent(left)} of the prior's width remains`);
 }
 
 const SYMBOLS = { phi: "φ", k_phi: "kφ", k_c: "kc", a_0: "a₀", a_1: "a₁", gamma: "γ" };

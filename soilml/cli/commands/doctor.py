@@ -1,0 +1,122 @@
+"""`soilml doctor`: whether this installation works, and what it can do."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterator
+from importlib import metadata
+
+from soilml.errors import SoilmlError
+
+HELP = "check this installation: libraries, model files, output"
+DESCRIPTION = """\
+Check this installation: which libraries are present and in which version, what
+cannot be done without the missing ones, and whether a released model file gives
+its known answers on this machine. The exit status is 1 where something that the
+installed parts need does not work.
+"""
+#: What needs each library, beside the board's own two.
+USES = {
+    "numpy": "everything",
+    "onnxruntime": "estimate, pull --from: model files",
+    "scipy": "identify, gap, pull, generate",
+    "pyarrow": "Parquet tables; generate, train",
+    "rich": "progress bars",
+    "pint": "import",
+    "h5py": "import of MATLAB 7.3",
+    "mcap": "import of MCAP",
+    "rosbags": "import of ROS bags",
+    "matplotlib": "pictures",
+    "jinja2": "report of gap; export-c",
+    "onnx": "train, export-c",
+    "torch": "train of an MLP",
+    "scikit-learn": "train",
+    "array-api-compat": "the forward model on torch tensors; train",
+    "tornado": "serve",
+    "threadpoolctl": "gap, generate, train",
+    "dask": "generate --engine dask",
+    "distributed": "generate --engine dask",
+}
+#: The libraries without which nothing works.
+NEEDED = ("numpy", "onnxruntime")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the findings; 1 where something does not work."""
+    from soilml import __version__
+    from soilml.io.text_tables import format_table
+
+    print(f"soilml {__version__}, Python {platform.python_version()}, {platform.platform()}")
+    print(f"{_cores()} usable cores; {sys.executable}\n")
+    print(format_table(("library", "version", "needed for"), list(_libraries()), text_columns=3))
+    problems = list(_problems())
+    print()
+    for text in problems:
+        print(f"! {text}")
+    if not problems:
+        print("released model files give their known answers; nothing is wrong")
+    return 1 if problems else 0
+
+
+def _libraries() -> Iterator[tuple[str, str, str]]:
+    for name, use in USES.items():
+        yield name, _version(name) or "-", use
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _problems() -> Iterator[str]:
+    """What does not work: missing or too old libraries, model files that fail."""
+    for name in NEEDED:
+        if not _version(name):
+            yield f"{name} is missing: pip install {name}"
+    for name, least in _least_versions().items():
+        found = _version(name)
+        if found and _numbers(found) < _numbers(least):
+            yield f"{name} is {found}; needed is {least} or newer: pip install -U {name}"
+    if not all(_version(name) for name in NEEDED):
+        return
+    from soilml.onboard.estimator import Estimator
+    from soilml.onboard.model_file import released_models
+
+    files = released_models()
+    if not files:
+        yield "no released model files are part of this installation"
+    for file in files.values():
+        try:
+            Estimator.load(file)
+        except SoilmlError as error:
+            yield str(error)
+
+
+def _least_versions() -> dict[str, str]:
+    """The oldest version of each library that this distribution allows."""
+    try:
+        required = metadata.requires("soilml") or []
+    except metadata.PackageNotFoundError:  # a checkout that is not installed
+        return {}
+    found = (re.match(r"([\w.-]+)\s*(?:>=|==)\s*([\d.]+)", text) for text in required)
+    return {match[1]: match[2] for match in found if match is not None}
+
+
+def _numbers(version: str) -> list[int]:
+    """A release number as a list that compares as versions do."""
+    return [int(part) for part in re.findall(r"\d+", version.split("+")[0])[:3]]
+
+
+def _cores() -> int:
+    usable = getattr(os, "sched_getaffinity", None)
+    return len(usable(0)) if usable is not None else os.cpu_count() or 1

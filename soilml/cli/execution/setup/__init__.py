@@ -1,1 +1,0 @@
-"""What the commands about the installation and the first files do."""

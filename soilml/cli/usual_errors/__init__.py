@@ -1,1 +1,0 @@
-"""Second answers: with the errors that sensors and models usually have."""

@@ -1,0 +1,157 @@
+"""The advised next measurement after a fit, and after the estimate of a trained model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case, take_case
+from soilml.errors import FitError, InputError, SoilmlError
+from soilml.experiment_design.candidate_rows import CandidateGrid, candidate_grid
+from soilml.experiment_design.design import Advice, advise
+from soilml.experiment_design.messages import next_row_remarks
+from soilml.experiment_design.parameter_samples import (
+    ParameterSamples,
+    samples_of_moments,
+    samples_of_rows,
+)
+from soilml.fitting.free_parameters import select_free
+from soilml.fitting.observations import read_observations
+from soilml.identification.fit_result import Fit
+from soilml.io.table import Table
+from soilml.io.toml_settings import Settings
+from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.quantities import CHANNELS, column
+from soilml.remarks import Remark
+
+if TYPE_CHECKING:
+    from soilml.onboard.estimator import Estimator
+
+Floats = NDArray[np.float64]
+
+#: Samples and simulated readings of an advice that accompanies a result: takes half a second.
+QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
+#: Rows up to which the exact posterior after an estimate takes at most half a second too.
+MAX_EXACT_ROWS = 4
+#: Rows in the planned sequence of such an advice.
+SEQUENCE_LENGTH = 2
+#: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
+CASE_KEYS = {"gear", "soil", "effect", "noise", "discrepancy", "operating", "rows", "seed", "runs"}
+#: Candidate slips, and loads, in the ranges of a recipe.
+GRID_SIZE = 4
+
+
+def advice_after_fit(
+    case: Case, table: Table, free: Sequence[str] | None, fit: Fit
+) -> Advice | None:
+    """Advice after the posterior method gave `fit`; None where none is possible.
+
+    That is the case where [noise] declares no channel, where no candidate is known to be feasible,
+    and where several gears were driven.
+    """
+    if case.gears:
+        return None
+    try:
+        data = read_observations(case, table)
+        selected = select_free(case, free)
+        samples = samples_of_rows(case, data, selected, QUICK_SAMPLES, found=fit.samples)
+        current = np.asarray([fit.remaining_fraction[f.path] for f in samples.free])
+        return _quick(
+            case, samples, candidate_grid(None, None, data.load), data.at, current_fraction=current
+        )
+    except (FitError, InputError):
+        return None
+
+
+def advice_after_estimate(
+    estimator: Estimator,
+    mean: Floats,
+    covariance: Floats,
+    readings: Mapping[str, Floats],
+) -> list[Remark]:
+    """Remarks on the next measurement after an estimate, (q,) and (q, q), of readings (rows,).
+
+    The present width is that of the estimate. The effect of a next row on it follows from the exact
+    posterior of up to `MAX_EXACT_ROWS` rows, and for more rows from mean and covariance. Model,
+    prior and noise are those of the recipe in the file; slips, loads and sensors are those of its
+    training. No remarks where the recipe has what a case lacks: sensor bias, vibration, speed, or
+    slip as a target.
+    """
+    trained = _trained_for(estimator)
+    if trained is None:
+        return []
+    case, ranges = trained
+    slip, load = (np.atleast_1d(readings[key]) for key in ("slip", "load"))
+    current = np.sqrt(np.diag(covariance)) / estimator.prior.std
+    try:
+        free = select_free(case, None)
+        if slip.size <= MAX_EXACT_ROWS:
+            rows = Table({column(n): np.atleast_1d(readings[n]) for n in estimator.inputs})
+            samples = samples_of_rows(case, read_observations(case, rows), free, QUICK_SAMPLES)
+        else:
+            samples = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
+        advice = _quick(
+            case,
+            samples,
+            ranges,
+            Operating(slip=slip, load=load),
+            channels=estimator.inputs,
+            parameters=estimator.names,
+            current_fraction=current,
+        )
+    except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
+        return []
+    return next_row_remarks(advice, "this row" if slip.size == 1 else "these rows")
+
+
+def mean_covariates(at: Operating) -> dict[str, float]:
+    """Means of the covariates of measured rows, which are assumed for the next row."""
+    values = {field: getattr(at, field) for field in COVARIATES}
+    return {field: float(np.mean(value)) for field, value in values.items() if value is not None}
+
+
+def _quick(
+    case: Case,
+    samples: ParameterSamples,
+    ranges: CandidateGrid,
+    driven: Operating,
+    *,
+    channels: tuple[str, ...] | None = None,
+    parameters: tuple[str, ...] | None = None,
+    current_fraction: Floats | None = None,
+) -> Advice:
+    return advise(
+        case,
+        samples,
+        ranges,
+        measured=driven,
+        count=SEQUENCE_LENGTH,
+        covariates=mean_covariates(driven),
+        channels=channels,
+        parameters=parameters,
+        current_fraction=current_fraction,
+        outcome_count=QUICK_OUTCOMES,
+    )
+
+
+def _trained_for(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
+    """The case and the candidate grid of a model file; None where no case can represent it."""
+    read = {*estimator.inputs}
+    if estimator.per_row or not {"slip", "load"} < read <= {"slip", "load", *CHANNELS}:
+        return None
+    try:
+        recipe = json.loads(estimator.metadata["recipe"])
+        if recipe.keys() - CASE_KEYS or recipe["operating"].keys() - {"slip", "load_N"}:
+            return None
+        case = take_case(Settings(recipe, estimator.path, Path()))
+        ends = [recipe["operating"][key] for key in ("slip", "load_N")]
+        pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
+        slips, loads = ([float(x) for x in np.linspace(a, b, GRID_SIZE)] for a, b in pairs)
+        return case, CandidateGrid(tuple(slips), tuple(loads))
+    except (SoilmlError, AttributeError, KeyError, TypeError, ValueError):
+        return None

@@ -1,0 +1,163 @@
+"""The result of `gap` as text and as files, and the text of an audit."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from soilml.io.text_tables import csv_text, format_table
+from soilml.report.numbers import format_residual
+from soilml.report.page import Provenance
+from soilml.report.result_files import json_text
+from soilml.report.terminal import rounded, shown_unit, significant
+
+if TYPE_CHECKING:
+    from soilml.gap.design.identifiability_audit import Audit
+    from soilml.gap.results import GapReport
+
+#: The file that there is where causes are suspected but not named.
+SUSPECTED_FILE = "model_suspected.toml"
+
+
+def gap_files(
+    report: GapReport, model: str, runs: str, origin: Provenance | None = None
+) -> dict[str, str]:
+    """The content of the files of a report by their names; `model` and `runs` were analysed."""
+    from soilml.config.write_case import case_as_toml
+    from soilml.gap.html.page import page, summary
+
+    if origin is None:
+        origin = Provenance.of(["gap", model, runs], [])
+    entry = {"report": summary(report, model, runs).as_json(origin)}
+    texts = {
+        "report.html": page(report, model, runs, origin),
+        "gap.json": json_text(report.as_json() | entry),
+        "model.toml": case_as_toml(report.model, [report.sentence]),
+        "next_runs.csv": csv_text(_next_runs(report)),
+    }
+    if report.suspected_model is not None:
+        first = " + ".join(report.best_unclaimed)
+        heading = f"With {first}, which is suspected, not named. {report.sentence}"
+        texts[SUSPECTED_FILE] = case_as_toml(report.suspected_model, [heading])
+    return texts
+
+
+def _next_runs(report: GapReport) -> dict[str, list[Any]]:
+    """The suggested runs, one line for each operating point; a sensor check has one line."""
+    lines: list[dict[str, Any]] = []
+    for number, option in enumerate(report.next_runs, 1):
+        head: dict[str, Any] = {"run": f"next_{number}", "kind": option.kind, "what": option.text}
+        head["separates_sigma"] = option.discrimination
+        if option.cost is not None:
+            head["cost"] = option.cost
+        lines += [head | row for row in option.rows or [{}]]
+    names = ["run", "kind", "what", "separates_sigma"]
+    names += ["cost"] if any("cost" in line for line in lines) else []
+    names += ["slip", "load_N"]
+    names += [name for line in lines for name in line if name not in names]
+    return {name: [line.get(name, "") for line in lines] for name in dict.fromkeys(names)}
+
+
+def gap_text(report: GapReport) -> str:
+    """The verdict and its tables, for the terminal."""
+    tables = (_gap_table, _effect_table, _suspect_table, _discrepancy_table)
+    parts = [f"{report.status}: {report.sentence}", *(table(report) for table in tables)]
+    if report.next_runs:
+        best = report.next_runs[0]
+        apart = (
+            "10 sigma or more"
+            if best.discrimination >= 10.0
+            else f"{best.discrimination:.2g} sigma"
+        )
+        cost = "" if best.cost is None else f" at a cost of {best.cost:g}"
+        parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}{cost}")
+    parts += [f"! {note}" for note in report.notes]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _residual(x: float) -> str:
+    return significant(x, 3) if not x < 1e-3 else format_residual(x)
+
+
+def _gap_table(report: GapReport) -> str:
+    rows = [
+        (name.replace("_", " "), _residual(s.before), _residual(s.after), s.description)
+        for name, s in report.gap.items()
+    ]
+    return format_table(("gap", "before", "after", "rows"), rows, last_left=True) if rows else ""
+
+
+def _effect_table(report: GapReport) -> str:
+    rows = [
+        (f"{e.name} {k}", *_in_shown_unit(v.value, v.std, v.unit), f"{e.probability:.3f}")
+        for e in report.effects
+        for k, v in e.parameters.items()
+    ]
+    heading = ("effect", "value", "std", "unit", "probability")
+    return format_table(heading, rows) if rows else ""
+
+
+def _in_shown_unit(value: float, std: float, unit: str) -> tuple[str, str, str]:
+    factor, shown = shown_unit(unit, value)
+    return rounded(factor * value, factor * std), rounded(factor * std, factor * std), shown
+
+
+def _both(d: Any) -> tuple[str, str, str]:
+    """A discrepancy before and after, and their unit."""
+    factor, shown = shown_unit(d.unit)
+    return significant(factor * d.before_value, 3), significant(factor * d.after_value, 3), shown
+
+
+def _suspect_table(report: GapReport) -> str:
+    """The likeliest suspects, where no cause is named."""
+    if report.status not in ("suspected", "unknown", "not-testable"):
+        return ""
+    rows = [(" + ".join(s.effects), f"{s.log_odds:+.1f}") for s in report.suspects[:5]]
+    return format_table(("suspect", "ln(odds)"), rows) if rows else ""
+
+
+def _discrepancy_table(report: GapReport) -> str:
+    rows = [
+        (name.rpartition("_")[0], *_both(d), f"{d.after_sigma:.2g}")
+        for name, d in report.discrepancy.items()
+    ]
+    if not any(d.after_sigma > 0.0 for d in report.discrepancy.values()):
+        return ""
+    return format_table(("discrepancy (rms)", "before", "after", "unit", "sigma"), rows)
+
+
+def audit_text(found: Audit) -> str:
+    """A line for each effect, what cannot be distinguished or tested, and runs to add."""
+
+    rows = [
+        (
+            e.name,
+            "yes" if e.separating_snr >= 3.0 else "no",
+            f"{significant(factor * e.size)} {unit}".rstrip(),
+            significant(e.residual_signal, 3),
+            significant(e.separating_snr, 3),
+            "never"
+            if math.isinf(e.detectable_size)
+            else significant(factor * e.detectable_size, 2),
+            f"{e.absorbed:.0%}",
+            ", ".join(f"{name} {cosine:.2f}" for name, cosine in e.rivals[:1]),
+        )
+        for e in found.effects
+        for factor, unit in [shown_unit(e.unit)]
+    ]
+    header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rival")
+    parts = [format_table(header, rows, text_columns=2, last_left=True)]
+    if found.classes:
+        parts.append(
+            "these effects cannot be distinguished at their reference sizes:\n"
+            + "\n".join("  " + ", ".join(c) for c in found.classes)
+        )
+    if found.untestable:
+        lines = [f"  {name}: {why}" for name, why in found.untestable.items()]
+        parts.append("cannot be tested:\n" + "\n".join(lines))
+    gaining = [run for run in found.added_runs if run.gained]
+    lines = [f"  {run.kind} ({run.text}): {', '.join(run.gained)}" for run in gaining[:5]]
+    parts.append(
+        "runs to add, and the effects that could then be named:\n" + ("\n".join(lines) or "  none")
+    )
+    return "\n\n".join(parts)

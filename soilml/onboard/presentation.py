@@ -1,0 +1,340 @@
+"""Estimates of a trained model as columns, remarks and a page; what a model file is for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.onboard.estimate import Estimate, Reason
+from soilml.onboard.estimator import Estimator
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
+from soilml.remarks import NEXT_ROW, Remark
+from soilml.report.figure_style import picture
+from soilml.report.page import Report, ReportPicture
+from soilml.report.parameter_figure import ParameterIntervals
+from soilml.report.parameter_lines import (
+    MODEL_EXACT,
+    TYPICAL_ERRORS,
+    parameter_lines,
+    parameter_table,
+)
+from soilml.report.terminal import shown_unit, significant
+
+Floats = NDArray[np.float64]
+
+#: Ending of the columns of the answer with typical model errors.
+TYPICAL = "usual"
+#: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
+MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
+#: Runs with the same remark have a line each up to this number, and one together beyond it.
+MOST_LINES = 10
+
+
+def description(estimator: Estimator) -> Remark:
+    """What a model file is for, in one line: gear, effects, estimated quantities with their prior.
+
+    Bounds of the prior that a context input scales are given by its name until it is set.
+    """
+    gear = dict(json.loads(estimator.metadata["gear"]))
+    limits = {} if estimator.sets is None else estimator.sets.context_ranges
+    fixed = {} if estimator.sets is None else estimator.sets.context_values
+    for name in ("radius", "width"):
+        gear[name] = fixed.get(f"wheel_{name}", gear.get(name, limits.get(f"wheel_{name}")))
+    sizes = [f"{k} {_number(v)}" for k, v in gear.items() if k != "type" and v is not None]
+    effects = [e["name"] for e in json.loads(estimator.metadata["recipe"]).get("effect", [])]
+    with_effects = f"with {', '.join(effects)}" if effects else "without effects"
+    priors = [
+        f"{entry['name'].replace('_', ' ')} {_prior_text(ends[0], ends[1], entry['unit'])}"
+        if (scale := entry.get("scale")) is None or scale in fixed
+        else f"{entry['name'].replace('_', ' ')} {entry['lower']:.3g} to 1 {scale}"
+        for entry, *ends in zip(
+            json.loads(estimator.metadata["outputs"]),
+            estimator.prior.lower,
+            estimator.prior.upper,
+            strict=True,
+        )
+    ]
+    text = (
+        f"{estimator.path}: for a {gear.get('type', 'gear that it does not state')}"
+        f"{' of ' if sizes else ''}{', '.join(sizes)}, {with_effects}; reads "
+        f"{', '.join(estimator.inputs)}; estimates {', '.join(priors)}"
+    )
+    return Remark("model-file", text, estimator.names, "note")
+
+
+def _prior_text(low: float, high: float, unit: str) -> str:
+    """A range in the unit in which a terminal shows it."""
+    factor, shown = shown_unit(unit, high)
+    return f"{significant(factor * low)} to {significant(factor * high)} {shown}".rstrip()
+
+
+def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
+    """Mean, std and interval of every parameter, by column name."""
+    columns = {}
+    for i, name in enumerate(estimate.names):
+        key = column(name)
+        columns[key] = estimate.mean[:, i]
+        columns[f"{key}_std"] = estimate.std[:, i]
+        columns[f"{key}_p05"] = estimate.low[:, i]
+        columns[f"{key}_p95"] = estimate.high[:, i]
+    return columns
+
+
+def _relative_width(estimate: Estimate) -> NDArray[np.float64]:
+    """RMS over the parameters of posterior width / prior width, (rows,); NaN out of range."""
+    widths = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))
+    return np.where(estimate.in_range, widths, np.nan)
+
+
+def median_row(estimate: Estimate) -> int:
+    """The row in range with the median width."""
+    widths = _relative_width(estimate)
+    return int(np.argsort(widths)[(int(estimate.in_range.sum()) - 1) // 2])
+
+
+def widest_row(estimate: Estimate) -> int:
+    """The row in range with the largest width."""
+    return int(np.nanargmax(_relative_width(estimate)))
+
+
+def width_remarks(estimate: Estimate, what: str, does: str, hint: str) -> list[Remark]:
+    """Median width of the estimates in range over the prior's; parameters not determined."""
+    if not estimate.in_range.any():
+        return []
+    share = np.median(estimate.std[estimate.in_range], axis=0) / estimate.prior_std
+    shares = ", ".join(f"{_words(n)} {s:.0%}" for n, s in zip(estimate.names, share, strict=True))
+    text = f"posterior width / prior width, {what}: {shares}"
+    remarks = [Remark("width", text, estimate.names, "note")]
+    vague = [n for n, s in zip(estimate.names, share, strict=True) if s > NOT_IDENTIFIED_ABOVE]
+    if vague:
+        text = (
+            f"{' and '.join(map(_words, vague))}: the estimate is mostly the prior, {what} {does} "
+            f"not determine {'it' if len(vague) == 1 else 'them'}; {hint} for a better estimate"
+        )
+        remarks.append(Remark("not-identified", text, tuple(vague)))
+    return remarks
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def refusal_remarks(
+    by: str,
+    names: Sequence[Any],
+    outside: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    estimate: Estimate,
+) -> list[Remark]:
+    """Why runs (n,) are not in range, and what their estimate is then.
+
+    `outside` and `rows` are the rows out of range, and all rows, of each.
+    """
+    found = []
+    for i in map(int, np.flatnonzero(~estimate.in_range)):
+        reason, what = Reason(int(estimate.reason[i])), "the estimate is the prior"
+        why = reason.words
+        if reason == Reason.OUT_OF_RANGE:
+            why = f"{outside[i]} of {rows[i]} rows are out of range"
+        if reason == Reason.INCONSISTENT:
+            what = "the estimate is widened as far as the misfit says"
+        code = reason.name.lower().replace("_", "-")
+        found.append((names[i], Remark(code, f"{why}; {what}")))
+    return remarks_on_runs(by, found)
+
+
+def remarks_on_runs(by: str, found: Sequence[tuple[Any, Remark]]) -> list[Remark]:
+    """The remarks with the names of their runs: one each, or one for many runs with the same."""
+    runs: dict[Remark, list[str]] = {}
+    for name, remark in found:
+        runs.setdefault(remark, []).append(str(name))
+    remarks = []
+    for remark, names in runs.items():
+        heads: dict[str, tuple[str, ...]] = {name: (name,) for name in names}
+        if len(names) > MOST_LINES:
+            heads = {f"{', '.join(names[:3])} and {len(names) - 3} more": tuple(names)}
+        remarks += [
+            replace(remark.under(f"{by} {head}: "), about=about) for head, about in heads.items()
+        ]
+    return remarks
+
+
+def typical_columns(estimate: Estimate) -> dict[str, NDArray[Any]]:
+    """Columns (runs,) of the answer with typical model errors: `cohesion_Pa_usual_std`, ..."""
+    columns: dict[str, NDArray[Any]] = {}
+    for key, values in estimate_columns(estimate).items():
+        name, dash, part = key.rpartition("_")
+        statistic = part in ("std", "p05", "p95")
+        columns[f"{name}_{TYPICAL}{dash}{part}" if statistic else f"{key}_{TYPICAL}"] = values
+    columns[f"in_range_{TYPICAL}"] = estimate.in_range.astype(float)
+    return columns
+
+
+def is_typical_column(name: str) -> bool:
+    """Whether a column is one of `typical_columns`."""
+    return name.endswith((f"_{TYPICAL}", *(f"_{TYPICAL}_{part}" for part in ("std", "p05", "p95"))))
+
+
+def typical_remarks(
+    by: str, names: Sequence[Any], exact: Estimate, typical: Estimate
+) -> list[Remark]:
+    """What the two answers are, how they differ, and which one to use."""
+    text = (
+        f"two intervals: columns without _{TYPICAL} take the model of wheel and soil as exact; "
+        f"columns with _{TYPICAL} include typical model errors, in the bearing of the soil, its "
+        "contact behind the axle, sinkage and drawbar pull"
+    )
+    remarks = [Remark("two-intervals", text, severity="note")]
+    both = exact.in_range & typical.in_range
+    if both.any():
+        ratio = np.median(typical.std[both] / exact.std[both], axis=0)
+        widths = ", ".join(
+            f"{_words(name)} {value:.1f}" for name, value in zip(exact.names, ratio, strict=True)
+        )
+        text = (
+            f"use the intervals that include model errors (_{TYPICAL}), unless this model was "
+            f"verified on a known soil; they are wider by factors of {widths}"
+        )
+        remarks.append(Remark("use-typical-errors", text, exact.names))
+    found = []
+    for i in map(int, np.flatnonzero(exact.reason == Reason.INCONSISTENT)):
+        code, rest = "no-interval-explains", "nor does it with typical errors; use neither interval"
+        if typical.in_range[i]:
+            code = "use-typical-errors"
+            rest = f"with typical errors it does; use the columns with _{TYPICAL}"
+        text = f"the model taken as exact does not explain the rows, {rest}"
+        found.append((names[i], Remark(code, text)))
+    return remarks + remarks_on_runs(by, found)
+
+
+def check_size(rows: int) -> None:
+    """Raise `InputError` for more estimates than a page is for."""
+    if rows > MOST_ESTIMATES:
+        raise InputError(
+            f"--report of {rows} estimates; at most {MOST_ESTIMATES} are possible: pool rows with "
+            "--by run, select some with --where, or take --out"
+        )
+
+
+def estimate_report(
+    columns: Mapping[str, Any],
+    remarks: Sequence[Remark],
+    estimator: Estimator,
+    by: str | None,
+    files: tuple[str, str],
+) -> Report:
+    """The page of estimates in columns (n,): model file and table that they are of."""
+    names, units, prior = estimator.names, estimator.units, estimator.prior
+    group = by or "row"
+    answers = [_answer(columns, names, by, "")]
+    if f"in_range_{TYPICAL}" in columns:
+        answers.insert(0, _answer(columns, names, by, f"_{TYPICAL}"))
+    labels = np.concatenate([a.labels for a in answers])
+    values, std, low, high = (
+        np.concatenate([getattr(a, key) for a in answers])
+        for key in ("values", "std", "low", "high")
+    )
+    inside = np.concatenate([a.inside for a in answers])
+    answered = np.isfinite(values).any(axis=1)
+    lines = {
+        str(labels[i]): parameter_lines(
+            names, units, values[i], std[i], low[i], high[i],
+            [float(x) if inside[i] else 1.0 for x in std[i] / prior.std],
+        )
+        for i in np.flatnonzero(answered)
+    }  # fmt: skip
+    if len(lines) <= _MOST_SENTENCES:
+        answer = [
+            f"{group.capitalize()} {name}: {' '.join(x.sentence for x in own)}"
+            for name, own in lines.items()
+        ]
+    else:
+        answer = [
+            f"{len(lines)} estimates, one for each {group}: "
+            + ", ".join(
+                f"{known} determine {line.name}"
+                for line, known in zip(
+                    next(iter(lines.values())),
+                    np.sum([[x.known for x in own] for own in lines.values()], axis=0),
+                    strict=True,
+                )
+            )
+            + "."
+        ]
+    outside = int(np.count_nonzero(answered & ~inside))
+    badge = "in range" if outside == 0 else "out of range" if outside == len(lines) else "mixed"
+    drawn = ParameterIntervals(
+        names, units, list(lines), values[answered], low[answered], high[answered],
+        prior.lower, prior.upper,
+    )  # fmt: skip
+    return Report(
+        kind="estimate",
+        title=f"Estimates of {Path(files[1]).name} by {Path(files[0]).name}",
+        badge=badge,
+        meaning=f"{len(lines) - outside} of {len(labels)} estimates are in the range of the "
+        "training, and explained",
+        answer=answer,
+        tone="named" if outside == 0 else "suspected",
+        pictures=[
+            ReportPicture(
+                "Estimates and 90 % intervals",
+                picture(drawn.plot, len(names), 1, drawn.size, answer[0]),
+                "Grey: the range of the prior.",
+            )
+        ],
+        tables=[parameter_table(lines, group)],
+        warnings=[remark for remark in remarks if remark.code != NEXT_ROW],
+        next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],
+        notation=[
+            ("±", "one standard deviation of the error that is expected."),
+            (
+                "90 %",
+                "interval that covers the value with that probability, under model and noise.",
+            ),
+            ("left of prior", "width of the estimate over that of the prior."),
+        ],
+    )
+
+
+@dataclass(frozen=True)
+class _Answer:
+    labels: NDArray[np.str_]
+    values: Floats
+    std: Floats
+    low: Floats
+    high: Floats
+    inside: NDArray[np.bool_]
+
+
+def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, end: str) -> _Answer:
+    """Estimates (n, q) of the columns that end so: `_usual` for the second answer."""
+    values, std, low, high = (
+        np.stack([np.asarray(columns[column(n) + end + part], float) for n in names], axis=1)
+        for part in ("", "_std", "_p05", "_p95")
+    )
+    own = columns[by] if by else np.arange(1, len(values) + 1)
+    said = {"": "" if f"in_range_{TYPICAL}" not in columns else f", {MODEL_EXACT}"}
+    text = said.get(end, f", {TYPICAL_ERRORS}")
+    labels = np.asarray([f"{name}{text}" for name in own], dtype=np.str_)
+    inside = np.nan_to_num(np.asarray(columns[f"in_range{end}"], float)) > 0.5
+    return _Answer(labels, values, std, low, high, np.asarray(inside))
+
+
+def _number(value: object) -> str:
+    """A number, or the ends of a range."""
+    if isinstance(value, tuple):
+        return f"{value[0]:.3g} to {value[1]:.3g} m"
+    return f"{value:g} m" if isinstance(value, float) else str(value)
+
+
+def trained_radius(estimator: Estimator) -> float | None:
+    """Radius (m) of the wheel of the training; None for a file of any wheel."""
+    radius = json.loads(estimator.metadata["gear"]).get("radius")
+    return float(radius) if isinstance(radius, int | float) else None

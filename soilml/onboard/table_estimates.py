@@ -1,0 +1,175 @@
+"""Estimates of the rows and runs of a table: readings by name, blocks of rows, remarks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.onboard.estimate import Estimate
+from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
+from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
+from soilml.onboard.set_contract import OPERATING_NOISE, OPERATING_STD_INPUTS, OPTIONAL_READINGS
+from soilml.onboard.set_posterior import SetPosterior
+from soilml.quantities import CHANNELS, column
+from soilml.remarks import Remark
+
+
+def complete_rows(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
+    """Rows that have all readings that the model needs, (rows,)."""
+    return np.asarray(np.all([np.isfinite(table[column(n)]) for n in estimator.inputs], axis=0))
+
+
+def row_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
+    """Inputs for the estimates of single rows, (rows,) by name."""
+    return {name: table[column(name)] for name in estimator.inputs}
+
+
+def joint_readings(estimator: Estimator, table: Table) -> dict[str, Any]:
+    """Inputs for the pooled estimate of all rows of one soil, (rows,) by name.
+
+    In addition to the required readings: sinkage and drawbar pull where the table has them and
+    their noise is known, and columns of standard deviations, those of slip and load included, which
+    replace the noise of the file.
+    """
+    readings = row_readings(estimator, table)
+    if estimator.sets is None:
+        return readings
+    for name in CHANNELS:
+        key, spread = column(name), f"{column(name)}_std"
+        known = name in estimator.sets.noise or spread in table
+        if name in OPTIONAL_READINGS and key in table and known:
+            readings[name] = table[key]
+        if name in readings and spread in table:
+            readings[f"{name}_std"] = _fill_blank_std(
+                table[spread], estimator, name, readings[name]
+            )
+    for name, input_name in zip(OPERATING_NOISE, OPERATING_STD_INPUTS, strict=True):
+        if (spread := f"{column(name)}_std") in table:
+            readings[input_name] = _fill_blank_std(table[spread], estimator, name, readings[name])
+    return readings
+
+
+def _fill_blank_std(spread: Any, estimator: Estimator, name: str, reading: Any) -> Any:
+    """Standard deviations of the table, and those of the model file where one is blank."""
+    constant, share = estimator.sets.noise.get(name, (0.0, 0.0)) if estimator.sets else (0.0, 0.0)
+    own = np.hypot(constant, share * np.abs(reading))
+    return np.where(np.isfinite(spread) & (spread > 0.0), spread, own)
+
+
+def estimates_of_rows(
+    estimator: Estimator,
+    readings: Mapping[str, Any],
+    usable: NDArray[np.bool_],
+    done: Callable[[int], None],
+) -> Estimate:
+    """An estimate for every row of a table; one that is not usable counts as out of range.
+
+    Parameters
+    ----------
+    readings
+        Inputs (usable rows,) by name.
+    usable
+        Rows (rows,) that have all readings.
+    done
+        Is given the number of rows that are estimated, after each block.
+    """
+    result, index = estimator.prior_estimate(len(usable)), np.flatnonzero(usable)
+    for first in range(0, index.size, ROWS_PER_CALL):
+        block = slice(first, first + ROWS_PER_CALL)
+        estimate = estimator(**{k: v[block] if np.ndim(v) else v for k, v in readings.items()})
+        for key in Estimate.ARRAYS:
+            getattr(result, key)[index[block]] = getattr(estimate, key)
+        done(min(block.stop, index.size))
+    return result
+
+
+def estimates_of_runs(
+    estimator: Estimator,
+    readings: Sequence[Mapping[str, Any]],
+    box: Mapping[str, tuple[float, float]],
+    *,
+    count: bool,
+) -> tuple[NDArray[np.int64], Estimate]:
+    """Estimates (runs,) from the readings of each run, within a narrower prior if there is one.
+
+    Before them the numbers of rows in range (runs,), which are zero unless they are to `count`.
+    """
+    in_range = np.zeros(len(readings), dtype=np.int64)
+
+    def estimates() -> Iterator[Estimate]:
+        for i, one in enumerate(readings):
+            if count:
+                in_range[i] = estimator.rows_in_range(**one).sum()
+            found = estimator.run(**one)
+            yield found.within(**box) if box else found
+
+    return in_range, Estimate.stack(estimates(), (len(readings),))
+
+
+def check_independent(estimators: Sequence[Estimator]) -> None:
+    """Raise `InputError` where all inputs of one file are inputs of another: dependent errors."""
+    for first, second in combinations(estimators, 2):
+        shared = set(first.inputs) & set(second.inputs)
+        if len(shared) == min(len(first.inputs), len(second.inputs)):
+            names = ", ".join(column(name) for name in first.inputs if name in shared)
+            raise InputError(
+                f"{first.path} and {second.path} both read {names}: their errors are not "
+                f"independent; use one of them, or --rule {COVARIANCE_INTERSECTION}"
+            )
+
+
+def excluded_rows(table: Table, rows: NDArray[np.bool_], code: str, why: str) -> list[Remark]:
+    """A remark on rows that get no estimate: how many, the reason, and the first three."""
+    if not rows.any():
+        return []
+    some = ", ".join(str(table.place(int(i))) for i in np.flatnonzero(rows)[:3])
+    more = ", ..." if rows.sum() > 3 else ""
+    return [Remark(code, f"{int(rows.sum())} rows {why} and get no estimate: {some}{more}")]
+
+
+def unused_std_remarks(estimator: Estimator, table: Table) -> list[Remark]:
+    """A note on columns of standard deviations that estimates of single rows do not use."""
+    if estimator.sets is not None and estimator.sets.sets_only:
+        return []
+    spreads = [f"{column(name)}_std" for name in (*CHANNELS, *OPERATING_NOISE)]
+    given = tuple(key for key in spreads if key in table)
+    if not given:
+        return []
+    hint = "give --by" if estimator.sets is not None else "train a file with [set_posterior]"
+    text = f"estimates of single rows do not use {', '.join(given)}; {hint} to have them used"
+    return [Remark("unused-std", text, given, "note")]
+
+
+def channel_remarks(estimator: Estimator, readings: dict[str, Any]) -> list[Remark]:
+    """A note on the channels used, for a file that can use more than it requires."""
+    if estimator.sets is None:
+        return []
+    rows = {name: int(np.isfinite(readings[name]).sum()) for name in CHANNELS if name in readings}
+    used = {name: count for name, count in rows.items() if count}
+    said = ", ".join(f"{name.replace('_', ' ')} ({count} rows)" for name, count in used.items())
+    first = Remark("channels-used", f"uses slip, load and {said}", tuple(used), "note")
+    return [first, *_common_error_remarks(estimator.sets)]
+
+
+def _common_error_remarks(sets: SetPosterior) -> list[Remark]:
+    """A note on the errors that all rows are assumed to share."""
+    texts = {
+        "slip_bias": "slip {:g}",
+        "load_gain": "load {:.3g} %",
+        "torque_gain": "torque {:.3g} %",
+        "sinkage_bias": "sinkage {:g} mm",
+        "drawbar_pull_bias": "drawbar pull {:g} N",
+    }
+    factors = {"slip_bias": 1.0, "sinkage_bias": 1e3, "drawbar_pull_bias": 1.0}  # gains in %
+    stds = {name: std for name, std in sets.common_errors.items() if std > 0.0 and name in texts}
+    if not stds:
+        return []
+    said = ", ".join(texts[n].format(factors.get(n, 100.0) * std) for n, std in stds.items())
+    text = f"assumes that all rows share errors with standard deviations of {said}"
+    return [Remark("shared-errors", text, tuple(stds), "note")]

@@ -1,0 +1,94 @@
+"""Estimated parameters on a page: sentences with units and intervals, and a table."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.report import numbers
+from soilml.report.page import ReportTable
+
+Floats = NDArray[np.float64]
+
+#: What the two intervals of `identify` and `estimate` are called on a page.
+MODEL_EXACT, TYPICAL_ERRORS = "model taken as exact", "with typical errors of model and sensors"
+
+
+@dataclass(frozen=True)
+class ParameterLine:
+    """A parameter in its display unit; `left` is the width over that of the prior, or None.
+
+    `doubted` is whether a warning says that the rows do not identify it.
+    """
+
+    name: str
+    value: str
+    ends: str
+    unit: str
+    left: float | None
+    doubted: bool = False
+
+    @property
+    def known(self) -> bool:
+        """Whether the rows determine it."""
+        return not self.doubted and (self.left is None or self.left <= NOT_IDENTIFIED_ABOVE)
+
+    @property
+    def sentence(self) -> str:
+        """What was found, with unit and interval."""
+        range_ = numbers.with_unit(self.ends, self.unit)
+        if not self.known:
+            remains = ""
+            if self.left is not None:
+                remains = f": {100.0 * self.left:.0f} % of the width of its prior remains"
+            return (
+                f"{numbers.capitalised(self.name)} is not determined by these rows{remains} (90 %: "
+                f"{range_})."
+            )
+        value = numbers.with_unit(self.value, self.unit).replace(" ", "\N{NO-BREAK SPACE}")
+        return f"{numbers.capitalised(self.name)} = {value} (90 %: {range_})."
+
+
+def parameter_lines(
+    names: Sequence[str],
+    units: Sequence[str],
+    values: Floats,
+    std: Floats,
+    low: Floats,
+    high: Floats,
+    left: Sequence[float | None],
+    doubted: Container[str] = (),
+) -> list[ParameterLine]:
+    """A line for each of p parameters, from arrays (p,) in SI units."""
+    found = []
+    for name, unit, value, error, *ends, share in zip(
+        names, units, values, std, low, high, left, strict=True
+    ):
+        factor, shown = numbers.display_unit(unit, float(abs(value)))
+        found.append(
+            ParameterLine(
+                numbers.parameter_name(name),
+                numbers.format_with_std(factor * value, factor * error),
+                numbers.format_interval(factor * ends[0], factor * ends[1], factor * error),
+                shown,
+                share,
+                name in doubted,
+            )
+        )
+    return found
+
+
+def parameter_table(lines: Mapping[str, list[ParameterLine]], by: str | None) -> ReportTable:
+    """The lines of each group as a table, after a column of the groups."""
+    rows = []
+    for name, own in lines.items():
+        for line in own:
+            left = "" if line.left is None else f"{100.0 * line.left:.0f} %"
+            value = line.value if line.known else f"not determined ({line.value})"
+            rows.append([*([name] if by else []), line.name, value, line.ends, line.unit, left])
+    header = ["parameter", "value ± std", "90 % interval", "unit", "left of prior"]
+    return ReportTable("Parameters", [*([by] if by else []), *header], rows, 1 + bool(by))

@@ -1,0 +1,73 @@
+"""The gap between model and measurements, with its map and the files of the report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from soilml.config.case import read_case
+from soilml.config.sensor_bias import checked_sensors
+from soilml.gap import STATUSES, gap
+from soilml.gap.html.discrepancy_map import discrepancy_maps
+from soilml.gap.html.verdict_section import advice, effect_descriptions, suspect_table
+from soilml.gap.presentation import gap_files
+from soilml.gap.results import GapReport
+from soilml.report.numbers import format_estimate, format_p_value
+from soilml.serve.answers.estimate import read_rows
+from soilml.serve.answers.job_files import Tell, setting_file, write_files
+
+#: Most next runs that the page shows; the report has all.
+_SHOWN_RUNS = 5
+
+
+def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """The verdict in words and tables, and the names of the written files.
+
+    Raises `SoilmlError` as `soilml gap` does.
+    """
+    model = setting_file("MODEL.toml", request.get("model"))
+    case = read_case(model, with_bias=True)
+    checked, case = checked_sensors(case.bias), replace(case, bias={})
+    table = read_rows(request)
+    stage = f"analysing {len(table)} rows"
+    tell(stage, 0.0)
+    report = gap(
+        case, table, calibration=checked, progress=lambda share: tell(stage, min(share, 1.0))
+    )
+    tell("drawing the report")
+    texts = gap_files(report, model.name, table.source)
+    return verdict(report) | {"rows": len(table), "files": write_files(texts)}
+
+
+def verdict(report: GapReport) -> dict[str, Any]:
+    """The parts of a report that the page shows."""
+    known = effect_descriptions(report)
+    return {
+        "status": report.status,
+        "meaning": STATUSES.get(report.status, ""),
+        "sentence": report.sentence.replace(" -> ", " → "),
+        "advice": advice(report),
+        "reasons": list(report.reasons),
+        "causes": [[{"name": n, "text": known.get(n, "")} for n in names]
+                   for names in report.cause_set],
+        "effects": [
+            {"name": e.name, "text": known.get(e.name, ""), "probability": e.probability,
+             "parameters": [[k, format_estimate(v)] for k, v in e.parameters.items()]}
+            for e in report.effects
+        ],
+        "suspects": [
+            {"names": s["effects"], "probability": s["probability"], "given": s["given"]}
+            for s in suspect_table(report)
+        ],
+        "maps": discrepancy_maps(report),
+        "p_gap": format_p_value(report.p_gap),
+        "sizes": [
+            {"rows": name, "before": g.before, "after": g.after, "what": g.description}
+            for name, g in report.gap.items()
+        ],
+        "next_runs": [
+            {"kind": n.kind, "text": n.text, "sigma": n.discrimination}
+            for n in report.next_runs[:_SHOWN_RUNS]
+        ],
+        "notes": list(report.notes),
+    }  # fmt: skip

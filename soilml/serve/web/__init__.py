@@ -1,1 +1,0 @@
-"""HTTP: who is answered, uploads, jobs in processes of their own."""

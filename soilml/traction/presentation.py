@@ -1,0 +1,260 @@
+"""Pull and slope as text, as columns, and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from soilml.io.text_tables import format_table
+from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.quantities import NOT_IDENTIFIED_ABOVE
+from soilml.remarks import Remark
+from soilml.report import numbers
+from soilml.report.figure_style import picture
+from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.terminal import significant
+from soilml.traction.by_load import LoadPrediction
+from soilml.traction.plot import figure_size
+from soilml.traction.report import PullReport
+
+#: The printed curve has every second slip.
+PRINTED_STEP = 2
+DEGREES = 180.0 / pi
+
+
+class Plotted(Protocol):
+    """A result that draws itself."""
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw into axes."""
+
+
+Result = TypeVar("Result", bound=Plotted)
+
+
+@dataclass(frozen=True)
+class Presentation(Generic[Result]):
+    """What one kind of result is written as.
+
+    Attributes
+    ----------
+    columns
+        The CSV table of a result, in SI units.
+    text
+        Tables and warnings for a terminal.
+    warnings
+        The warnings alone.
+    page
+        The page of results by group, the column of the groups, model file and table.
+    panels
+        Rows and columns of axes that `plot` takes, and the size of the figure, inches.
+    """
+
+    columns: Callable[[Result], Mapping[str, Any]]
+    text: Callable[[Result], str]
+    warnings: Callable[[Result], Sequence[Remark]]
+    page: Callable[[Mapping[str, Result], str | None, tuple[str, str]], Report]
+    panels: Callable[[Result], tuple[int, int, tuple[float, float]]]
+
+
+def pull_columns(report: PullReport) -> dict[str, Any]:
+    """A row for each load and slip, in SI units; what holds for a load stands in all its rows."""
+    parts = [_columns(one) for one in report.by_load]
+    return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+
+
+def _columns(one: LoadPrediction) -> dict[str, Any]:
+    known, prior = one.posterior, one.prior
+    count = len(known.slip)
+    columns = {"load_N": np.full(count, known.load), "slip": known.slip}
+    for name, values in (
+        ("drawbar_pull_N", known.pull),
+        ("slope_rad", known.slope),
+        ("largest_drawbar_pull_N", known.largest_pull),
+        ("best_slip", known.best_slip),
+        ("steepest_slope_rad", known.steepest_slope),
+    ):
+        found = quantile_band(values)
+        for ending, part in zip(("", "_p05", "_p95"), _ends(found), strict=True):
+            columns[name + ending] = np.broadcast_to(part, count)
+    before = quantile_band(prior.pull), quantile_band(prior.slope)
+    for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
+        columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
+    for name, share in zip(
+        ("largest_drawbar_pull", "steepest_slope"), one.remaining_fraction, strict=True
+    ):
+        columns[f"{name}_remaining_fraction"] = np.full(count, share)
+    return columns
+
+
+def _ends(found: QuantileBand) -> tuple[Any, Any, Any]:
+    return found.middle, found.lower, found.upper
+
+
+def pull_warnings(report: PullReport) -> list[Remark]:
+    """Warnings of each load, then those of the whole result."""
+    by_load = [(f"{one.posterior.load:.4g} N: ", one.warnings) for one in report.by_load]
+    own = [remark.under(head) for head, remarks in by_load for remark in remarks]
+    return [*own, *report.warnings]
+
+
+def pull_text(report: PullReport) -> str:
+    """A table for each load, the largest pull, the steepest slope, and the warnings."""
+    slips, loads = report.measured_range.slip, report.measured_range.load
+    head = (
+        f"{report.rows} row{'s'[: report.rows > 1]} at slips {slips[0]:.2g} to {slips[1]:.2g}, "
+        f"loads {loads[0]:.4g} to {loads[1]:.4g} N"
+    )
+    parts = [head, *(_load_text(one) for one in report.by_load)]
+    return "\n\n".join([*parts, "\n".join(f"! {text}" for text in report.warnings)])
+
+
+def _load_text(one: LoadPrediction) -> str:
+    known, prior = one.posterior, one.prior
+    pull, slope, before = (
+        quantile_band(known.pull),
+        quantile_band(known.slope),
+        quantile_band(prior.pull),
+    )
+    header = (
+        "slip", "pull_N", "p05", "p95", "pull/load", "slope_deg", "p05", "p95",
+        "prior_p05_N", "prior_p95_N",
+    )  # fmt: skip
+    lines = []
+    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
+        cells = [f"{known.slip[i]:.3g}", *(f"{v[i]:.1f}" for v in _ends(pull))]
+        cells += [f"{pull.middle[i] / known.load:.2f}"]
+        cells += [f"{DEGREES * v[i]:.1f}" for v in _ends(slope)]
+        lines.append((*cells, f"{before.lower[i]:.1f}", f"{before.upper[i]:.1f}"))
+    ends = quantile_band(known.best_slip), quantile_band(known.steepest_slip)
+    pulled = _value_text(
+        quantile_band(known.largest_pull), 1.0, one.remaining_fraction[0] > NOT_IDENTIFIED_ABOVE
+    )
+    climbed = _value_text(
+        quantile_band(known.steepest_slope),
+        DEGREES,
+        one.remaining_fraction[1] > NOT_IDENTIFIED_ABOVE,
+    )
+    best = [
+        f"largest pull    {pulled} N, at slip {_slips(ends[0])}; "
+        f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",
+        f"steepest slope  {climbed} deg, at slip {_slips(ends[1])}; "
+        f"before the rows {_range(quantile_band(prior.steepest_slope), DEGREES)} deg",
+    ]
+    doubts = [f"! {text}" for text in one.warnings]
+    table = format_table(header, lines, text_columns=0)
+    return "\n".join([f"load {known.load:.4g} N", table, *best, *doubts])
+
+
+def _value_text(found: QuantileBand, factor: float, unknown: bool) -> str:
+    middle = "not known" if unknown else f"{factor * float(found.middle):.1f}"
+    return f"{middle} ({_range(found, factor)})"
+
+
+def _range(found: QuantileBand, factor: float) -> str:
+    return f"{factor * float(found.lower):.1f} to {factor * float(found.upper):.1f}"
+
+
+def _slips(found: QuantileBand) -> str:
+    low, middle, high = (f"{float(v):.2g}" for v in (found.lower, found.middle, found.upper))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str, str]) -> Report:
+    """The page of `pull` for one gear: predictions by group; model file and table."""
+    answer, rows, known = [], [], []
+    for name, report in found.items():
+        for one in report.by_load:
+            head = f"{by} {name}, " if by else ""
+            pulled, climbed = _bests(one)
+            unknown = [share > NOT_IDENTIFIED_ABOVE for share in one.remaining_fraction]
+            known += [not any(unknown)]
+            load = significant(one.posterior.load)
+            parts = [
+                f"{what} {'is not known better than before the rows' if vague else 'is'} {value}"
+                for what, value, vague in zip(
+                    ("the largest pull", "the steepest slope"), (pulled, climbed), unknown,
+                    strict=True,
+                )
+            ]  # fmt: skip
+            answer.append(f"{numbers.capitalised(head)}{load} N: {', '.join(parts)}.")
+            rows += [([name] if by else []) + row for row in _page_rows(one)]
+    header = ["load, N", "slip", "pull, N", "90 %", "slope, °", "90 %", "pull before, N (90 %)"]
+    first = next(iter(found.values()))
+    images = [
+        ReportPicture(
+            f"Pull and slope over slip{f', {by} {name}' if by else ''}",
+            picture(report.plot, 2, len(report.by_load), figure_size(report), answer[0]),
+            "Lines: medians. Bands: 90 % of the soils that the rows allow (blue) and of those of "
+            "the prior (grey).",
+        )
+        for name, report in list(found.items())[:MOST_PICTURES]
+    ]
+    warnings = [
+        remark.under(f"{by} {name}: ") if by else remark
+        for name, report in found.items()
+        for remark in pull_warnings(report)
+    ]
+    count = sum(report.rows for report in found.values())
+    badge = "predicted" if all(known) else "partly known" if any(known) else "not known"
+    return Report(
+        kind="pull",
+        title=f"Drawbar pull and slope on the soil of {Path(files[1]).name}",
+        badge=badge,
+        meaning=f"from {count} row{'s'[: count != 1]} at slips {first.measured_range.slip[0]:.2g} "
+        f"to {first.measured_range.slip[1]:.2g}, by the model {Path(files[0]).name}",
+        answer=answer[:MOST_SENTENCES],
+        tone="named" if all(known) else "suspected",
+        pictures=images,
+        tables=[
+            ReportTable("Pull and slope", [*([by] if by else []), *header], rows, 1 + bool(by))
+        ],
+        warnings=warnings,
+        next_steps=[
+            "Drive a row at another load and slip: soilml advise tells which narrows the soil most."
+        ],
+        notation=[("90 %", "from the 5 % to the 95 % quantile; medians before them.")],
+    )
+
+
+#: Most pictures and sentences of a page; the table has the rest.
+MOST_PICTURES, MOST_SENTENCES = 6, 6
+
+
+def _bests(one: LoadPrediction) -> tuple[str, str]:
+    known = one.posterior
+    pulled, climbed = quantile_band(known.largest_pull), quantile_band(known.steepest_slope)
+    return f"{_middle(pulled, 1.0)} N ({_range(pulled, 1.0)})", (
+        f"{_middle(climbed, DEGREES)}° ({_range(climbed, DEGREES)})"
+    )
+
+
+def _middle(found: QuantileBand, factor: float) -> str:
+    return f"{factor * float(found.middle):.1f}"
+
+
+def _page_rows(one: LoadPrediction) -> list[list[str]]:
+    known = one.posterior
+    pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
+    rows = []
+    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
+        cells = [significant(known.load), f"{known.slip[i]:.3g}"]
+        for band, factor in ((pull, 1.0), (slope, DEGREES)):
+            low, middle, high = (factor * v[i] for v in (band.lower, band.middle, band.upper))
+            cells += [f"{middle:.1f}", f"{low:.1f} to {high:.1f}"]
+        rows.append([*cells, f"{before.lower[i]:.1f} to {before.upper[i]:.1f}"])
+    return [[cell.replace("-", "−") for cell in row] for row in rows]
+
+
+PRESENTATION = Presentation(
+    columns=pull_columns,
+    text=pull_text,
+    warnings=pull_warnings,
+    page=pull_page,
+    panels=lambda report: (2, len(report.by_load), figure_size(report)),
+)
