@@ -52,7 +52,7 @@ def exported(name: str, folder: Path) -> CompiledModel:
 def memory_table(models: dict[str, CompiledModel]) -> str:
     """Bytes that a program needs, as the headers state them."""
     lines = [
-        "| file | constants, kB | memory of a set, kB | working memory of a call, kB |",
+        "| file | constants, kB | state of a set, kB | working memory of a call, kB |",
         "|---|---:|---:|---:|",
     ]
     for name, model in models.items():
@@ -118,9 +118,10 @@ def tasks(name, model, estimator):  # type: ignore[no-untyped-def]
 def differences_table(models: dict[str, CompiledModel]) -> str:
     """Differences of answers: C from onnxruntime, and onnxruntime from itself in another order."""
     lines = [
-        "Differences in standard deviations of the answer, largest of the three quantities: sets "
-        f"of 1 to 32 rows with absent channels ({SETS} sets), and streams of 300 rows in steps of "
-        f"1 to 32 ({STREAMS} streams). Beside them those of onnxruntime from itself, with the rows "
+        "Differences in standard deviations of the answer, largest of the three quantities. "
+        f"Cases are {SETS} sets of 1 to 32 rows with absent channels, and {STREAMS} streams of "
+        "300 rows in steps of 1 to 32. Beside them those of onnxruntime from itself, with the "
+        "rows "
         "of each step in another order: rounding alone. *Flags*: sets whose `in_range` differs.",
         "",
         "| file | rows | of | median | 99 of 100 | largest | flags | rounding: median | 99 of 100 "

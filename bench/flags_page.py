@@ -18,9 +18,10 @@ CHANNELS = ("Torque only", "Torque, sinkage and drawbar pull")
 ABOUT = (
     "Reference wheel, six slips at six loads, 2 % torque noise, 100 soils per fault; files with "
     "exact sensors. Detection "
-    "rates in %: *flagged* by `wheel.onnx`; by a *chi-square* test of the exact model, which does "
-    "not know the fault; and by a *likelihood-ratio* test that knows the fault and its size, about "
-    "the most powerful test there is. Both tests have a false alarm rate of 1 %. *Error*: rms "
+    "rates in %: *flagged* by `wheel.onnx`; by a *chi-square* test of the exact model without "
+    "knowledge of the fault; and by a *likelihood-ratio* test. That test knows the fault and "
+    "its size, and is about the most powerful test there is. Both tests have a false alarm rate "
+    "of 1 %. *Error*: rms "
     "error of c, phi and K in standard deviations reported by `wheel.onnx`, over the sets that it "
     "does not flag; 1 for valid sets. Left half: torque only; right half: sinkage and drawbar pull "
     "too."

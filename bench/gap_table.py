@@ -168,7 +168,7 @@ def _soil(sets: Sequence[Judged]) -> Iterator[Figure]:
             share = hits / len(values) if values else float("nan")
             gated = level == 0.02
             yield Figure(
-                f"90 % interval of {symbol} holds the truth, discrepancy {level:.0%}",
+                f"90 % interval of {symbol}: coverage, discrepancy {level:.0%}",
                 rate(hits, len(values)),
                 "0.86 to 0.94" if gated else "",
                 0.86 <= share <= 0.94 if gated and values else None,

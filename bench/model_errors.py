@@ -111,8 +111,8 @@ def lines_of(estimator: Estimator, world: World, channels: Sequence[str]) -> tup
 def coverage_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
     """A line for each world: coverage, refusals, interval score."""
     lines = [
-        "| what is wrong | exact sensors: refused | 90 % of c, phi, K | score | usual errors of "
-        "sensors: refused | 90 % | score | and of the model: refused | 90 % | score |",
+        "| what is wrong | exact sensors: refused | 90 % of c, phi, K | score | typical errors "
+        "of sensors: refused | 90 % | score | and of the model: refused | 90 % | score |",
         "|---|---:|---|---:|---:|---|---:|---:|---|---:|",
     ]
     for world in worlds:
@@ -185,7 +185,7 @@ def tables(file: Path = ROOT / "exported" / "wheel.onnx") -> str:
     """All tables of a model file."""
     estimator = Estimator.load(file)
     parts = [
-        "### Width of sound sets with usual errors, over that with exact sensors",
+        "### Width of sound sets with typical errors, over that with exact sensors",
         price_table(estimator),
     ]
     for label, channels in CHANNELS.items():

@@ -61,9 +61,10 @@ PARTS = (
         "accuracy",
         "forward-model",
         "Accuracy of the rigid wheel",
-        "Relative error against adaptive quadrature and bracketing (`tests/reference.py`), over "
-        "c 0 to 6 kPa, phi 15 to 50 deg, K 2 to 60 mm, n 0.4 to 1.6, k 4e4 to 1e7 N/m^(n+2), load "
-        "5 to 1000 N, r 0.04 to 0.5 m, b 0.02 to 0.4 m. Goal: 1e-6.",
+        "Relative error against adaptive quadrature and bracketing (`tests/reference.py`). "
+        "Goal: 1e-6. The input box is c 0 to 6 kPa, phi 15 to 50 deg, K 2 to 60 mm, n 0.4 to "
+        "1.6 and k 4e4 to 1e7 N/m^(n+2). Loads are 5 to 1000 N, r is 0.04 to 0.5 m and b 0.02 "
+        "to 0.4 m.",
         lambda folder: physics.accuracy(),
     ),
     Part(
@@ -86,9 +87,10 @@ PARTS = (
         "comparison",
         "identification",
         "Estimators and analytic methods relative to the Bayes limit",
-        "Written by `soilml compare`; docs/benchmark.md explains the benchmark. Reference wheel, "
-        "recipe `benchmark`: c 0 to 3 kPa, phi 25 to 45 deg, K 5 to 30 mm, slip 0.05 to 0.6, load "
-        "30 to 120 N, 2 % torque noise, bearing parameters known. A single reading does not "
+        "Written by `soilml compare`; docs/benchmark.md explains the benchmark. The reference "
+        "wheel follows the recipe `benchmark`: c 0 to 3 kPa, phi 25 to 45 deg, K 5 to 30 mm, "
+        "slip 0.05 to 0.6, load 30 to 120 N. Torque noise is 2 %, and the bearing parameters "
+        "are known. A single reading does not "
         "determine three parameters: all methods stay near the prior there, with correspondingly "
         "wide intervals.",
         lambda folder: learning.comparison(),
@@ -100,9 +102,10 @@ PARTS = (
         "Three unknown parameters of the recipe `wheel`; torque (2 % noise) and sinkage (0.5 mm) "
         "at four loads (`python bench/identification.py`). The posterior is sampled with "
         "polynomials in place of the model; *model itself*: every sample is solved. The second "
-        "table compares the two on simulated sets, in standard deviations of the posterior: "
-        "samples of an effective size of 2500 differ by 0.03 (rms) in a mean, and by about twice "
-        "that in an end of the 90 % interval. Sets for which no polynomial was accurate enough "
+        "table compares the two on simulated sets, in standard deviations of the posterior. "
+        "Samples of an effective size of 2500 differ by 0.03 (rms) in a mean, and by about "
+        "twice that in an end of the 90 % interval. Sets for which no polynomial was accurate "
+        "enough "
         "are left out; `identify` samples the model for them.",
         lambda folder: identification.text(),
     ),
@@ -138,13 +141,13 @@ PARTS = (
         "Wrong sensors and wrong models",
         f"`wheel.onnx` on {model_errors.SETS} soils a line, {model_errors.ROWS} rows each at three "
         "loads, 2 % torque noise (`python bench/model_errors.py`). Sets are simulated by the "
-        "reference wheel of blind sets, which shares no code with `soilml`. First the file with "
-        "exact sensors and the prior for refused sets, as files were before they knew of errors; "
-        "then its two answers: with the usual errors of the sensors, as if the model were right, "
-        "and with the usual errors of the model as well (`model_error` 1). Score: mean of the "
+        "reference wheel of blind sets, which shares no code with `soilml`. First comes the "
+        "file with exact sensors and the prior for refused sets. Its two answers follow: with "
+        "typical errors of the sensors and an exact model, and with typical errors of the model "
+        "as well (`model_error` 1). Score: mean of the "
         "interval score over parameters and sets, in standard deviations of the prior; the prior "
-        "has about 3.3. Last table: the two answers of `identify --method posterior`, without and "
-        f"with usual errors, to {wrong_worlds_identified.SETS} sets made in the same way.",
+        "has about 3.3. Last table: the two answers of `identify --method posterior`, without "
+        f"and with typical errors, to {wrong_worlds_identified.SETS} sets made in the same way.",
         lambda folder: f"{model_errors.tables()}\n\n{wrong_worlds_identified.section()}",
     ),
     Part(
@@ -172,21 +175,22 @@ PARTS = (
         "streams",
         "driving",
         "A day of driving",
-        f"{streams.DAYS} simulated days of docs/driving.md on each line, by the reference wheel of "
-        "`datagen/blind_sets`: three soils of 100 rows, 2 % torque noise, slip with a standard "
-        "deviation of 0.02; 2 % of the rows are glitches (torque doubled or zero, slip off by a "
-        "half), torque is stuck for 20 rows, a pause lasts 10 rows, and over the last 150 rows the "
-        "friction angle falls by 7 degrees or the zero of the torque sensor rises by 0.5 N m. "
+        f"{streams.DAYS} simulated days of docs/driving.md on each line, by the reference wheel "
+        "of `datagen/blind_sets`. A day has three soils of 100 rows, 2 % torque noise, and slip "
+        "with a standard deviation of 0.02. Of the rows, 2 % are glitches (torque doubled or "
+        "zero, slip off by a half); torque is stuck for 20 rows, and a pause lasts 10 rows. "
+        "Over the last 150 rows the friction angle falls by 7 degrees or the zero of the torque "
+        "sensor rises by 0.5 N m. "
         "Width: median standard deviation over that of the prior. "
         f"Intervals and flag `in_range`: rows from the {streams.SETTLED}th on one soil on, "
         "glitches apart. Alarms: sound rows of unchanged soil that were set aside or called a "
-        f"change, drift or stuck sensor. Changes by rms change of torque: how many were told "
+        "change, drift or stuck sensor. Changes by rms change of torque: how many were detected "
         f"within {streams.WITHIN} rows; median and largest delay in rows. Drift: how many were "
         "flagged; median and largest delay. Last column: of the rows in a drift whose mean is off "
         "by more than so many standard deviations, the share that carries a flag, and their "
-        "number. `model_error` 1: the file with the usual errors of its model, and without them "
-        "otherwise. All usual errors: those of sensors are drawn for each day, those of bearing "
-        "and contact for each soil.",
+        "number. `model_error` 1: the file with typical errors of its model, and without them "
+        "otherwise. All typical errors: those of sensors are drawn for each day, those of "
+        "bearing and contact for each soil.",
         lambda folder: streams.table(ROOT / "exported" / "wheel.onnx"),
     ),
     Part(
@@ -236,9 +240,10 @@ PARTS = (
         "slip",
         "systems",
         "Slip of a wheel-leg",
-        "Slip from torque and from vibration (Comin and Saaj 2017, eqs. 18 and 24): the released "
-        "linear files, and LS-SVM variants trained on the same data, on strides that no file was "
-        "trained on. Each cell: RMSE over the standard deviation of the prior, coverage of the "
+        "Slip from torque and from vibration (Comin and Saaj 2017, eqs. 18 and 24). The "
+        "released linear files, and LS-SVM variants trained on the same data, are tested on "
+        "strides that no file was trained on. Each cell: RMSE over the standard deviation of "
+        "the prior, coverage of the "
         "90 % interval. The rules prior-once and eq. 26 take errors for independent. *World*: what "
         "differs from the recipe of the files. *Disagreement*: difference between the two files in "
         "standard deviations of that difference, 1 where both are right.",

@@ -99,8 +99,9 @@ def rmse_table(folder: Path) -> str:
 def log_density_table(folder: Path) -> str:
     """Log posterior density at the truth"""
     lines = [
-        "Mean log density at the truth of all unknowns jointly (uncertain bearing included): that "
-        "of the exact posterior, and the gap by which the posterior of the file is below it. Goal: "
+        "Mean log density at the truth of all unknowns jointly (uncertain bearing included). "
+        "*Exact*: of the exact posterior; *gap*: how far the posterior of the file is below it. "
+        "Goal: "
         f"a gap of at most {MAX_GAP:g} nat.",
         "",
         "| file, sets | subset | sets | gap, nat | s.e. | exact, nat | goal |",
@@ -124,9 +125,10 @@ def coverage_table(folder: Path) -> str:
         "Coverage of 90 % intervals, and of the joint 90 % ellipsoid of mean and covariance: of "
         "the file / of the exact posterior on the same sets. Goal: 90 % intervals cover "
         f"{low:.0%} to {high:.0%}. Coverage of an exact posterior is 90 % on average over the "
-        "prior, not among soils of one third of the prior, where the posterior mean is shrunk "
-        "towards the middle; nor need a Gaussian ellipsoid cover 90 % of a posterior that is not "
-        "Gaussian. A file reports 90 % intervals only: 50 % figures are of the posterior that its "
+        "prior. It is not among soils of one third of the prior, where the posterior mean is "
+        "shrunk towards the middle. Nor need a Gaussian ellipsoid cover 90 % of a posterior "
+        "that is not Gaussian. A file reports 90 % intervals only: 50 % figures are of the "
+        "posterior that its "
         "likelihood defines.",
         "",
         f"| file, sets | subset | sets | {' | '.join(SHEAR_SYMBOLS)} | joint | goal |",
@@ -147,9 +149,10 @@ def calibration_table(folder: Path) -> str:
     """Simulation-based calibration"""
     lines = [
         "Chi-square test of the truth's posterior rank against uniformity (Talts et al., "
-        "arXiv:1804.06788, 2018), p-values. `ranks`: 10 bins of the rank in the posterior that the "
-        "file's likelihood defines; `interval`: below, inside and above the file's own 90 % "
-        "interval; `exact`: the exact posterior, in the bins of its stored quantiles. Goal: p at "
+        "arXiv:1804.06788, 2018), p-values. `ranks`: 10 bins of the rank in the posterior that "
+        "the file's likelihood defines. `interval`: below, inside and above the file's own 90 % "
+        "interval. `exact`: the exact posterior, in the bins of its stored quantiles. Goal: p "
+        "at "
         f"least {MIN_P_VALUE:g}.",
         "",
         "| file, sets | sets | test | " + " | ".join(SHEAR_SYMBOLS) + " | goal |",

@@ -27,7 +27,7 @@ WORLDS = (
     ("as modelled", "", 0.0, 0.0),
     ("slip-sinkage 0.3", "slip-sinkage", 0.3, 0.0),
     ("grousers of 10 mm", "grousers", 0.01, 0.0),
-    ("all usual errors", "", 0.0, 1.0),
+    ("all typical errors", "", 0.0, 1.0),
 )
 #: Deviation in standard deviations of a soil that the estimate is wrong about.
 FAR = 3.0
@@ -155,7 +155,7 @@ def table(file: Path, days: int = DAYS) -> str:
     edges = ("below 10 %", "10 to 20 %", "above 20 %")
     heads = (
         "world and method",
-        "90 % holds: c / phi / K",
+        "coverage of 90 % intervals: c / phi / K",
         "width",
         "in range",
         "alarms per 1000 rows",
@@ -174,6 +174,6 @@ def table(file: Path, days: int = DAYS) -> str:
         ]
         lines.append(_line(f"{name}, tracker", tracked(estimator, driven)))
         lines.append(_line(f"{name}, tracker, `model_error` 1", tracked(usual, driven)))
-        lines.append(_line(f"{name}, plain steps", stepped(estimator, driven)))
-        lines.append(_line(f"{name}, plain steps, `model_error` 1", stepped(usual, driven)))
+        lines.append(_line(f"{name}, `step`", stepped(estimator, driven)))
+        lines.append(_line(f"{name}, `step`, `model_error` 1", stepped(usual, driven)))
     return "\n".join(lines)

@@ -65,11 +65,11 @@ WORLDS = (
     World("exit angle, kappa 0.25", mechanism=("exit-angle", 0.25)),
     World("lugs of 10 mm", mechanism=("grousers", 0.01)),
     World("bearing pressure x 2", bearing=2.0),
-    World("all usual errors at once", usual=1.0),
+    World("all typical errors at once", usual=1.0),
 )
 #: An error of the usual size, as the answer that allows for it assumes, where `x 2` is one error of
 #: 1.7 standard deviations.
-USUAL_BEARING = World("usual error of bearing", bearing_std=STD["bearing"])
+USUAL_BEARING = World("typical error of bearing", bearing_std=STD["bearing"])
 #: Mechanisms that no error of sensors or model describes, at their reference sizes.
 UNLISTED = (
     "stress-shift",

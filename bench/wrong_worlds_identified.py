@@ -67,8 +67,9 @@ def section() -> str:
     low, high = (100.0 * binom.ppf(q, SETS, 0.9) / SETS for q in (0.025, 0.975))
     return (
         "### Posterior of the full model\n\n"
-        "The second answer promises 90 % on average over errors of the usual sizes: of the last "
-        "two lines, and not of each single error above them. Bearing pressure x 2 is an error of "
+        "The second answer has a coverage of 90 % on average over errors of typical sizes, "
+        "those of the last two lines, and not of each single error above them. Bearing pressure "
+        "x 2 is an error of "
         f"1.7 standard deviations. By chance alone, 95 of 100 cells of {SETS} sets lie between "
         f"{low:.0f} and {high:.0f} where the coverage is 90.\n\n{table()}"
     )

@@ -133,7 +133,7 @@ def test_region_soil_and_time_are_compared_with_their_gates():
     assert figure(sets, "the same over that of a Gaussian process").met
     off = {"cohesion": {"before": 500.0, "after": 830.0, "std": 10.0, "true": 800.0}}
     sets = [record(discrepancy=0.02) for _ in range(9)] + [record(discrepancy=0.02, soil=off)]
-    held = figure(sets, "90 % interval of c holds the truth, discrepancy 2%")
+    held = figure(sets, "90 % interval of c: coverage, discrepancy 2%")
     assert held.met and held.measured.endswith("9/10")
     slow = [record(seconds=0.8), record(seconds=0.9), record(seconds=12.0)]
     assert not figure(slow, "seconds of one core, 49 to 72 rows").met

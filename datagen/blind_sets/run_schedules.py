@@ -30,7 +30,7 @@ DESIGNS = {
     "jittered-one-load": "the same about one level",
     "repeats": "each operating point is driven two or three times, in different runs",
     "missing-channels": "one or two of the three channels were not measured",
-    "unequal-soils": "the soil differs from run to run three times as much as usual",
+    "unequal-soils": "the soil differs from run to run three times as much as in the others",
     "braking": "slips from braking to driving",
     "two-gears": "two wheels of different size, or with and without lugs, at the same points",
 }

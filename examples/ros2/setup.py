@@ -4,7 +4,7 @@ from setuptools import setup
 
 setup(
     name="soil_estimator",
-    version="0.1.0",
+    version="0.2.0",
     packages=["soil_estimator"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/soil_estimator"]),
