@@ -143,7 +143,7 @@ def test_region_soil_and_time_are_compared_with_their_gates():
 def test_pages_are_written_from_few_records_and_from_kept_ones(tmp_path):
     sets = [record(), null(), record(status="crash", cause_set=[], seconds=9.0)]
     page = gap_pages.text(sets)
-    assert "| falsely unique: null |" in page and "nan" not in page.split("### Held-out")[0]
+    assert "| falsely unique: null |" in page and "nan" not in page.split("## Held-out")[0]
     kept = [{k: list(v) if isinstance(v, tuple) else v for k, v in s.items()} for s in sets]
     assert gap_pages.text(gap_records.from_json(kept)) == page
     many = [record(probabilities={"slip-sinkage": p}) for p in np.linspace(0.0, 1.0, 120)]

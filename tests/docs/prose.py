@@ -1,4 +1,4 @@
-"""Sentences of a Markdown page: paragraphs and items of lists, without code, tables and headings."""
+"""Sentences of a Markdown page, from paragraphs and lists, without code, tables and headings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ def sentences(page: str) -> Iterator[Sentence]:
     """The sentences of a page in its order."""
     for line, text in _paragraphs(page):
         begin = 0
-        for end in _END.finditer(text):
+        masked = _CODE.sub(lambda code: f"`{'x' * (len(code[0]) - 2)}`", text)
+        for end in _END.finditer(masked):
             words = text[begin : end.start()].split()
             if words and words[-1].lower().lstrip("(") in ABBREVIATIONS:
                 continue
