@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.fitting.coordinates import linearise, predict_readings, soil_coordinate
 from soilml.fitting.free_parameters import select_free
 from soilml.fitting.readings import stack_readings
-from soilml.gap.statistics.signatures import effect_signatures
+from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import column

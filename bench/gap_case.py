@@ -21,6 +21,7 @@ from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, SHEAR, column
+from soilml.remarks import texts
 
 #: Solutions by which the speed of the machine is measured.
 SOLUTIONS = 4000
@@ -86,7 +87,7 @@ def _said(report: GapReport) -> dict[str, Any]:
         "suspects": [tuple(sorted(s.effects)) for s in getattr(report, "suspects", ())],
         "p_gap": report.p_gap,
         "unclaimed": list(report.best_unclaimed),
-        "reasons": list(report.reasons),
+        "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
     }
 

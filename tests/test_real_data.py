@@ -68,10 +68,10 @@ def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
     assert together["suspects"][0]["effects"] == ["grousers@lugged"]
     assert together["suspects"][0]["log_odds"] > 0.0 > together["suspects"][1]["log_odds"]
     driving = said("cmu_driving")
-    assert driving["fits_best_but_not_claimed"] == ["slip-sinkage"]
+    assert driving["best_unclaimed"] == ["slip-sinkage"]
     for found in (driving, said("cmu_braking"), said("cmu_all")):
         assert found["effects"] == []
-        assert any("one load only" in reason for reason in found["reasons"])
+        assert any(reason["code"] == "one-load" for reason in found["reasons"])
 
 
 def test_the_continuous_law_of_braking_explains_driving_and_braking_far_better(tmp_path, capsys):

@@ -159,11 +159,11 @@ def line(story: Story) -> tuple[str, ...]:
     region = report["gap"].get("held_out_region")
     gap = "-" if region is None else f"{region['before']:.3g} -> {region['after']:.3g}"
     phi = "-"
-    if "friction_angle" in report["soil"]["after"]:
+    if "friction_angle" in report["soil_after"]:
         off = [
             abs(
                 np.degrees(
-                    report["soil"][when]["friction_angle"]["value"] - story.soil["friction_angle"]
+                    report[f"soil_{when}"]["friction_angle"]["value"] - story.soil["friction_angle"]
                 )
             )
             for when in ("before", "after")

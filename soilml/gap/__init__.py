@@ -4,8 +4,8 @@
 determines which effects an experimental design could identify.
 """
 
-from soilml.gap.design.identifiability_audit import Audit, audit
-from soilml.gap.results import STATUSES, GapReport
+from soilml.gap.design.identifiability import Audit, audit
+from soilml.gap.report.results import STATUSES, GapReport
 from soilml.gap.workflow import gap
 
 __all__ = ["STATUSES", "Audit", "GapReport", "audit", "gap"]

@@ -12,8 +12,8 @@ from soilml.report.result_files import json_text
 from soilml.report.terminal import rounded, shown_unit, significant
 
 if TYPE_CHECKING:
-    from soilml.gap.design.identifiability_audit import Audit
-    from soilml.gap.results import GapReport
+    from soilml.gap.design.identifiability import Audit
+    from soilml.gap.report.results import GapReport
 
 #: The file that there is where causes are suspected but not named.
 SUSPECTED_FILE = "model_suspected.toml"
@@ -24,7 +24,7 @@ def gap_files(
 ) -> dict[str, str]:
     """The content of the files of a report by their names; `model` and `runs` were analysed."""
     from soilml.config.write_case import case_as_toml
-    from soilml.gap.html.page import page, summary
+    from soilml.gap.report.page import page, summary
 
     if origin is None:
         origin = Provenance.of(["gap", model, runs], [])
@@ -132,7 +132,7 @@ def audit_text(found: Audit) -> str:
     rows = [
         (
             e.name,
-            "yes" if e.separating_snr >= 3.0 else "no",
+            "yes" if e.nameable else "no",
             f"{significant(factor * e.size)} {unit}".rstrip(),
             significant(e.residual_signal, 3),
             significant(e.separating_snr, 3),

@@ -10,7 +10,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.errors import InputError
-from soilml.fitting.free_parameters import FreeParameter
 from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
 from soilml.fitting.readings import (
     Readings,
@@ -18,30 +17,21 @@ from soilml.fitting.readings import (
     stack_readings,
 )
 from soilml.fitting.rover_rows import with_rover_columns
-from soilml.gap.data.candidate_effects import candidate_effects, effect_names
-from soilml.gap.data.checks import (
+from soilml.gap.candidate_effects import candidate_effects, effect_names
+from soilml.gap.checks import (
     DataCheckResult,
     check_readings,
     estimate_repeat_noise,
     without_duplicate_rows,
 )
-from soilml.gap.data.holdout import HoldoutSplit, split_holdout
 from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.design.run_costs import check_costs, rank_by_cost
-from soilml.gap.messages import unsupported_conclusions, verdict_sentence
-from soilml.gap.results import GapReport
-from soilml.gap.search.iteration import Analysis, analyse
-from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.verdict.claimed_effects import (
-    discrepancy_map,
-    named_effects,
-    signature_similarity,
-    soil_estimates,
-)
-from soilml.gap.verdict.cross_validation import predict_held_out
+from soilml.gap.design.run_kinds import check_costs, rank_by_cost
+from soilml.gap.evidence.held_out import HoldoutSplit, predict_held_out, split_holdout
+from soilml.gap.report.results import GapReport
+from soilml.gap.report.sentences import unsupported_conclusions, verdict_sentence
+from soilml.gap.search.analysis import Analysis, analyse
 from soilml.gap.verdict.decision import (
     NOTHING_IS_BETTER,
-    Decision,
     cause_set,
     decide,
     is_left_open,
@@ -50,27 +40,36 @@ from soilml.gap.verdict.decision import (
     with_refused_outside,
 )
 from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagree
-from soilml.gap.verdict.estimate_spread import among_candidates, by_undetected_effects
-from soilml.gap.verdict.remaining_discrepancy import (
-    discrepancy_amplitudes,
-    remaining_discrepancy,
-    with_uncertain_discrepancy,
-)
-from soilml.gap.verdict.report_entries import (
+from soilml.gap.verdict.entries import (
     analysis_notes,
     candidate_summaries,
     competing_explanations,
+    conditions_of_suspects,
     gap_reductions,
+    named_effects,
     readings_and_predictions,
+    signature_similarity,
     soil_beside_discrepancy,
     soil_marginal,
     suspects,
     variance_component_entries,
 )
-from soilml.gap.verdict.residual_trend import residual_trend
-from soilml.gap.verdict.updated_case import updated_case
+from soilml.gap.verdict.estimates import (
+    among_candidates,
+    by_undetected_effects,
+    soil_estimates,
+    updated_case,
+)
+from soilml.gap.verdict.remainder import (
+    discrepancy_amplitudes,
+    discrepancy_map,
+    remaining_discrepancy,
+    residual_trend,
+    with_uncertain_discrepancy,
+)
 from soilml.io.read_table import Rows, as_table
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.remarks import Remark, texts
 from soilml.unsolvable import solvable
 
 
@@ -167,19 +166,26 @@ def gap(
     readings = stack_readings(case, split.analysed)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes += exclusions
+    notes += [Remark("channel-excluded", text) for text in exclusions]
     checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)
         return _bad_data_report(case, errors, checks.notes, seed)
     if unusable_rows:
         rows = "1 row is" if unusable_rows == 1 else f"{unusable_rows} rows are"
-        notes.append(f"{rows} excluded: the status is not ok")
+        notes.append(Remark("rows-excluded", f"{rows} excluded: the status is not ok"))
     checks = replace(checks, notes=(*notes, *checks.notes))
 
     place = split.analysed.place
     analysis = analyse(
-        case, soil, readings, effects, calibration or {}, seed, place, progress or (lambda _: None)
+        case,
+        soil,
+        readings,
+        effects=effects,
+        calibration=calibration or {},
+        seed=seed,
+        place=place,
+        progress=progress or (lambda _: None),
     )
     if analysis.error:
         return _bad_data_report(case, (analysis.error,), checks.notes, seed)
@@ -188,55 +194,57 @@ def gap(
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
     analysis = replace(analysis, result=with_refused_outside(analysis.result))
-    report = _build_report(case, analysis, checks, soil, split, held_out, seed)
-    return replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
+    report = _build_report(case, analysis, checks, split, held_out, seed)
+    report = replace(
+        report,
+        next_runs=tuple(rank_by_cost(report.next_runs, known_costs)),
+        sentence=verdict_sentence(report, effect_names(case)),
+    )
+    fixed = fixed_parameters(case, soil)
+    conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
+    return replace(report, not_claimed=tuple(conclusions))
 
 
 def _bad_data_report(
-    case: Case, errors: Sequence[str], notes: tuple[str, ...], seed: int
+    case: Case, errors: Sequence[Remark], notes: tuple[Remark, ...], seed: int
 ) -> GapReport:
     """The report on data that cannot be analysed."""
-    return GapReport(
-        "bad-data", "; ".join(errors), case, reasons=tuple(errors), notes=notes, seed=seed
-    )
+    sentence = "; ".join(texts(errors))
+    return GapReport("bad-data", sentence, case, reasons=tuple(errors), notes=notes, seed=seed)
 
 
 def _build_report(
     case: Case,
     analysis: Analysis,
     checks: DataCheckResult,
-    free: Sequence[FreeParameter],
     split: HoldoutSplit,
     held_out: Readings | None,
     seed: int,
 ) -> GapReport:
-    """Decide the status and collect the entries of the report."""
+    """Decide the status, then compute the entries of the report."""
     problem, result = analysis.problem, analysis.result
     obstacles = checks.naming_obstacles
-    before = soil_marginal(analysis)
     smooth_gap = result.has_gap and not is_left_open(result)
     conflicts = [] if smooth_gap else disagreements(problem, result.soil)
     if result.has_gap and not (smooth_gap or conflicts):
         conflicts = [NOTHING_IS_BETTER]
-    best = next((c.best for c in result.accepted if c.names), before)
-    figures = gap_reductions(analysis, before, best, seed)
     decision = decide(problem, result, obstacles, conflicts)
+
+    before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
-    if shown is not best:
-        figures = gap_reductions(analysis, before, shown, seed)
-    if held_out is not None and len(held_out):  # after the verdict, which must not depend on it
-        description = split.description
+    after = shown if decision.claimed else beside  # what model.toml contains
+    figures = gap_reductions(analysis, before, shown, seed)
+    if held_out is not None and len(held_out):
         figures[split.name] = predict_held_out(
-            problem, result.soil, shown.fit, held_out, description
+            problem, result.soil, shown.fit, held_out, split.description
         )
-    none = soil_beside_discrepancy(analysis)
-    after = shown if decision.claimed else none  # what model.toml contains
-    alike = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
+    replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     intervals = with_uncertain_discrepancy(problem, after)
-    left = discrepancy_amplitudes(problem, after) if smooth_gap else None
     if smooth_gap:
+        left = discrepancy_amplitudes(problem, after)
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
+        left = None
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
     report = GapReport(
         status=decision.status,
@@ -244,15 +252,14 @@ def _build_report(
         model=updated_case(intervals, left),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
-        suspects=tuple(suspects(analysis, obstacles)) if smooth_gap else (),
         best_unclaimed=unclaimed_effects(decision, result),
-        reasons=reasons(decision, obstacles, conflicts or alike),
+        reasons=reasons(decision, obstacles, conflicts or replicates),
         gap=figures,
         soil_before=soil_estimates(result.soil),
         soil_after=soil_estimates(intervals, spread),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
-        untestable={u.name: u.reason for u in result.untestable},
-        notes=(*checks.notes, *analysis_notes(analysis, after.fit, shown.fit, alike)),
+        untestable=dict(result.untestable),
+        notes=(*checks.notes, *analysis_notes(analysis, after.fit, shown.fit, replicates)),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,
@@ -264,37 +271,22 @@ def _build_report(
         suspected = updated_case(fit, discrepancy_amplitudes(problem, shown))
         report = replace(report, suspected_model=suspected)
     if decision.claimed:
-        report = _with_effects(report, analysis, decision)
-    if smooth_gap:
-        report = _with_disagreement(report, analysis, none, shown if decision.shown else none, seed)
+        claimed = decision.claimed
+        similarity = signature_similarity(problem, claimed[0].fit, claimed[0].amplitude)
+        report = replace(
+            report,
+            effects=tuple(named_effects(claimed, intervals, similarity, result.posterior)),
+            mimic_radius=similarity.largest_cosine(claimed[0].names),
+        )
+    if not smooth_gap:
+        return report
+    left_by = shown if decision.shown else beside
     return replace(
         report,
-        sentence=verdict_sentence(report, effect_names(case)),
-        not_claimed=tuple(unsupported_conclusions(report, obstacles, fixed_parameters(case, free))),
-    )
-
-
-def _with_effects(report: GapReport, analysis: Analysis, decision: Decision) -> GapReport:
-    """The report with the effects that it claims and their similarity to other effects."""
-    claimed, posterior = decision.claimed, analysis.result.posterior
-    similarity = signature_similarity(analysis.problem, claimed[0].fit, claimed[0].amplitude)
-    intervals = with_uncertain_discrepancy(analysis.problem, claimed[0].best)
-    return replace(
-        report,
-        effects=tuple(named_effects(claimed, intervals, similarity, posterior)),
-        mimic_radius=similarity.largest_cosine(claimed[0].names),
-    )
-
-
-def _with_disagreement(
-    report: GapReport, analysis: Analysis, before: MarginalFit, after: MarginalFit, seed: int
-) -> GapReport:
-    """The report with the map of the gap, the remaining discrepancy and the runs to make next."""
-    problem = analysis.problem
-    return replace(
-        report,
-        where=tuple(discrepancy_map(problem, analysis.result.soil, seed)),
-        residual_trend=residual_trend(problem, after.fit),
-        discrepancy=remaining_discrepancy(problem, before, after),
+        suspects=tuple(suspects(analysis)),
+        conditions=conditions_of_suspects(analysis, obstacles),
+        where=tuple(discrepancy_map(problem, result.soil, seed)),
+        residual_trend=residual_trend(problem, left_by.fit),
+        discrepancy=remaining_discrepancy(problem, beside, left_by),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )

@@ -16,13 +16,13 @@ _DISPLAY_UNITS = {
     "N/m^3": (1e-3, "kN/m^3"),
 }
 _VARIANCE_COMPONENTS = {
-    "friction_angle_from_run_to_run_rad": (
+    "friction_angle_std": (
         "friction angle from run to run, std",
         180.0 / math.pi,
         "°",
     ),
-    "bearing_from_run_to_run": ("bearing strength from run to run, std", 100.0, " %"),
-    "memory_of_samples": ("correlation of neighbouring samples", 1.0, ""),
+    "bearing_std": ("bearing strength from run to run, std", 100.0, " %"),
+    "autocorrelation": ("correlation of neighbouring samples", 1.0, ""),
 }
 _SYMBOLS = {"theta_1": "θ₁", "k_phi": "k_φ", "k_c": "k_c", "phi": "φ", "gamma": "γ", "a_0": "a₀"}
 _NAMES = {

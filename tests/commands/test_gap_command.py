@@ -117,8 +117,8 @@ def test_the_folder_gets_four_files(done):
 def test_gap_json_has_the_promised_keys(done):
     found = content(done)
     assert {
-        "status", "effects", "cause_set", "where", "gap", "soil", "mimic_radius", "next_runs",
-        "seed", "soilml_version",
+        "status", "effects", "cause_set", "where", "gap", "soil_before", "soil_after",
+        "mimic_radius", "next_runs", "seed", "soilml_version",
     } <= set(found)  # fmt: skip
     assert found["status"] == "named" and ["slip-sinkage"] in found["cause_set"]
     (effect,) = found["effects"]
@@ -129,7 +129,7 @@ def test_gap_json_has_the_promised_keys(done):
     assert set(found["gap"]) == {"train", "held_out_runs", "held_out_region"}
     for figures in found["gap"].values():
         assert figures["before"] > figures["after"] > 0.0
-    assert set(found["soil"]) == {"before", "after"}
+    assert set(found["soil_before"]) == set(found["soil_after"])
     assert found["seed"] == 0
 
 
@@ -146,7 +146,7 @@ def test_the_model_that_was_written_carries_what_was_named(done):
     found = content(done)
     assert effect.name == found["effects"][0]["name"]
     assert effect.n1 == pytest.approx(found["effects"][0]["parameters"]["n1"]["value"], rel=1e-5)
-    for name, value in found["soil"]["after"].items():
+    for name, value in found["soil_after"].items():
         assert float(getattr(case.soil, name)) == pytest.approx(value["value"], rel=1e-5)
 
 
@@ -176,7 +176,7 @@ def test_next_runs_carry_their_costs_where_some_are_given(inputs, tmp_path, caps
     found = analysed(inputs, tmp_path, capsys, *files, "--cost", "heavier=50")
     costs = {run["kind"]: run["cost"] for run in found["next_runs"]}
     assert set(costs.values()) <= {1.0, 50.0}
-    per_cost = [run["separates_sigma"] / run["cost"] for run in found["next_runs"]]
+    per_cost = [run["discrimination"] / run["cost"] for run in found["next_runs"]]
     assert per_cost == sorted(per_cost, reverse=True)
     text = (tmp_path / "out" / "next_runs.csv").read_text()
     header = ["run", "kind", "what", "separates_sigma", "cost", "slip", "load_N"]
@@ -188,7 +188,7 @@ def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
     found = analysed(inputs, tmp_path, capsys, *files, "--seed", "3")
     assert found["status"] == "bad-data" and found["seed"] == 3
     assert found["effects"] == found["cause_set"] == found["next_runs"] == []
-    assert any("6 readings for 3 soil parameters" in reason for reason in found["reasons"])
+    assert any("6 readings for 3 soil parameters" in reason["text"] for reason in found["reasons"])
     text = (tmp_path / "out" / "next_runs.csv").read_text()
     assert text.strip() == "run,kind,what,separates_sigma,slip,load_N"
 
@@ -198,12 +198,12 @@ def test_one_load_has_suspects_and_names_nothing(inputs, tmp_path, capsys):
     found = analysed(inputs, tmp_path, capsys, *files)
     assert found["status"] == "suspected"
     assert found["effects"] == []
-    assert "one load only" in found["reasons"][0]
+    assert found["reasons"][0]["code"] == "one-load"
     odds = [suspect["log_odds"] for suspect in found["suspects"]]
     assert odds == sorted(odds, reverse=True)
-    assert all("one load cannot test them" in s["given"] for s in found["suspects"])
+    assert "inside-priors" in {condition["code"] for condition in found["conditions"]}
     first = found["suspects"][0]["effects"]
-    assert found["fits_best_but_not_claimed"] == first
+    assert found["best_unclaimed"] == first
     assert "[[effect]]" not in (tmp_path / "out" / "model.toml").read_text()
     suspected = (tmp_path / "out" / "model_suspected.toml").read_text()
     assert all(f'name = "{name}"' in suspected for name in first)
@@ -220,7 +220,7 @@ def test_noise_that_nobody_declared_is_bad_data_with_a_hint(inputs, tmp_path, ca
     files = (str(inputs / "quiet.toml"), str(inputs / "runs.csv"))
     found = analysed(inputs, tmp_path, capsys, *files)
     assert found["status"] == "bad-data"
-    assert 'give [noise] torque_Nm, as in torque_Nm = "2 %"' in found["reasons"][0]
+    assert 'give [noise] torque_Nm, as in torque_Nm = "2 %"' in found["reasons"][0]["text"]
 
 
 def heavy(inputs, tmp_path):

@@ -18,14 +18,14 @@ from soilml.fitting.predictions import (
     predict_many,
 )
 from soilml.fitting.readings import Readings
-from soilml.gap.data.candidate_effects import effect_names
+from soilml.gap.candidate_effects import effect_names
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
+from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.design.static_checks import SENSOR_CHECKS, SOIL_TESTS
-from soilml.gap.report_parts import NextRun
-from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.search.problem import FitProblem
-from soilml.gap.verdict.cross_validation import covariance_at
+from soilml.gap.evidence.held_out import covariance_at
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.report.results import NextRun
+from soilml.gap.search.explanation import CandidateFit
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from soilml.gap.search.candidate_fits import CandidateFit
-from soilml.gap.statistics.evidence import TEMPERING
+from soilml.gap.evidence.marginal_likelihood import TEMPERING
+from soilml.gap.search.explanation import CandidateFit
 
 #: Decrease of the objective by the best explanation from which another one is rejected: tempered
 #: odds of 1 to 33.

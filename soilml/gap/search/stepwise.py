@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.fitting.least_squares import Solution
-from soilml.gap.search.candidate_fits import (
+from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
+from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
+from soilml.gap.evidence.score_test import ScoreTest, score_test
+from soilml.gap.search.explanation import (
     CandidateFit,
     CandidateRequest,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
+    shape_directions,
 )
-from soilml.gap.search.marginal_fits import MarginalFit, fit_marginal
 from soilml.gap.search.posterior import Posterior, explanations, posterior
-from soilml.gap.search.predicted_gains import predicted_gains, predicted_with_and_without
-from soilml.gap.search.problem import FitProblem, StartedFit
-from soilml.gap.search.residual_test import ResidualTest, residual_test
-from soilml.gap.search.selection import (
+from soilml.gap.search.screening import (
     LARGE_DISCREPANCY,
     WITHIN_REACH,
     Starts,
     effects_to_fit,
+    predicted_gains,
+    predicted_with_and_without,
 )
-from soilml.gap.statistics.signatures import Untestable, effect_signatures
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -69,8 +71,8 @@ class SearchResult:
     final_test: ResidualTest
     predicted_gain: dict[str, float]
     posterior: Posterior
-    #: effects that these runs cannot test
-    untestable: tuple[Untestable, ...] = ()
+    #: why these runs cannot test an effect, by its name
+    untestable: Mapping[str, Remark] = field(default_factory=dict)
 
     @property
     def has_gap(self) -> bool:
@@ -91,6 +93,22 @@ class SearchResult:
     def likeliest(self) -> CandidateFit | None:
         """The candidate with effects of the largest evidence; None where no gap was searched."""
         return next((c for c in self.candidates if c.names), None)
+
+
+def without_search(
+    soil: Solution, test: ResidualTest, untestable: Mapping[str, Remark] | None = None
+) -> SearchResult:
+    """The result where no effect was searched for: there are no candidates."""
+    return SearchResult(
+        soil=soil,
+        soil_test=test,
+        accepted=(),
+        candidates=(),
+        final_test=test,
+        predicted_gain={},
+        posterior=Posterior({}),
+        untestable=untestable or {},
+    )
 
 
 def search(
@@ -119,9 +137,7 @@ def search(
     signatures, untestable = effect_signatures(soil.fitted(), problem.readings, problem.effects)
     soil_test = residual_test(problem, soil, signatures, seed)
     if soil_test.p_value >= GAP_LEVEL:
-        return SearchResult(
-            soil, soil_test, (), (), soil_test, {}, Posterior({}), tuple(untestable)
-        )
+        return without_search(soil, soil_test, untestable)
     progress(1 / STEPS)
     none = _soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, none, soil, signatures)
@@ -144,14 +160,14 @@ def search(
     found = posterior(candidates, gains, none)
     accepted = explanations(candidates, found)
     return SearchResult(
-        soil,
-        soil_test,
-        accepted,
-        candidates,
-        _test_residuals(problem, accepted[0], seed),
-        gains,
-        found,
-        tuple(untestable),
+        soil=soil,
+        soil_test=soil_test,
+        accepted=accepted,
+        candidates=candidates,
+        final_test=_test_residuals(problem, accepted[0], seed),
+        predicted_gain=gains,
+        posterior=found,
+        untestable=untestable,
     )
 
 
@@ -248,3 +264,43 @@ def _extensions(
             if names not in fitted and names not in extended:
                 extended[names] = candidate
     return extended
+
+
+@dataclass(frozen=True)
+class ResidualTest:
+    """Score test of a fit's residuals, and the signatures against which they were tested."""
+
+    signatures: tuple[Signature, ...]
+    test: ScoreTest
+
+    @property
+    def p_value(self) -> float:
+        """Family-wise p value of the largest score."""
+        return self.test.family_wise_p
+
+
+def residual_test(
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature], seed: int
+) -> ResidualTest:
+    """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
+
+    All that the coordinates of the fit can explain is projected out, with second-order terms in
+    the laws of its effects; see `soilml.gap.search.explanation.shape_directions`. What another
+    soil could explain is, with tests of the soil, what these permit.
+    """
+    whiten = problem.discrepancy.whiten(problem.declared_amplitude)
+    fit = fit.whitened_by(whiten)
+    smooth = smooth_basis(problem.readings)
+    columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])
+    signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
+    directions = [whiten @ columns for columns in shape_directions(problem, fit)]
+    space = np.column_stack([fit.jacobian, *directions])
+    # tests of the soil are residuals that no effect changes: a change of the soil costs something
+    deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
+    tests, k = len(deviation), len(fit.x)
+    columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
+    space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])
+    residual = np.append(fit.residual, -deviation)
+    degrees_of_freedom = problem.covariance.components.degrees_of_freedom
+    test = score_test(residual, columns, space, signs, degrees_of_freedom, seed)
+    return ResidualTest(tuple(signatures), test)

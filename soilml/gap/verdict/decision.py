@@ -9,11 +9,13 @@ import numpy as np
 
 from soilml.fitting.coordinates import EffectCoordinate
 from soilml.fitting.least_squares import Solution
-from soilml.gap.search.candidate_fits import CandidateFit
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.report.sentences import NOT_DECISIVE
+from soilml.gap.search.explanation import CandidateFit
 from soilml.gap.search.posterior import not_rejected
-from soilml.gap.search.problem import FitProblem
 from soilml.gap.search.stepwise import SearchResult
-from soilml.gap.verdict.law_difference import law_matters
+from soilml.quantities import column
+from soilml.remarks import Remark
 
 #: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
 #: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
@@ -29,17 +31,19 @@ SUSPECT_MARGIN = 4.0
 #: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
 #: cause is stated all the same: tempered odds of 1100 to 1.
 LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
-#: Why nothing is named where the evidence for the suspects is weak.
-NOT_DECISIVE = "the evidence is not decisive beside the model's usual error"
 #: Why an explanation that the evidence supports is not claimed.
-IMPLAUSIBLE_FAULT = "the fault of a sensor or of the rig would have to be implausibly large"
+IMPLAUSIBLE_FAULT = Remark(
+    "implausible-fault", "the fault of a sensor or of the rig would have to be implausibly large"
+)
 OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
     "one that the catalogue lacks"
 )
 NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
 #: Why nothing is said where the soil alone is rejected without an alternative.
-NOTHING_IS_BETTER = "the soil alone is rejected, and no effect or smooth discrepancy is better"
+NOTHING_IS_BETTER = Remark(
+    "nothing-is-better", "the soil alone is rejected, and no effect or smooth discrepancy is better"
+)
 
 
 @dataclass(frozen=True)
@@ -53,22 +57,22 @@ class Decision:
     status: str
     claimed: tuple[CandidateFit, ...]
     shown: CandidateFit | None
-    reason: str = ""
+    reason: Remark | None = None
 
 
 def decide(
     problem: FitProblem,
     result: SearchResult,
-    naming_obstacles: Sequence[str],
-    disagreements: Sequence[str],
+    naming_obstacles: Sequence[Remark],
+    disagreements: Sequence[Remark],
 ) -> Decision:
-    """The status of a report; see `soilml.gap.results.STATUSES`.
+    """The status of a report; see `soilml.gap.report.results.STATUSES`.
 
     Parameters
     ----------
-    naming_obstacles : sequence of str
+    naming_obstacles : sequence of Remark
         Why these runs cannot identify a cause.
-    disagreements : sequence of str
+    disagreements : sequence of Remark
         Measurements that disagree with each other, which forbid a verdict without a gap.
     """
     if not result.has_gap:
@@ -91,13 +95,15 @@ def decide(
     if _implausible(best.fit):
         return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
     if _far_from_catalogue(best):
-        return Decision("suspected", (), best, OTHER_LAW.format(" + ".join(best.names)))
+        text = OTHER_LAW.format(" + ".join(best.names))
+        return Decision("suspected", (), best, Remark("other-law", text, best.names))
     if left := _large_remainder(problem, result, best):
         shown = _first_suspect(result) or best
-        reason = NOT_CATALOGUED.format(" + ".join(best.names), left)
+        text = NOT_CATALOGUED.format(" + ".join(best.names), left.replace("_", " "))
         if shown is not best:
-            reason += f", and the evidence for {' + '.join(shown.names)} is not decisive"
-        return Decision("suspected", (), shown, reason)
+            text += f", and the evidence for {' + '.join(shown.names)} is not decisive"
+        remark = Remark("not-catalogued", text, (*best.names, column(left)))
+        return Decision("suspected", (), shown, remark)
     if len(accepted) > 1:
         return Decision("class", accepted, best)
     if not result.adequate:
@@ -112,7 +118,7 @@ def _large_remainder(problem: FitProblem, result: SearchResult, best: CandidateF
     none, worst = result.none, int(np.argmax(best.amplitude))
     if none is None or none.objective >= best.objective + DECISIVE_GAIN:
         return ""
-    name = problem.readings.channels[worst].replace("_", " ")
+    name = problem.readings.channels[worst]
     return name if best.amplitude[worst] >= LARGE_REMAINDER else ""
 
 
@@ -176,11 +182,11 @@ def _implausible(fit: Solution) -> bool:
 
 
 def reasons(
-    decision: Decision, obstacles: Sequence[str], disagreements: Sequence[str]
-) -> tuple[str, ...]:
+    decision: Decision, obstacles: Sequence[Remark], disagreements: Sequence[Remark]
+) -> tuple[Remark, ...]:
     """Why no cause can be named, or why the absence of a gap is not stated.
 
-    Of the rows driven alike that disagree, the worst are named beside the suspects, because no
+    Of the replicate rows that disagree, the worst are named beside the suspects, because no
     suspect explains their difference.
     """
     match decision.status:
@@ -190,7 +196,9 @@ def reasons(
             why = (*obstacles, decision.reason) if decision.reason else tuple(obstacles)
             if not disagreements:
                 return why
-            return (*(why or (NOT_DECISIVE,)), f"rows driven alike disagree: {disagreements[0]}")
+            worst = disagreements[0]
+            text = f"replicate rows disagree: {worst}"
+            return (*(why or (NOT_DECISIVE,)), replace(worst, text=text))
         case "not-testable":
             return tuple(obstacles)
     return (decision.reason,) if decision.reason else ()
@@ -208,3 +216,30 @@ def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ..
     if decision.claimed or result.likeliest is None:
         return ()
     return decision.shown.names if decision.shown else result.likeliest.names
+
+
+#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
+#: law does not matter: that of a usual model error.
+NEGLIGIBLE_FRACTION = 0.02
+
+
+def law_matters(problem: FitProblem, candidate: CandidateFit) -> bool:
+    """Whether the two laws differ inside the measured range by more than matters.
+
+    They differ if, in some channel, the root mean square difference of their predictions exceeds
+    both the standard error of a mean over the readings of that channel and the range of the channel
+    times `NEGLIGIBLE_FRACTION`.
+    """
+    readings = problem.readings
+    difference = candidate.free_law.fit.prediction - candidate.catalogue_law.fit.prediction
+    for i in range(len(readings.channels)):
+        in_channel = readings.channel == i
+        values = readings.reading[in_channel]
+        if not values.size:
+            continue
+        rms = float(np.sqrt(np.mean(difference[in_channel] ** 2)))
+        mean_error = float(np.sqrt(np.mean(problem.covariance.std[in_channel] ** 2) / values.size))
+        span = max(float(values.max()), 0.0) - min(float(values.min()), 0.0)
+        if rms > max(mean_error, NEGLIGIBLE_FRACTION * span):
+            return True
+    return False

@@ -8,16 +8,17 @@ from soilml.errors import InputError
 from soilml.fitting.coordinates import linearise
 from soilml.fitting.least_squares import Solution, levenberg_marquardt
 from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
-from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.reml_covariance import (
+from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
     assemble_covariance,
     run_effect_columns,
 )
-from soilml.gap.statistics.repeats import repeat_disagreement
-from soilml.gap.verdict.cross_validation import held_out_region
+from soilml.gap.evidence.held_out import held_out_region
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.evidence.repeats import repeat_disagreement
 from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.report.numbers import decimal
 
 #: Estimated over declared noise from which the noise counts as scaled up. Its standard error is
@@ -31,33 +32,35 @@ REGION_LEVEL = 0.001
 REPEAT_LEVEL = 0.001
 
 
-def disagreements(problem: FitProblem, soil: Solution) -> list[str]:
+def disagreements(problem: FitProblem, soil: Solution) -> list[Remark]:
     """What disagrees with what although no smooth gap was found; empty where nothing does."""
     components, readings = problem.covariance.components, problem.readings
     found = repeats_that_disagree(problem, soil)
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale >= NOISE_SCALED_UP:
-            found.append(
+            text = (
                 f"readings of {column(name)} scatter {decimal(scale, 2)} times as much as their "
                 "declared noise"
             )
+            found.append(Remark("noise-scaled", text, (column(name),)))
     angle = components.friction_angle_std / RUN_EFFECT_UNITS["friction_angle"]
     bearing = components.bearing_std / RUN_EFFECT_UNITS["bearing"]
     if max(angle, bearing) >= UNUSUAL_RUN_EFFECT:
-        found.append(
+        text = (
             "runs differ from each other like soils whose friction angle varies by "
             f"{np.degrees(components.friction_angle_std):.2g} deg and whose bearing strength "
             f"varies by {components.bearing_std:.0%}"
         )
+        found.append(Remark("runs-differ", text))
     found += _region(problem, soil)
     found += [
-        f"the rows disagree with a test of the soil: {text}"
+        Remark("soil-test", f"the rows disagree with a test of the soil: {text}")
         for text in disagreeing_soil_tests(soil.case, soil.values())
     ]
     return found
 
 
-def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[str]:
+def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[Remark]:
     """Rows driven alike that differ by more than declared noise and usual scatter explain.
 
     The predictions of `fit` account for their small differences in slip and load.
@@ -81,10 +84,14 @@ def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[str]:
             sentences.setdefault(comparison.channel, comparison.sentence)
             if comparison.p_value >= REPEAT_LEVEL:
                 agree.add(comparison.channel)
-    return [text for channel, text in sentences.items() if channel not in agree]
+    return [
+        Remark("repeats-disagree", text, (column(channel),))
+        for channel, text in sentences.items()
+        if channel not in agree
+    ]
 
 
-def _region(problem: FitProblem, soil: Solution) -> list[str]:
+def _region(problem: FitProblem, soil: Solution) -> list[Remark]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
     from scipy.special import chdtrc
 
@@ -100,18 +107,19 @@ def _region(problem: FitProblem, soil: Solution) -> list[str]:
         fit = levenberg_marquardt(soil.case, soil.coordinates, part, whiten, soil.x)
         y, derivatives = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
     except InputError:
-        return [
-            f"the region {name} cannot be predicted: no fit to the other rows carries its loads"
-        ]
+        text = f"the region {name} cannot be predicted: no fit to the other rows carries its loads"
+        return [Remark("region-not-predicted", text)]
     jacobian = derivatives[out]
     residual = (problem.readings.reading - y)[out]
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
-        return [f"a fit to the rows outside {name} has no equilibrium inside it"]
+        text = f"a fit to the rows outside {name} has no equilibrium inside it"
+        return [Remark("region-not-predicted", text)]
     matrix = covariance[inside] + jacobian @ fit.covariance @ jacobian.T
     square = float(residual @ np.linalg.solve(matrix, residual))
     if chdtrc(residual.size, square) >= REGION_LEVEL:
         return []
-    return [
+    text = (
         f"the region {name} is not predicted by a fit to the other rows: mean squared residual "
         f"{decimal(square / residual.size, 2)} (1 is expected)"
-    ]
+    )
+    return [Remark("region-not-predicted", text)]

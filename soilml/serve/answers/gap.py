@@ -7,11 +7,16 @@ from typing import Any
 
 from soilml.config.case import read_case
 from soilml.config.sensor_bias import checked_sensors
-from soilml.gap import STATUSES, gap
-from soilml.gap.html.discrepancy_map import discrepancy_maps
-from soilml.gap.html.verdict_section import advice, effect_descriptions, suspect_table
+from soilml.gap import STATUSES, GapReport, gap
 from soilml.gap.presentation import gap_files
-from soilml.gap.results import GapReport
+from soilml.gap.report.page import (
+    advice,
+    conditions_text,
+    discrepancy_maps,
+    effect_descriptions,
+    suspect_table,
+)
+from soilml.remarks import texts
 from soilml.report.numbers import format_estimate, format_p_value
 from soilml.serve.answers.estimate import read_rows
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
@@ -41,13 +46,13 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
 def verdict(report: GapReport) -> dict[str, Any]:
     """The parts of a report that the page shows."""
-    known = effect_descriptions(report)
+    known, given = effect_descriptions(report), conditions_text(report.conditions)
     return {
         "status": report.status,
         "meaning": STATUSES.get(report.status, ""),
         "sentence": report.sentence.replace(" -> ", " → "),
         "advice": advice(report),
-        "reasons": list(report.reasons),
+        "reasons": texts(report.reasons),
         "causes": [[{"name": n, "text": known.get(n, "")} for n in names]
                    for names in report.cause_set],
         "effects": [
@@ -56,7 +61,7 @@ def verdict(report: GapReport) -> dict[str, Any]:
             for e in report.effects
         ],
         "suspects": [
-            {"names": s["effects"], "probability": s["probability"], "given": s["given"]}
+            {"names": s["effects"], "probability": s["probability"], "given": given}
             for s in suspect_table(report)
         ],
         "maps": discrepancy_maps(report),
@@ -69,5 +74,5 @@ def verdict(report: GapReport) -> dict[str, Any]:
             {"kind": n.kind, "text": n.text, "sigma": n.discrimination}
             for n in report.next_runs[:_SHOWN_RUNS]
         ],
-        "notes": list(report.notes),
+        "notes": texts(report.notes),
     }  # fmt: skip

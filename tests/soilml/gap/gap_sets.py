@@ -15,21 +15,27 @@ from soilml.fitting.coordinates import soil_coordinate
 from soilml.fitting.free_parameters import select_free
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.search.candidate_fits import CandidateRequest, fit_candidates
-from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.reml_covariance import (
+from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
     assemble_covariance,
     run_effect_columns,
 )
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.search.explanation import CandidateRequest, fit_candidates
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
+from soilml.remarks import Remark
 
 MODEL = THREE_CHANNEL_MODEL.replace("2 %", "1 %")
 LOADS = (40.0, 60.0, 90.0, 140.0)
+
+
+def remark(text):
+    """A remark with this text, which is its code too."""
+    return Remark(text, text)
 
 
 def case_of(text: str = MODEL, effects=EFFECTS) -> Case:

@@ -8,12 +8,12 @@ from gap_sets import case_of, driven
 
 from soilml.errors import InputError
 from soilml.gap import audit
-from soilml.gap.design.effect_identifiability import (
+from soilml.gap.design.identifiability import (
     NAMEABLE_SIGMA,
     identifiability,
     indistinguishable_classes,
 )
-from soilml.gap.statistics.signatures import Signature
+from soilml.gap.evidence.directions import Signature
 from soilml.physics.effects import EFFECTS
 
 STD = np.asarray([0.5, 1.0, 1.0, 1.0, 1.0])
@@ -106,11 +106,11 @@ def test_runs_to_add_gain_what_could_not_be_named(found):
 def test_the_audit_as_json_has_the_same_figures(found):
     content = found.as_json()
     first, entry = found.effects[0], content["effects"][0]
-    assert (entry["name"], entry["seen_sigma"]) == (first.name, first.signal)
-    assert entry["left_sigma"] == first.residual_signal
+    assert (entry["name"], entry["signal"]) == (first.name, first.signal)
+    assert entry["residual_signal"] == first.residual_signal
     assert entry["nameable"] == (first.separating_snr >= 3.0)
-    assert content["not_testable"] == found.untestable
-    assert [r["nameable"] for r in content["runs_to_add"]] == [r.nameable for r in found.added_runs]
+    assert content["untestable"] == {n: r.as_json() for n, r in found.untestable.items()}
+    assert [r["nameable"] for r in content["added_runs"]] == [r.nameable for r in found.added_runs]
     assert content["classes"] == [list(c) for c in found.classes]
 
 

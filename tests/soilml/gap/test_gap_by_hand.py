@@ -11,23 +11,21 @@ from scipy.integrate import quad
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
 from soilml.gap.design.planned_readings import joined_readings
-from soilml.gap.search.candidate_fits import EFFECT_PENALTY
-from soilml.gap.search.predicted_gains import free_law_gains, noise_only_gains, predicted_gains
-from soilml.gap.search.problem import FitProblem
-from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
-from soilml.gap.statistics.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
-from soilml.gap.statistics.reml_covariance import VarianceComponents, assemble_covariance
-from soilml.gap.statistics.signatures import SECANT_STEP, Signature, effect_signatures
-from soilml.gap.verdict.claimed_effects import (
-    SignatureSimilarity,
-    discrepancy_map,
+from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
+from soilml.gap.evidence.directions import SECANT_STEP, Signature, effect_signatures
+from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
+from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.search.explanation import EFFECT_PENALTY
+from soilml.gap.search.screening import free_law_gains, noise_only_gains, predicted_gains
+from soilml.gap.verdict.entries import SignatureSimilarity, named_effects, signature_similarity
+from soilml.gap.verdict.estimates import (
+    PRIOR_HALF_WIDTH,
     effect_estimates,
-    named_effects,
-    signature_similarity,
     soil_estimates,
+    updated_case,
 )
-from soilml.gap.verdict.residual_trend import residual_trend
-from soilml.gap.verdict.updated_case import PRIOR_HALF_WIDTH, updated_case
+from soilml.gap.verdict.remainder import discrepancy_map, residual_trend
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.slip_sinkage import SlipSinkage
 from soilml.physics.operating_point import Operating
@@ -176,7 +174,7 @@ def test_signatures_are_secants_in_the_possible_direction(problem):
     case, readings = problem.case, problem.readings
     signatures, missing = effect_signatures(case, readings, problem.effects)
     by_name = {s.name: s for s in signatures}
-    assert {u.name: u.reason for u in missing}["rate"] == "needs the column speed_m_s"
+    assert str(missing["rate"]) == "needs the column speed_m_s"
     dug = by_name["slip-sinkage"]
     assert dug.sign == 1 and by_name["torque-offset"].sign == 0
     assert dug.kind == EFFECTS["slip-sinkage"].about.kind
@@ -196,11 +194,12 @@ def test_signatures_are_secants_in_the_possible_direction(problem):
 def test_one_speed_is_not_enough_to_test_a_rate():
     case = case_of()
     constant = fit_problem(case, driven(case, speed=[0.1] * 4)).readings
-    (missing,) = effect_signatures(case, constant, {"rate": EFFECTS["rate"]})[1]
-    assert missing.reason == "needs runs at several values of speed_m_s"
+    missing = effect_signatures(case, constant, {"rate": EFFECTS["rate"]})[1]
+    assert missing["rate"].code == "constant-column"
+    assert missing["rate"].text == "needs runs at several values of speed_m_s"
     several = fit_problem(case, driven(case, speed=[0.1, 0.1, 0.2, 0.2])).readings
     (tested,), missing = effect_signatures(case, several, {"rate": EFFECTS["rate"]})
-    assert tested.name == "rate" and missing == []
+    assert tested.name == "rate" and missing == {}
 
 
 def test_gains_are_what_least_squares_gains(problem):

@@ -7,10 +7,11 @@ import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.fitting.readings import stack_readings
-from soilml.gap.data.checks import check_readings, estimate_repeat_noise, without_duplicate_rows
-from soilml.gap.statistics.outliers import outliers
-from soilml.gap.statistics.smooth_basis import smooth_basis
+from soilml.gap.checks import check_readings, estimate_repeat_noise, without_duplicate_rows
+from soilml.gap.evidence.directions import smooth_basis
+from soilml.gap.evidence.outliers import outliers
 from soilml.io.table import Table
+from soilml.remarks import texts
 
 
 def check(table, text=MODEL):
@@ -81,7 +82,7 @@ def test_a_repeat_that_strays_to_the_other_side_confirms_nothing():
 def test_loads_that_scatter_about_one_level_are_reported_as_one():
     loads = 20.0 * (1.0 + np.random.default_rng(3).uniform(-0.08, 0.08, 8))
     table = driven(case_of(), loads=tuple(loads))
-    assert any("one load only" in reason for reason in check(table).naming_obstacles)
+    assert any("one load only" in reason for reason in texts(check(table).naming_obstacles))
 
 
 def test_exact_duplicates_are_excluded():
@@ -90,8 +91,8 @@ def test_exact_duplicates_are_excluded():
     kept, repeats = without_duplicate_rows(again)
     assert repeats == 2 and len(kept) == len(table)
     np.testing.assert_array_equal(kept["torque_Nm"], table["torque_Nm"])
-    assert "2 rows are exact duplicates" in check(again).notes[0]
-    assert "rows are exact duplicates" in check(joined(table, table)).errors[0]
+    assert "2 rows are exact duplicates" in check(again).notes[0].text
+    assert "rows are exact duplicates" in check(joined(table, table)).errors[0].text
 
 
 def test_repeated_rows_with_other_readings_are_no_duplicates():
@@ -110,25 +111,25 @@ def test_repeated_rows_with_other_readings_are_no_duplicates():
 def test_obstacles_to_naming_a_cause_are_reported(how, said):
     found = check(driven(case_of(), **how))
     assert found.errors == ()
-    assert any(said in reason for reason in found.naming_obstacles)
+    assert any(said in reason for reason in texts(found.naming_obstacles))
 
 
 def test_a_constant_sensor_is_an_error():
     table = driven(case_of())
     found = check(changed(table, sinkage_m=np.full(len(table), 0.01)))
-    assert found.errors == ("sinkage_m is the same in every row: check the sensor",)
+    assert texts(found.errors) == ["sinkage_m is the same in every row: check the sensor"]
 
 
 def test_too_few_readings_are_an_error():
     table = driven(case_of(), loads=(40.0, 80.0), slips=1)
-    assert "6 readings for 3 soil parameters" in check(table).errors[0]
+    assert "6 readings for 3 soil parameters" in check(table).errors[0].text
 
 
 def test_a_table_without_any_reading_is_refused():
     table = driven(case_of())
     blank = np.full(len(table), np.nan)
     found = check(changed(table, torque_Nm=blank, drawbar_pull_N=blank, sinkage_m=blank))
-    assert found.errors == ("no torque, drawbar pull or sinkage was measured",)
+    assert texts(found.errors) == ["no torque, drawbar pull or sinkage was measured"]
 
 
 QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
@@ -137,7 +138,7 @@ QUIET = MODEL.replace('sinkage_m = "1 %"\n', "")
 def test_undeclared_noise_is_an_error():
     found = check(driven(case_of()), QUIET)
     assert len(found.errors) == 1
-    assert 'give [noise] sinkage_m, as in sinkage_m = "2 %", or a column' in found.errors[0]
+    assert 'give [noise] sinkage_m, as in sinkage_m = "2 %", or a column' in found.errors[0].text
 
 
 def test_a_column_of_standard_deviations_declares_noise():
@@ -158,5 +159,5 @@ def test_undeclared_noise_is_estimated_from_repeated_rows():
     found, notes = estimate_repeat_noise(stack_readings(case, table))
     assert list(found) == ["sinkage"]
     assert found["sinkage"] == pytest.approx(2e-4, rel=0.2)
-    assert "noise of sinkage_m is not declared" in notes[0]
+    assert "noise of sinkage_m is not declared" in notes[0].text
     assert check(table, QUIET).errors == ()

@@ -6,22 +6,20 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.fitting.coordinates import linearise
 from soilml.fitting.readings import stack_readings
-from soilml.gap.statistics.reml_covariance import (
+from soilml.gap.evidence.covariance import (
+    LOG_NOISE_SCALE_PRIOR_STD,
     RUN_EFFECT_GRID,
+    RUN_EFFECT_PRIOR_STD,
     RUN_EFFECT_UNITS,
     VarianceComponents,
     _run_effect_grid,
     assemble_covariance,
     estimate_covariance,
-    run_effect_columns,
-)
-from soilml.gap.statistics.restricted_likelihood import (
-    LOG_NOISE_SCALE_PRIOR_STD,
-    RUN_EFFECT_PRIOR_STD,
     restricted_likelihood,
+    run_effect_columns,
     whiten_series,
 )
-from soilml.gap.statistics.smooth_basis import smooth_basis
+from soilml.gap.evidence.directions import smooth_basis
 
 LOADS = (40.0, 65.0, 100.0, 150.0) * 4
 

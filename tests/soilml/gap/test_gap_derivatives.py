@@ -20,8 +20,8 @@ from soilml.fitting.predictions import (
     linearise_many,
     predict_many,
 )
-from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.search.problem import StartedFit, fit_many
+from soilml.gap.candidate_effects import with_effect
+from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.sinkage_estimate import SinkageEstimate

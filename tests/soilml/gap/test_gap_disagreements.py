@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.statistics.reml_covariance import _is_autocorrelated
-from soilml.gap.statistics.smooth_basis import smooth_basis
+from soilml.gap.evidence.covariance import _is_autocorrelated
+from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.verdict import disagreements
+from soilml.remarks import texts
 
 
 @pytest.fixture(scope="module")
@@ -77,21 +78,23 @@ def test_noise_and_runs_beyond_the_usual_forbid_an_all_clear(sound, component, v
     known = problem.covariance.components
     changed = replace(problem.covariance, components=replace(known, **{component: value}))
     found = disagreements.disagreements(replace(problem, covariance=changed), soil)
-    assert len(found) == bool(said) and said in "".join(found)
+    assert len(found) == bool(said) and said in "".join(texts(found))
 
 
-def test_a_region_that_the_rest_does_not_predict_is_told(sound):
+def test_a_region_that_the_rest_does_not_predict_is_stated(sound):
     problem, soil = sound
     assert disagreements._region(problem, soil) == []
     readings = problem.readings
     heavy = readings.load >= 139.0
-    for sigma, told in ((3.0, True), (0.3, False)):
+    for sigma, fails in ((3.0, True), (0.3, False)):
         off = np.where(heavy, sigma * readings.std, 0.0) * np.where(readings.channel == 2, -1, 1)
         moved = replace(problem, readings=replace(readings, reading=readings.reading + off))
         found = disagreements._region(moved, soil)
-        assert len(found) == told
-        if told:
-            assert found[0].startswith("the region load_N >= 140 is not predicted by a fit to the")
-            assert 4.0 < float(found[0].split()[-4]) < 12.0  # 3 sigma beside noise
+        assert len(found) == fails
+        if fails:
+            assert found[0].text.startswith(
+                "the region load_N >= 140 is not predicted by a fit to the"
+            )
+            assert 4.0 < float(found[0].text.split()[-4]) < 12.0  # 3 sigma beside noise
     two = fit_problem(case_of(), driven(case_of(), loads=(40.0, 60.0), slips=2))
     assert disagreements._region(two, soil) == []

@@ -5,19 +5,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven, fit_problem
+from gap_sets import MODEL, case_of, driven, fit_problem, remark
 
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap import gap
-from soilml.gap.html.page import page
-from soilml.gap.messages import verdict_sentence
-from soilml.gap.report_parts import GapReduction, Suspect
-from soilml.gap.results import GapReport
+from soilml.gap.report.page import page
+from soilml.gap.report.results import GapReduction, GapReport, Suspect
+from soilml.gap.report.sentences import verdict_sentence
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.verdict.decision import decide, unclaimed_effects
-from soilml.gap.verdict.report_entries import size_notes
+from soilml.gap.verdict.entries import size_notes
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
+from soilml.remarks import texts
 
 TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
 
@@ -38,24 +38,24 @@ def test_noise_far_above_the_scatter_of_repeats_is_noted():
     table = driven(case_of(), loads=TWICE)
     report = gap(case_of(times(MODEL, 5.0)), table)
     assert report.status == "no-gap"
-    assert any("the noise is overstated" in note for note in report.notes)
-    assert not any("overstated" in note for note in gap(case_of(), table).notes)
+    assert any("the noise is overstated" in note for note in texts(report.notes))
+    assert not any("overstated" in note for note in texts(gap(case_of(), table).notes))
 
 
-def test_two_runs_that_differ_are_told_beside_the_suspects():
+def test_two_runs_that_differ_are_named_beside_the_suspects():
     table = driven(case_of(), loads=(60.0, 60.0), slips=12)
     torque = table["torque_Nm"] * np.where(table["run"] == "run_1", 1.43, 1.0)
     report = gap(case_of(), changed(table, "torque_Nm", torque))
     assert report.status == "suspected"
-    told = [reason for reason in report.reasons if "rows driven alike disagree" in reason]
-    assert len(told) == 1 and "torque" in told[0] and told[0] in report.sentence
-    assert not any("drawbar pull" in note for note in report.notes if "alike" in note)
+    listed = [reason for reason in texts(report.reasons) if "replicate rows disagree" in reason]
+    assert len(listed) == 1 and "torque" in listed[0] and listed[0] in report.sentence
+    assert not any("drawbar pull" in note for note in texts(report.notes) if "replicate" in note)
 
 
 def test_understated_noise_is_undecided():
     report = gap(case_of(times(MODEL, 0.33)), driven(case_of(), seed=4))
     assert report.status == "undecided"
-    assert any("as much as their declared noise" in reason for reason in report.reasons)
+    assert any("as much as their declared noise" in reason for reason in texts(report.reasons))
 
 
 def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
@@ -84,7 +84,7 @@ def test_a_strange_but_repeatable_response_leaves_the_soil_where_it_was():
 
 
 def test_a_suspect_that_enlarges_the_residuals_is_explained():
-    suspect = Suspect(("grousers",), 2.7, "if no other cause has a similar signature")
+    suspect = Suspect(("grousers",), 2.7)
     figures = {"train": GapReduction(8.8, 10.1, {}, 108, "all rows fitted")}
     report = GapReport("suspected", "", case_of(), suspects=(suspect,), gap=figures)
     assert "8.80 -> 10.1 (noise alone gives 1; it grows because" in verdict_sentence(report, ())
@@ -157,13 +157,13 @@ def test_figures_are_those_of_the_suspect_that_is_listed_first():
         accepted=ordered[:1],
     )
     assert result.likeliest.names == ("b", "c")
-    decision = decide(None, result, ["one load only"], [])
+    decision = decide(None, result, [remark("one load only")], [])
     assert decision.status == "suspected" and decision.shown.names == ("a",)
     report = GapReport(
         "suspected",
         "",
         case_of(),
-        suspects=(Suspect(("b", "c"), 0.1, ""), Suspect(("a",), 0.0, "")),
+        suspects=(Suspect(("b", "c"), 0.1), Suspect(("a",), 0.0)),
         best_unclaimed=unclaimed_effects(decision, result),
         gap={"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")},
     )
@@ -181,7 +181,7 @@ def test_lugs_that_would_have_to_be_far_larger_than_lugs_are_remarked_on(height,
         "height of grousers would have to be 80.0 mm, 8 times its usual size (10.0 mm): the law of "
         "the catalogue does not explain the gap by an effect of plausible size"
     )
-    assert [n.replace("\N{NO-BREAK SPACE}", " ") for n in notes] == [expected] * said
+    assert [n.text.replace("\N{NO-BREAK SPACE}", " ") for n in notes] == [expected] * said
 
 
 def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
@@ -213,8 +213,8 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
             posterior=found,
         )
         decision = decide(problem, result, (), ())
-        return decision.status, "drawbar pull" in decision.reason
+        return decision.status, decision.reason and decision.reason.about
 
-    assert status(20.0, 4.0) == ("suspected", True)
-    assert status(20.0, 2.5) == ("partly-named", False)
-    assert status(30.0, 4.0) == ("partly-named", False)
+    assert status(20.0, 4.0) == ("suspected", ("a", "drawbar_pull_N"))
+    assert status(20.0, 2.5) == ("partly-named", None)
+    assert status(30.0, 4.0) == ("partly-named", None)

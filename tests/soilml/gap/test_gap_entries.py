@@ -5,24 +5,26 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_sets import case_of
+from gap_sets import case_of, remark
 
 from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
-from soilml.gap.report_parts import EstimatedValue
-from soilml.gap.search.candidate_fits import (
+from soilml.gap.checks import ONE_LOAD
+from soilml.gap.evidence.linearised_fit import AMPLITUDES
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.report.page import conditions_text
+from soilml.gap.report.results import EstimatedValue, soil_test_agreement
+from soilml.gap.search.explanation import (
     EFFECT_PENALTY,
     CandidateFit,
 )
-from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import Posterior
-from soilml.gap.soil_test_agreement import soil_test_agreement
-from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.verdict import report_entries
-from soilml.gap.verdict.report_entries import (
+from soilml.gap.verdict import entries
+from soilml.gap.verdict.entries import (
     _bound_notes,
     analysis_notes,
     competing_explanations,
+    conditions_of_suspects,
     soil_beside_discrepancy,
     soil_marginal,
     suspects,
@@ -30,6 +32,7 @@ from soilml.gap.verdict.report_entries import (
 )
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import ShearStrength
+from soilml.remarks import Remark, texts
 
 
 def made(*names, objective=0.0, amplitude=(0.0, 0.0)):
@@ -96,27 +99,27 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
 
 def test_suspects_are_the_likeliest_eight_under_stated_conditions():
     weights = {(f"e{i}",): -1.0 - i for i in range(12)} | {(): -3.0}
-    found = suspects(analysed(weights=weights), [])
+    found = suspects(analysed(weights=weights))
     assert [s.effects[0] for s in found] == [f"e{i}" for i in range(8)]
     assert found[0].log_odds > found[1].log_odds
-    assert found[0].given == (
-        "if no other cause than those of the catalogue has a similar signature"
-    )
-    (one, *_) = suspects(analysed(weights=weights, runs=("a",)), ["only one load was driven"])
-    assert ", and if the bed was the same for all rows, and if the soil parameters" in one.given
+    plain = conditions_of_suspects(analysed(), [])
+    assert [c.code for c in plain] == ["catalogue-complete"]
+    one = conditions_of_suspects(analysed(runs=("a",)), [Remark(ONE_LOAD, "")])
+    assert conditions_text(one).startswith("if no other cause than those of the catalogue has a ")
+    assert ", and if the bed was the same for all rows, and if the soil" in conditions_text(one)
 
 
 def notes(given):
     fit = SimpleNamespace(coordinates=[], x=np.zeros(0))
-    return analysis_notes(given, fit, fit, ["run a and run b"])
+    return texts(analysis_notes(given, fit, fit, [remark("run a and run b")]))
 
 
-def test_notes_on_outliers_noise_runs_and_memory(monkeypatch):
-    monkeypatch.setattr(report_entries, "overstated_noise_notes", lambda readings: [])
-    assert notes(analysed(runs=("a",))) == ["rows driven alike disagree: run a and run b"]
+def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
+    monkeypatch.setattr(entries, "overstated_noise_notes", lambda readings: [])
+    assert notes(analysed(runs=("a",))) == ["replicate rows disagree: run a and run b"]
     several = notes(
         analysed(
-            outliers=[f"o{i}" for i in range(7)],
+            outliers=tuple(f"o{i}" for i in range(7)),
             noise_scale=np.asarray([1.25, 1.26]),
             autocorrelation=0.5,
             runs=tuple("abcdef"),
@@ -125,12 +128,12 @@ def test_notes_on_outliers_noise_runs_and_memory(monkeypatch):
     assert several == [
         "7 readings are outliers and were excluded: o0, o1, o2, o3, o4, o5",
         "the noise of sinkage_m is 1.3 times as large as declared",
-        "rows driven alike disagree: run a and run b",
+        "replicate rows disagree: run a and run b",
         "the noise of neighbouring samples of a run is correlated (0.5), which reduces their "
         "weight",
     ]
     (one, _, few) = notes(
-        analysed(outliers=["o"], runs=tuple("abcde"), friction_angle_std=0.01, bearing_std=0.04)
+        analysed(outliers=("o",), runs=tuple("abcde"), friction_angle_std=0.01, bearing_std=0.04)
     )
     assert one == "1 reading is an outlier and was excluded: o"
     assert few.startswith("run-to-run variation of the soil cannot be estimated from fewer than 6")
@@ -140,9 +143,9 @@ def test_notes_on_outliers_noise_runs_and_memory(monkeypatch):
 
 
 def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
-    monkeypatch.setattr(report_entries, "overstated_noise_notes", lambda readings: [])
+    monkeypatch.setattr(entries, "overstated_noise_notes", lambda readings: [])
     monkeypatch.setattr(
-        report_entries, "disagreeing_soil_tests", lambda case, values: ["plate 3 sigma off"]
+        entries, "disagreeing_soil_tests", lambda case, values: ["plate 3 sigma off"]
     )
     given = analysed(runs=("a",))
     assert not any("plate" in note for note in notes(given))
@@ -154,9 +157,11 @@ def test_estimates_at_a_bound():
     soil = SoilCoordinate("cohesion", "Pa", 0.0, 1.0, Prior(0.0, 1000.0))
     size = EffectCoordinate("n1", "1", 0.0, 4.0, Prior(0.0, 1.0), effect="slip-sinkage")
     at = [f"{soil.path} is at a bound of its prior"]
-    assert _bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5]) == 2 * at
+    assert texts(_bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
     assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []
-    assert _bound_notes([size, size], [3.9961, 0.0]) == [f"{size.path} is at its upper bound"]
+    assert texts(_bound_notes([size, size], [3.9961, 0.0])) == [
+        f"{size.path} is at its upper bound"
+    ]
     assert _bound_notes([size], [3.9959]) == []
 
 
@@ -170,9 +175,9 @@ def test_variance_components_by_the_names_of_columns():
     assert variance_component_entries(given) == {
         "noise_scale_torque_Nm": 1.0,
         "noise_scale_sinkage_m": 1.5,
-        "friction_angle_from_run_to_run_rad": 0.01,
-        "bearing_from_run_to_run": 0.02,
-        "memory_of_samples": 0.3,
+        "friction_angle_std": 0.01,
+        "bearing_std": 0.02,
+        "autocorrelation": 0.3,
     }
 
 

@@ -7,8 +7,8 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.gap import gap
-from soilml.gap.statistics.signatures import effect_signatures
-from soilml.gap.verdict.estimate_spread import SIZES, by_undetected_effects
+from soilml.gap.evidence.directions import effect_signatures
+from soilml.gap.verdict.estimates import SIZES, by_undetected_effects
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,9 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.fitting.discrepancy_process import discrepancy_process
-from soilml.gap.search.problem import StartedFit, fit_many
-from soilml.gap.statistics.amplitude_prior import AMPLITUDES, amplitude_penalty
-from soilml.gap.statistics.evidence import LARGEST_SIZE, _size_prior
-from soilml.gap.statistics.prior_bounds import outside_bounds
+from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
+from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, _size_prior, outside_bounds
+from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 

@@ -5,27 +5,27 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gap_sets import case_of, driven, fit_problem
+from gap_sets import case_of, driven, fit_problem, remark
 
 from soilml import Table
 from soilml.errors import InputError
 from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.messages import unsupported_conclusions
-from soilml.gap.results import GapReport
-from soilml.gap.search.candidate_fits import EFFECT_PENALTY
-from soilml.gap.statistics.amplitude_prior import (
+from soilml.gap.evidence.linearised_fit import (
     AMPLITUDES,
     NO_DISCREPANCY,
     UNKNOWN_CAUSE,
     UNKNOWN_SCALE,
     amplitude_penalty,
 )
-from soilml.gap.statistics.evidence import TEMPERING
-from soilml.gap.statistics.prior_bounds import outside_bounds
-from soilml.gap.verdict.estimate_spread import SIZES, _size_posterior
+from soilml.gap.evidence.marginal_likelihood import TEMPERING, outside_bounds
+from soilml.gap.report.results import GapReport
+from soilml.gap.report.sentences import unsupported_conclusions
+from soilml.gap.search.explanation import EFFECT_PENALTY
+from soilml.gap.verdict.estimates import SIZES, _size_posterior
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 from soilml.physics.soils.soil_tests import ShearStrength
+from soilml.remarks import texts
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_conclusions_that_a_status_does_not_support(status, said):
         },
     }
     report = GapReport(status, "", case_of())
-    found = unsupported_conclusions(report, ["one load only"], ["kphi"])
+    found = texts(unsupported_conclusions(report, [remark("one load only")], ["kphi"]))
     assert found[0] == "the cause of the gap: one load only"
     assert any(said in text for text in found)
     for words, statuses in everything.items():

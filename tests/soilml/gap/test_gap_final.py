@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.gap.search import iteration
-from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
-from soilml.gap.search.marginal_fits import MarginalFit, _changed
+from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, VarianceComponents
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit, _changed
+from soilml.gap.search import analysis
+from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.posterior import Posterior, explanations, not_rejected, posterior
-from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.reml_covariance import RUN_EFFECT_UNITS, VarianceComponents
 
 
 def made(*names, objective=0.0):
@@ -97,4 +97,4 @@ def test_variance_components_have_converged_where_weights_hardly_change(
         components(1.0, 2.0, 2.0, 0.5),
         components(scale, 2.0 + angle, 2.0 + bearing, 0.5 + rho),
     )
-    assert iteration._have_converged(last, new) == converged
+    assert analysis._have_converged(last, new) == converged

@@ -10,11 +10,10 @@ from soilml.errors import InputError
 from soilml.fitting.coordinates import linearise, predict_readings, size_coordinate
 from soilml.fitting.least_squares import levenberg_marquardt
 from soilml.fitting.readings import stack_readings
-from soilml.gap.data.candidate_effects import with_effect
-from soilml.gap.search import problem as problem_module
-from soilml.gap.search.problem import StartedFit, fit_many
-from soilml.gap.statistics.signatures import effect_signatures
-from soilml.gap.statistics.smooth_basis import regions, smooth_basis
+from soilml.gap.candidate_effects import with_effect
+from soilml.gap.evidence import problem as problem_module
+from soilml.gap.evidence.directions import effect_signatures, regions, smooth_basis
+from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.physics.effects import EFFECTS
 
 
@@ -116,7 +115,7 @@ NEEDS = {"rate": "speed_m_s", "multipass": "pass", "lateral-slip": "slip_angle_r
 def test_an_effect_without_its_covariate_cannot_be_tested(clean, name, column):
     known, untestable = effect_signatures(clean.case, clean.readings, {name: EFFECTS[name]})
     assert known == []
-    assert [(u.name, u.reason) for u in untestable] == [(name, f"needs the column {column}")]
+    assert {n: r.text for n, r in untestable.items()} == {name: f"needs the column {column}"}
 
 
 @pytest.mark.parametrize("name, column", NEEDS.items())
@@ -132,14 +131,14 @@ def test_an_effect_with_a_constant_covariate_cannot_be_tested(name, column):
         )
         assert [s.name for s in known] == ([name] if tested else [])
         if not tested:
-            assert untestable[0].reason == f"needs runs at several values of {column}"
+            assert untestable[name].text == f"needs runs at several values of {column}"
 
 
 def test_an_effect_that_the_model_has_is_moved_from_its_size():
     case = with_effect(case_of(), EFFECTS["grousers"])
     readings = fit_problem(case_of(), driven(case_of())).readings
     (known,), untestable = effect_signatures(case, readings, {"grousers": EFFECTS["grousers"]})
-    assert known.name == "grousers" and untestable == []
+    assert known.name == "grousers" and untestable == {}
 
 
 def test_smooth_columns_are_independent_and_of_one_channel_each(clean):

@@ -21,10 +21,10 @@ from soilml.fitting.predictions import (
     predict_many,
 )
 from soilml.fitting.readings import stack_readings
-from soilml.gap.data.candidate_effects import candidate_effects, with_effect
+from soilml.gap.candidate_effects import candidate_effects, with_effect
 from soilml.gap.design.planned_readings import expected_readings, joined_readings
 from soilml.gap.design.run_options import run_options
-from soilml.gap.search.problem import exclude_each_other
+from soilml.gap.evidence.problem import exclude_each_other
 from soilml.physics.effects import EFFECTS
 
 WIDTHS = WHEELS.replace("0.12", "0.10", 1)

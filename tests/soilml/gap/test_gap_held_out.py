@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.verdict.cross_validation import (
+from soilml.gap.evidence.held_out import (
     INFEASIBLE_SQUARE,
     _run_folds,
     gap_reduction,

@@ -8,16 +8,16 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
-from soilml.gap.search import marginal_fits
-from soilml.gap.search.marginal_fits import fit_marginal
-from soilml.gap.statistics.amplitude_prior import AMPLITUDES
-from soilml.gap.statistics.evidence import (
+from soilml.gap.evidence import problem as problem_module
+from soilml.gap.evidence.linearised_fit import AMPLITUDES
+from soilml.gap.evidence.marginal_likelihood import (
     SMALLEST_SIZE,
     Evidence,
     _expected_amplitude,
     _prior,
     _size_prior,
 )
+from soilml.gap.evidence.problem import fit_marginal
 from soilml.numerics.prior import Prior
 
 
@@ -50,7 +50,7 @@ def fitting(monkeypatch):
         value, found = listed[fit.name].pop(0)
         return Evidence(value, np.asarray([found]), np.zeros(0), np.asarray([found]))
 
-    monkeypatch.setattr(marginal_fits, "fit_many", fit_many)
+    monkeypatch.setattr(problem_module, "fit_many", fit_many)
     discrepancy = SimpleNamespace(evidence=evidence, whiten=lambda amplitude: float(amplitude[0]))
     return SimpleNamespace(discrepancy=discrepancy), listed, asked
 

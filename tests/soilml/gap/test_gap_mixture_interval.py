@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from soilml.gap.statistics.mixture_interval import HALF_WIDTH, equivalent_std
+from soilml.gap.verdict.estimates import equivalent_std
+from soilml.quantities import Z_90
 
 
 def test_one_component_keeps_its_standard_deviation():
@@ -12,10 +13,10 @@ def test_one_component_keeps_its_standard_deviation():
     assert found == pytest.approx(0.3, rel=1e-8)
 
 
-def test_the_interval_holds_90_percent_of_the_mixture():
+def test_the_interval_covers_90_percent_of_the_mixture():
     offset, std = np.asarray([0.0, 0.7, -2.0]), np.asarray([0.2, 0.5, 0.3])
     weight = np.asarray([6.0, 3.0, 1.5])
-    half = HALF_WIDTH * equivalent_std(offset, std, weight)
+    half = Z_90 * equivalent_std(offset, std, weight)
     inside = norm.cdf(half, offset, std) - norm.cdf(-half, offset, std)
     assert weight @ inside / weight.sum() == pytest.approx(0.9, abs=1e-7)
 

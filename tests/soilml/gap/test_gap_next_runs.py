@@ -8,10 +8,9 @@ from gap_sets import candidate, case_of, driven, fit_problem
 
 from soilml.errors import InputError
 from soilml.gap.design.discriminating_runs import next_runs
-from soilml.gap.design.gear_changes import gear_changes
-from soilml.gap.design.run_costs import KINDS, LISTED, check_costs, rank_by_cost
-from soilml.gap.design.run_options import drivable_slips, run_options
-from soilml.gap.report_parts import NextRun
+from soilml.gap.design.run_kinds import KINDS, LISTED, check_costs, rank_by_cost
+from soilml.gap.design.run_options import drivable_slips, gear_changes, run_options
+from soilml.gap.report.results import NextRun
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from soilml.fitting.coordinates import EffectCoordinate
-from soilml.gap.statistics.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, _is_confirmed, outliers
-from soilml.gap.statistics.repeats import _worst_pair
-from soilml.gap.verdict.claimed_effects import _size
+from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, _is_confirmed, outliers
+from soilml.gap.evidence.repeats import _worst_pair
+from soilml.gap.verdict.entries import _size
 from soilml.numerics.prior import Prior
 
 

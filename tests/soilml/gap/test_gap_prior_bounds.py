@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 from scipy.integrate import quad
 
-from soilml.gap.statistics.prior_bounds import outside_bounds
+from soilml.gap.evidence.marginal_likelihood import outside_bounds
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.effects import EFFECTS
 

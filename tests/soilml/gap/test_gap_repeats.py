@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.fitting.readings import stack_readings
-from soilml.gap.statistics.repeats import (
+from soilml.gap.evidence.repeats import (
     _pair_sentence,
     overstated_noise,
     overstated_noise_notes,
@@ -85,7 +85,7 @@ def test_overstated_noise_is_noted():
     case = case_of()
     calm = stack_readings(case, driven(case, loads=TWICE, noise=0.2))
     assert set(overstated_noise(calm)) == {"torque", "drawbar_pull", "sinkage"}
-    note = overstated_noise_notes(calm)[0]
+    note = overstated_noise_notes(calm)[0].text
     assert "repeated rows of" in note and "times the declared noise" in note
     assert overstated_noise(stack_readings(case, driven(case, loads=TWICE))) == {}
 

@@ -8,8 +8,8 @@ from gap_sets import case_of
 
 from soilml.errors import InputError
 from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
-from soilml.gap.data.holdout import split_holdout
-from soilml.gap.design.gear_changes import LUG_EFFECTS, gear_changes
+from soilml.gap.design.run_options import LUG_EFFECTS, gear_changes
+from soilml.gap.evidence.held_out import split_holdout
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.gap.statistics.score_test import ScoreTest, score_test
+from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.numerics.subspaces import project_out
 
 

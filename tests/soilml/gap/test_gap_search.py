@@ -7,25 +7,25 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.fitting.coordinates import shape_coordinates
-from soilml.gap.search.candidate_fits import (
+from soilml.gap.evidence.directions import effect_signatures
+from soilml.gap.evidence.held_out import (
+    gap_reduction,
+    held_out,
+    predict_held_out,
+)
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.search.explanation import (
     EFFECT_PENALTY,
     CandidateFit,
     CandidateRequest,
     fit_candidates,
     fit_shapes,
 )
-from soilml.gap.search.marginal_fits import MarginalFit
 from soilml.gap.search.posterior import IN_CATALOGUE, Posterior, explanations, posterior
-from soilml.gap.search.predicted_gains import predicted_gains
+from soilml.gap.search.screening import predicted_gains
 from soilml.gap.search.stepwise import search
-from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.signatures import effect_signatures
-from soilml.gap.verdict.cross_validation import (
-    gap_reduction,
-    held_out,
-    predict_held_out,
-)
-from soilml.gap.verdict.law_difference import law_matters
+from soilml.gap.verdict.decision import law_matters
 from soilml.physics.effects import EFFECTS
 
 DIGGING = EFFECTS["slip-sinkage"]

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.gap.search import selection, stepwise
-from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
-from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.statistics.evidence import Evidence
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.search import screening, stepwise
+from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
 
 
 def fit_of(objective=0.0, x=None):
@@ -36,14 +36,14 @@ def screens(monkeypatch):
     def own_law(problem, none, fit, signatures):
         return given["none" if fit is none.fit else "soil"]
 
-    monkeypatch.setattr(selection, "free_law_gains", own_law)
-    monkeypatch.setattr(selection, "noise_only_gains", lambda problem, soil, s: given["noise"])
+    monkeypatch.setattr(screening, "free_law_gains", own_law)
+    monkeypatch.setattr(screening, "noise_only_gains", lambda problem, soil, s: given["noise"])
     return given
 
 
 def selected(gains, amplitude=(0.0, 0.0), starts=None):
     none = made(amplitude=amplitude)
-    return selection.effects_to_fit(None, none, fit_of(), [], gains, starts or {})
+    return screening.effects_to_fit(None, none, fit_of(), [], gains, starts or {})
 
 
 def test_effects_within_12_of_the_largest_gain_are_fitted_at_least_four_at_most_nine(screens):

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.search.predicted_gains import (
+from soilml.gap.evidence.directions import effect_signatures
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.search.screening import (
+    MIN_FITTED,
+    effects_to_fit,
     free_law_gains,
     noise_only_gains,
     predicted_with_and_without,
 )
-from soilml.gap.search.selection import MIN_FITTED, effects_to_fit
 from soilml.gap.search.stepwise import _soil_alone, search
-from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.signatures import effect_signatures
 from soilml.physics.effects import EFFECTS
 
 #: The stresses move to the front of the contact in proportion to slip.

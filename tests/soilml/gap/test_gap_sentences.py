@@ -4,12 +4,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from gap_sets import case_of
+from gap_sets import case_of, remark
 
 from soilml.config.model_discrepancy import Discrepancy
-from soilml.gap.messages import _odds, unsupported_conclusions, verdict_sentence
-from soilml.gap.report_parts import GapReduction, RemainingDiscrepancy, Suspect
-from soilml.gap.results import GapReport
+from soilml.gap.report.results import GapReduction, GapReport, RemainingDiscrepancy, Suspect
+from soilml.gap.report.sentences import _odds, unsupported_conclusions, verdict_sentence
+from soilml.remarks import texts
 
 FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}
 LEFT = {
@@ -43,8 +43,8 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
     assert "within the noise and the declared discrepancy:" in said("no-gap", model=declared)
 
 
-def test_without_a_cause_the_reasons_are_told():
-    reasons = ("one load only", "runs differ")
+def test_without_a_cause_the_reasons_are_stated():
+    reasons = (remark("one load only"), remark("runs differ"))
     assert said("undecided", reasons=reasons).endswith("inconsistent: one load only; runs differ.")
     assert said("not-testable", reasons=reasons).endswith("its cause: one load only; runs differ.")
     unknown = said("unknown", reasons=reasons, best_unclaimed=("a", "b"), discrepancy=LEFT)
@@ -58,7 +58,7 @@ def test_without_a_cause_the_reasons_are_told():
 
 def test_suspects_have_their_odds_and_the_first_three_are_listed():
     odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
-    suspects = tuple(Suspect((name,), value, "") for name, value in odds.items())
+    suspects = tuple(Suspect((name,), value) for name, value in odds.items())
     sentence = said("suspected", suspects=suspects)
     assert sentence == (
         "There is a gap, and its cause is not named: the evidence is not decisive beside the "
@@ -66,7 +66,9 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
         "catalogue: a (odds 20 to 1); b (even odds); c (odds 1 to 2.7). With a, mean squared "
         "residual 8.80 -> 1.10 (noise alone gives 1)."
     )
-    other = said("suspected", suspects=suspects, best_unclaimed=("c", "d"), reasons=("why",))
+    other = said(
+        "suspected", suspects=suspects, best_unclaimed=("c", "d"), reasons=(remark("why"),)
+    )
     assert "not named: why. " in other and "With c + d, mean" in other
 
 
@@ -107,7 +109,8 @@ def test_explanations_by_what_is_claimed():
 
 
 def concluded(status, obstacles=(), fixed=(), **parts):
-    return unsupported_conclusions(report(status, **parts), obstacles, fixed)
+    given = report(status, **parts)
+    return texts(unsupported_conclusions(given, [remark(text) for text in obstacles], fixed))
 
 
 SMALLER = "that a smaller gap proves a cause: wrong effects reduce the gap too"
@@ -141,15 +144,17 @@ def test_what_each_status_does_not_support(status, words):
 
 
 @pytest.mark.parametrize(
-    "before, after, told",
+    "before, after, hardly",
     [(1.6, 0.81, True), (1.6, 0.79, False), (1.4, 1.4, False), (9.0, 4.4, False), (9.0, 4.6, True)],
 )
-def test_extrapolation_is_not_supported_where_the_gap_is_hardly_reduced(before, after, told):
+def test_extrapolation_is_not_supported_where_the_gap_is_hardly_reduced(before, after, hardly):
     region = GapReduction(before, after, {}, 24, "load_N >= 140")
     found = concluded("named", gap=FIGURES | {"held_out_region": region})
-    assert any("on load_N >= 140 the gap is hardly reduced" in text for text in found) == told
+    assert any("on load_N >= 140 the gap is hardly reduced" in text for text in found) == hardly
 
 
 def test_effects_that_cannot_be_tested_are_listed_by_name():
-    found = concluded("named", untestable={"slope": "needs tilt", "rate": "needs speeds"})
+    found = concluded(
+        "named", untestable={"slope": remark("needs tilt"), "rate": remark("needs speeds")}
+    )
     assert found[-2:] == ["rate: needs speeds", "slope: needs tilt"]

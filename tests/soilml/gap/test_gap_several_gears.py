@@ -19,9 +19,9 @@ from soilml.fitting.free_parameters import select_free
 from soilml.fitting.operating_points import operating_points
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.data.candidate_effects import candidate_effects, with_effect
+from soilml.gap.candidate_effects import candidate_effects, with_effect
 from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.statistics.signatures import effect_signatures
+from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column
@@ -127,7 +127,7 @@ def test_two_diameters_make_small_wheel_stiffness_testable():
     effects = {"small-wheel-stiffness": EFFECTS["small-wheel-stiffness"]}
     readings = stack_readings(alike, rows(alike))
     found, untestable = effect_signatures(alike, readings, effects)
-    assert not found and "several diameters" in untestable[0].reason
+    assert not found and "several diameters" in next(iter(untestable.values())).text
     readings = stack_readings(two, rows(two))
     assert effect_signatures(two, readings, effects)[0][0].name == "small-wheel-stiffness"
 

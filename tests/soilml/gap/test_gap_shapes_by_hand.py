@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from gap_sets import candidate, case_of, driven, fit_problem
 
-from soilml.gap.search import candidate_fits
-from soilml.gap.search.candidate_fits import (
+from soilml.gap.evidence.directions import Signature
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.search import explanation
+from soilml.gap.search.explanation import (
     _better,
     predicted_shape_gain,
     shape_directions,
 )
-from soilml.gap.search.marginal_fits import MarginalFit
-from soilml.gap.search.predicted_gains import free_law_gains
-from soilml.gap.statistics.evidence import Evidence
-from soilml.gap.statistics.signatures import Signature
+from soilml.gap.search.screening import free_law_gains
 from soilml.physics.effects.slip_sinkage import SlipSinkage
 
 
@@ -100,8 +100,8 @@ def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatc
         asked.extend(amplitude for _, amplitude in started)
         return fits
 
-    monkeypatch.setattr(candidate_fits, "fit_marginal", fitted)
-    one, two = candidate_fits.fit_shapes(problem, [first, found])
+    monkeypatch.setattr(explanation, "fit_marginal", fitted)
+    one, two = explanation.fit_shapes(problem, [first, found])
     assert one.free_law is fits[0] and two.free_law is fits[2]
     np.testing.assert_array_equal(asked[0], found.amplitude)
     np.testing.assert_array_equal(asked[1], np.zeros(len(problem.readings.channels)))
@@ -111,8 +111,8 @@ def test_a_candidate_keeps_its_fit_under_noise_alone(dug):
     problem, found = dug
     none = np.zeros(len(problem.readings.channels))
     starts = [None, {}]
-    one, two = candidate_fits.fit_candidates(
-        problem, [candidate_fits.CandidateRequest(("slip-sinkage",), {}, none, s) for s in starts]
+    one, two = explanation.fit_candidates(
+        problem, [explanation.CandidateRequest(("slip-sinkage",), {}, none, s) for s in starts]
     )
     assert one.noise_only is None and two.noise_only is not None
     white = problem.covariance.whiten

@@ -11,12 +11,13 @@ from soilml.fitting.coordinates import soil_coordinate
 from soilml.fitting.free_parameters import select_free
 from soilml.fitting.soil_test_terms import SoilTestTerms
 from soilml.gap import audit, gap
-from soilml.gap.html.page import page
+from soilml.gap.report.page import page
 from soilml.identification.bevameter import bevameter
 from soilml.identification.bevameter.model_file import updated_soil
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
+from soilml.remarks import texts
 
 SAND = soil("wong1989/dry_sand")
 KNOWN = {
@@ -80,7 +81,7 @@ def test_tests_of_the_soil_add_to_the_odds_of_the_cause(reports):
 
 def test_report_compares_the_soil_with_its_tests(reports):
     plate, shear = reports[1].as_json()["soil_tests"]
-    assert shear["test"] == "shear strength under 7.5 kPa"
+    assert shear["label"] == "shear strength under 7.5 kPa"
     assert abs(shear["sigma_before"]) > 2.5 > 1.5 > abs(shear["sigma_after"])
     assert abs(plate["sigma_after"]) < 1.5
     text = page(reports[1], "model.toml", "runs.csv")
@@ -101,7 +102,7 @@ def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():
     _, shear = sand_tests()
     other = replace(shear, strength=2.0 * shear.strength)
     report = gap(replace(CASE, soil_tests=(other,)), runs())
-    assert any("disagree with a test of the soil" in note for note in report.notes)
+    assert any("disagree with a test of the soil" in note for note in texts(report.notes))
 
 
 def test_audit_knows_that_tests_hold_the_soil():
@@ -168,5 +169,5 @@ def test_runs_that_agree_are_no_gap_only_where_the_tests_agree_too():
     firm = replace(plate, pressure=1.6 * plate.pressure)  # no unknown parameter can explain it
     report = gap(replace(case, soil_tests=(firm, shear)), runs())
     assert report.status == "undecided"
-    assert any("disagree with a test of the soil" in reason for reason in report.reasons)
-    assert not any("part of the gap" in text for text in report.notes)
+    assert any("disagree with a test of the soil" in reason for reason in texts(report.reasons))
+    assert not any("part of the gap" in text for text in texts(report.notes))

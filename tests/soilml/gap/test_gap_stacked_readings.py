@@ -8,7 +8,7 @@ from gap_sets import MODEL, case_of, driven
 
 from soilml.errors import InputError
 from soilml.fitting.readings import MOST_READINGS, check_size, stack_readings
-from soilml.gap.search.marginal_fits import _changed
+from soilml.gap.evidence.problem import _changed
 from soilml.io.table import Table
 from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 

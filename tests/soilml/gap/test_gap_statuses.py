@@ -4,10 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gap_sets import remark
 
 from soilml.fitting.coordinates import EffectCoordinate
-from soilml.gap.search.candidate_fits import EFFECT_PENALTY, CandidateFit
-from soilml.gap.search.marginal_fits import MarginalFit
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.report.sentences import NOT_DECISIVE
+from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
 from soilml.gap.search.posterior import (
     MAX_CHANCE_CLASS,
     MAX_CHANCE_NAME,
@@ -17,14 +20,12 @@ from soilml.gap.search.posterior import (
     not_rejected,
 )
 from soilml.gap.search.stepwise import SearchResult
-from soilml.gap.statistics.evidence import Evidence
 from soilml.gap.verdict import decision
 from soilml.gap.verdict.decision import (
     DECISIVE_GAIN,
     IMPLAUSIBLE_FAULT,
     LARGE_REMAINDER,
     MAX_SIZE_DEVIATION,
-    NOT_DECISIVE,
     SUSPECT_MARGIN,
     cause_set,
     decide,
@@ -33,7 +34,7 @@ from soilml.gap.verdict.decision import (
     unclaimed_effects,
     with_refused_outside,
 )
-from soilml.gap.verdict.report_entries import candidate_summaries
+from soilml.gap.verdict.entries import candidate_summaries
 from soilml.numerics.prior import Prior
 
 PROBLEM = SimpleNamespace(readings=SimpleNamespace(channels=("torque", "drawbar_pull")))
@@ -95,7 +96,7 @@ def test_without_a_gap_what_disagrees_decides():
     quiet = searched(NONE, DIG, gap=False)
     assert status(quiet) == "no-gap"
     assert status(quiet, ["one load only"]) == "no-gap"
-    assert status(quiet, disagreements=["runs differ"]) == "undecided"
+    assert status(quiet, disagreements=[remark("runs differ")]) == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -145,7 +146,7 @@ def test_a_fault_of_an_implausible_size_is_not_claimed():
         far = candidate("dig", 20.0, coordinates=[size("dig")], x=[-x * MAX_SIZE_DEVIATION])
         made = decide(PROBLEM, searched(NONE, far), (), ())
         assert made.status == found
-        assert made.reason == ("" if found == "named" else IMPLAUSIBLE_FAULT)
+        assert made.reason == (None if found == "named" else IMPLAUSIBLE_FAULT)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +160,7 @@ def test_a_law_far_from_the_catalogues_is_suspected(names, limit):
         own = candidate(names, 20.0, coordinates=[size("dig", is_shape=True)], x=[x])
         made = decide(PROBLEM, searched(NONE, own), (), ())
         assert (made.status, made.shown) == (found, own)
-        assert ("the law of" in made.reason) == (found == "suspected")
+        assert (made.reason is not None) == (found == "suspected")
 
 
 def test_a_large_remainder_beside_little_evidence_is_suspected():
@@ -175,7 +176,8 @@ def test_a_large_remainder_beside_little_evidence_is_suspected():
     ):
         made = found(amplitude, gain)
         assert made.status == expected
-        assert ("drawbar pull" in made.reason) == (expected == "suspected")
+        assert (made.reason is not None) == (expected == "suspected")
+        assert made.reason is None or made.reason.about == ("dig", "drawbar_pull_N")
 
 
 def test_beside_a_large_remainder_the_first_suspect_is_shown_and_why_not_the_best():
@@ -183,11 +185,11 @@ def test_beside_a_large_remainder_the_first_suspect_is_shown_and_why_not_the_bes
     none = candidate("", 20.0 + DECISIVE_GAIN - 1.0, amplitude=(5.0, 5.0))
     words = "beside dig, at least four times the usual error of a model is left in the torque"
     made = decide(PROBLEM, searched(none, best, PLOUGH), (), ())
-    assert (made.shown, made.reason) == (best, words)
+    assert (made.shown, made.reason.text) == (best, words)
     weights = {(): -9.0, ("dig",): -2.0, ("plough",): -1.0}
     made = decide(PROBLEM, searched(none, best, PLOUGH, weights=weights), (), ())
     assert made.status == "suspected" and made.shown is PLOUGH
-    assert made.reason == f"{words}, and the evidence for plough is not decisive"
+    assert made.reason.text == f"{words}, and the evidence for plough is not decisive"
 
 
 def test_another_law_is_stated_where_it_matters(law):
@@ -220,16 +222,16 @@ def test_what_is_shown_is_the_suspect_that_is_listed_first():
 def test_reasons_by_status():
     suspected = decide(PROBLEM, searched(NONE, DIG, accepted=0), (), ())
     assert reasons(suspected, [], []) == ()
-    assert reasons(suspected, ["one load only"], []) == ("one load only",)
-    assert reasons(suspected, [], ["a and b", "c and d"]) == (
-        NOT_DECISIVE,
-        "rows driven alike disagree: a and b",
-    )
-    assert reasons(suspected, ["one load only"], ["a and b"])[0] == "one load only"
-    undecided = decide(PROBLEM, searched(NONE, gap=False), (), ["a and b"])
-    assert reasons(undecided, ["one load only"], ["a and b"]) == ("a and b",)
-    testless = decide(PROBLEM, searched(candidate("", 1.0, (1.0, 0.0)), DIG), ["one load"], ())
-    assert reasons(testless, ["one load"], ["a and b"]) == ("one load",)
+    load, two, more = remark("one load only"), remark("a and b"), remark("c and d")
+    assert reasons(suspected, [load], []) == (load,)
+    first, second = reasons(suspected, [], [two, more])
+    assert first == NOT_DECISIVE
+    assert (second.code, second.text) == ("a and b", "replicate rows disagree: a and b")
+    assert reasons(suspected, [load], [two])[0] == load
+    undecided = decide(PROBLEM, searched(NONE, gap=False), (), [two])
+    assert reasons(undecided, [load], [two]) == (two,)
+    testless = decide(PROBLEM, searched(candidate("", 1.0, (1.0, 0.0)), DIG), [load], ())
+    assert reasons(testless, [load], [two]) == (load,)
     assert reasons(decide(PROBLEM, searched(NONE, DIG), (), ()), [], []) == ()
 
 
@@ -276,7 +278,9 @@ def test_candidates_are_summarised_against_the_soil_alone_and_the_best():
     result = searched(NONE, DIG, PLOUGH, slow, far, pair)
     object.__setattr__(result, "predicted_gain", {"dig": 70.0})
     found = candidate_summaries(SimpleNamespace(result=result), claimed=True)
-    rows = [(c.names, c.predicted_gain, c.achieved_gain, c.excess, c.verdict) for c in found[:4]]
+    rows = [
+        (c.effects, c.predicted_gain, c.achieved_gain, c.excess, str(c.verdict)) for c in found[:4]
+    ]
     assert rows == [
         (("dig",), 70.0, 80.0, 1.0, "explains the data"),
         (("plough",), 0.0, 78.0, 3.0, "more effects than needed"),
@@ -285,7 +289,7 @@ def test_candidates_are_summarised_against_the_soil_alone_and_the_best():
     ]
     assert found[4].excess == 0.0 and np.isnan(found[4].predicted_gain)
     unclaimed = candidate_summaries(SimpleNamespace(result=result), claimed=False)
-    assert [c.verdict for c in unclaimed[:2]] == [
+    assert [str(c.verdict) for c in unclaimed[:2]] == [
         "fits best, not claimed",
         "not rejected, not claimed",
     ]

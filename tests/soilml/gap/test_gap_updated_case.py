@@ -9,9 +9,9 @@ from gap_sets import MODEL, candidate, case_of, driven, fit_problem
 from soilml.config.write_case import case_as_toml
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.planned_readings import expected_readings
+from soilml.gap.design.run_kinds import SENSOR_CHECKS
 from soilml.gap.design.run_options import run_options
-from soilml.gap.design.static_checks import SENSOR_CHECKS
-from soilml.gap.verdict.updated_case import updated_case
+from soilml.gap.verdict.estimates import updated_case
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 

@@ -7,10 +7,9 @@ import pytest
 
 from soilml import Table
 from soilml.errors import InputError
-from soilml.gap.data import checks
-from soilml.gap.data.checks import CheckedData, Severity, without_duplicate_rows
-from soilml.gap.data.holdout import split_holdout
-from soilml.gap.design.run_costs import LISTED, check_costs, rank_by_cost
+from soilml.gap import checks
+from soilml.gap.checks import CheckedData, Consequence, without_duplicate_rows
+from soilml.gap.design.run_kinds import LISTED, check_costs, rank_by_cost
 from soilml.gap.design.run_options import (
     HIGHEST_SLIP,
     ROWS_PER_RUN,
@@ -19,9 +18,11 @@ from soilml.gap.design.run_options import (
     _whole,
     drivable_slips,
 )
-from soilml.gap.report_parts import NextRun
-from soilml.gap.verdict import remaining_discrepancy as remaining
-from soilml.gap.verdict.law_difference import NEGLIGIBLE_FRACTION, law_matters
+from soilml.gap.evidence.held_out import split_holdout
+from soilml.gap.report.results import NextRun
+from soilml.gap.verdict import remainder as remaining
+from soilml.gap.verdict.decision import NEGLIGIBLE_FRACTION, law_matters
+from soilml.remarks import texts
 
 CHANNELS = ("torque", "sinkage")
 
@@ -153,11 +154,11 @@ def test_duplicates_are_an_error_from_a_fifth_of_the_table_on():
         return severities(checks._check_duplicate_rows, rows=rows, duplicate_rows=duplicates)
 
     assert found(10, 0) == []
-    assert found(8, 2) == [Severity.NOTE]
-    assert found(79, 21) == [Severity.ERROR]
+    assert found(8, 2) == [Consequence.NOTE]
+    assert found(79, 21) == [Consequence.ERROR]
 
 
-@pytest.mark.parametrize(("count", "expected"), [(10, [Severity.ERROR]), (11, [])])
+@pytest.mark.parametrize(("count", "expected"), [(10, [Consequence.ERROR]), (11, [])])
 def test_readings_for_three_parameters(count, expected):
     class Several:
         channels = CHANNELS
@@ -171,10 +172,10 @@ def test_readings_for_three_parameters(count, expected):
 @pytest.mark.parametrize(
     ("values", "std", "expected"),
     [
-        ([1.0, 2.0, 3.0, 4.0], 4e-6, [Severity.ERROR]),
+        ([1.0, 2.0, 3.0, 4.0], 4e-6, [Consequence.ERROR]),
         ([1.0, 2.0, 3.0, 4.0], 4.1e-6, []),
-        ([1.0, 2.0, 3.0, 4.0], np.nan, [Severity.ERROR]),
-        ([1.0, 1.0, 1.0, 1.0], 0.1, [Severity.ERROR]),
+        ([1.0, 2.0, 3.0, 4.0], np.nan, [Consequence.ERROR]),
+        ([1.0, 1.0, 1.0, 1.0], 0.1, [Consequence.ERROR]),
         ([1.0, 1.0, 1.0], 0.1, []),  # few rows may agree
     ],
 )
@@ -204,14 +205,14 @@ def test_repeats_give_the_noise_by_their_degrees_of_freedom():
     )  # fmt: skip
     noise, notes = checks.estimate_repeat_noise(given)
     assert noise == {"torque": pytest.approx(np.sqrt(20.0 / 6.0))}
-    assert notes == [
+    assert texts(notes) == [
         "noise of torque_Nm is not declared: 1.83 was estimated from repeated rows"
     ]  # fmt: skip
     few = stub(**vars(given) | {"driven_alike": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
     assert checks.estimate_repeat_noise(few) == ({}, [])
     equal = stub(**vars(given) | {"reading": np.repeat([9.0, 18.0], 4)})
     noise, notes = checks.estimate_repeat_noise(equal)
-    assert noise == {} and "its repeated rows are equal" in notes[0]
+    assert noise == {} and "its repeated rows are equal" in notes[0].text
     known = stub(**vars(given) | {"std": np.ones(8)})
     assert checks.estimate_repeat_noise(known) == ({}, [])
 

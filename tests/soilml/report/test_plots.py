@@ -14,8 +14,7 @@ from soilml import Estimator, Table, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.experiment_design.candidate_rows import CandidateRow
-from soilml.gap.report_parts import GapReduction
-from soilml.gap.results import GapReport
+from soilml.gap.report.results import GapReduction, GapReport
 from soilml.traction.report import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")

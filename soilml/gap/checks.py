@@ -1,0 +1,191 @@
+"""Data checks before an analysis: which data can be analysed, and which can identify a cause.
+
+A new check is a function from `CheckedData` to findings, listed in `CHECKS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.fitting.observations import LEAST_RELATIVE_STD
+from soilml.fitting.readings import Readings
+from soilml.io.table import Table
+from soilml.quantities import column
+from soilml.remarks import Remark
+
+Floats = NDArray[np.float64]
+
+#: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
+#: standard error is then 30 %.
+MIN_REPEAT_DEGREES_OF_FREEDOM = 6
+#: Readings beyond the number of soil parameters that an analysis needs.
+MIN_RESIDUAL_READINGS = 8
+#: Code of the obstacle that one load cannot test the soil parameters.
+ONE_LOAD = "one-load"
+#: Fraction of duplicate rows above which the table itself is suspect.
+MAX_DUPLICATE_FRACTION = 0.2
+
+
+@dataclass(frozen=True)
+class DataCheckResult:
+    """Errors that prevent an analysis, obstacles to naming a cause, and notes."""
+
+    errors: tuple[Remark, ...] = ()
+    naming_obstacles: tuple[Remark, ...] = ()
+    notes: tuple[Remark, ...] = ()
+
+
+@dataclass(frozen=True)
+class CheckedData:
+    """What the checks look at; `parameters` is the number of free soil parameters."""
+
+    readings: Readings
+    rows: int
+    duplicate_rows: int
+    parameters: int
+
+
+class Consequence(Enum):
+    """Consequence of a finding."""
+
+    ERROR = "no analysis"
+    NAMING_OBSTACLE = "no cause can be named"
+    NOTE = "for information"
+
+
+Finding = tuple[Consequence, Remark]
+
+
+def check_readings(
+    readings: Readings, table: Table, duplicate_rows: int, parameters: int
+) -> DataCheckResult:
+    """Run all data checks.
+
+    Parameters
+    ----------
+    duplicate_rows : int
+        Number of duplicate rows that were removed from `table` before.
+    parameters : int
+        Number of free soil parameters.
+    """
+    data = CheckedData(readings, len(table), duplicate_rows, parameters)
+    findings = [finding for check in CHECKS for finding in check(data)]
+    errors, obstacles, notes = (
+        tuple(remark for consequence, remark in findings if consequence is wanted)
+        for wanted in Consequence
+    )
+    return DataCheckResult(errors, obstacles, notes)
+
+
+def _check_channels(data: CheckedData) -> Iterator[Finding]:
+    readings = data.readings
+    for i, name in enumerate(readings.channels):
+        in_channel, key = readings.channel == i, column(name)
+        if not np.isfinite(readings.std[in_channel]).all():
+            text = (
+                f"the noise of {key} is not declared and there are no repeated rows to estimate "
+                f'it from: give [noise] {key}, as in {key} = "2 %", or a column {key}_std'
+            )
+            yield Consequence.ERROR, Remark("noise-undeclared", text, (key,))
+        values = readings.reading[in_channel]
+        largest = float(np.abs(values).max(initial=0.0))
+        std = float(np.nanmax(readings.std[in_channel], initial=0.0))
+        if 0.0 < std <= LEAST_RELATIVE_STD * largest:
+            text = (
+                f"the noise of {key} is {std:.3g} or less, its largest reading {largest:.3g}: no "
+                "sensor resolves so much; declare one such as '2 % + 0.05'"
+            )
+            yield Consequence.ERROR, Remark("noise-too-small", text, (key,))
+        if values.size > 3 and np.ptp(values) == 0.0:
+            text = f"{key} is the same in every row: check the sensor"
+            yield Consequence.ERROR, Remark("constant-channel", text, (key,))
+
+
+def _check_duplicate_rows(data: CheckedData) -> Iterator[Finding]:
+    if data.duplicate_rows:
+        many = data.duplicate_rows > MAX_DUPLICATE_FRACTION * (data.rows + data.duplicate_rows)
+        text = f"{data.duplicate_rows} rows are exact duplicates and were excluded"
+        remark = Remark("duplicate-rows", text, severity="warning" if many else "note")
+        yield Consequence.ERROR if many else Consequence.NOTE, remark
+
+
+def _check_count(data: CheckedData) -> Iterator[Finding]:
+    count = len(data.readings)
+    if not data.readings.channels:
+        text = "no torque, drawbar pull or sinkage was measured"
+        yield Consequence.ERROR, Remark("no-channel", text)
+    elif count < data.parameters + MIN_RESIDUAL_READINGS:
+        text = (
+            f"{'1 reading' if count == 1 else f'{count} readings'} for {data.parameters} soil "
+            f"parameters: at least {data.parameters + MIN_RESIDUAL_READINGS} readings are needed"
+        )
+        yield Consequence.ERROR, Remark("few-readings", text)
+
+
+def _check_variety(data: CheckedData) -> Iterator[Finding]:
+    readings = data.readings
+    if len(readings.runs) < 2:
+        text = "one run only: run-to-run variation of the soil cannot be separated from a gap"
+        yield Consequence.NAMING_OBSTACLE, Remark("one-run", text)
+    if not readings.channels:
+        return
+    if readings.load_levels.count < 2:
+        text = "one load only: soil parameters and effects are confounded"
+        yield Consequence.NAMING_OBSTACLE, Remark(ONE_LOAD, text)
+    if readings.slip_levels.count < 3:
+        text = "fewer than three slips: effects that vary with slip cannot be distinguished"
+        yield Consequence.NAMING_OBSTACLE, Remark("few-slips", text)
+
+
+#: All data checks, in the order in which their findings are reported.
+CHECKS: tuple[Callable[[CheckedData], Iterator[Finding]], ...] = (
+    _check_channels,
+    _check_duplicate_rows,
+    _check_count,
+    _check_variety,
+)
+
+
+def without_duplicate_rows(table: Table) -> tuple[Table, int]:
+    """The table without exact duplicates of earlier rows, and the number of duplicates."""
+    names = [n for n in table.columns if n != "source"]
+    keys = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
+    first = {key: i for i, key in reversed(list(enumerate(keys)))}
+    kept = np.asarray(sorted(first.values()), dtype=np.int64)
+    return (table, 0) if kept.size == len(table) else (table.rows(kept), len(table) - kept.size)
+
+
+def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:
+    """Noise of the channels without declared noise, from repeated rows, and notes about it."""
+    noise, notes = {}, []
+    for i, name in enumerate(readings.channels):
+        undeclared = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
+        if undeclared.size == 0:
+            continue
+        _, group = np.unique(readings.driven_alike[undeclared], return_inverse=True)
+        count = np.bincount(group)
+        mean = np.bincount(group, readings.reading[undeclared]) / count
+        degrees_of_freedom = int((count - 1).sum())
+        if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
+            continue
+        squares = float(np.sum((readings.reading[undeclared] - mean[group]) ** 2))
+        std = float(np.sqrt(squares / degrees_of_freedom))
+        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.reading[undeclared]).max()):
+            text = (
+                f"noise of {column(name)} is not declared, and its repeated rows are equal: none "
+                "can be estimated from them"
+            )
+            notes.append(Remark("repeats-equal", text, (column(name),)))
+            continue
+        noise[name] = std
+        text = (
+            f"noise of {column(name)} is not declared: {noise[name]:.3g} was estimated from "
+            "repeated rows"
+        )
+        notes.append(Remark("noise-estimated", text, (column(name),), "note"))
+    return noise, notes

@@ -1,1 +1,0 @@
-"""Stacked readings, the data checks before an analysis, and held-out rows."""

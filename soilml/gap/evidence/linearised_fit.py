@@ -1,0 +1,168 @@
+"""Evidence of a fit's neighbourhood as a linear model, for many amplitudes of a discrepancy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Divisions that are kept: fits share them, because amplitudes are those of a grid.
+KEPT = 64
+
+
+@dataclass(frozen=True)
+class Division:
+    r"""The whitened process with one channel apart from the others, which have an amplitude.
+
+    .. math::
+        V^{-1} = V_0^{-1} - V_0^{-1} \Phi\, \tau^2 (I + \tau^2 \Phi^T V_0^{-1} \Phi)^{-1} \Phi^T
+        V_0^{-1}, \quad |V| = |V_0| \prod_k (1 + \tau^2 \lambda_k)
+
+    with the covariance V_0 of all but the channel's own discrepancy, its functions Phi, and the
+    eigenvalues lambda of Phi^T V_0^-1 Phi: one decomposition serves all amplitudes tau.
+    """
+
+    own: NDArray[np.bool_]  # (q,) functions of the channel
+    reduce: (
+        Floats  # (r, r), the inverse of the factor of V_0 times the amplitudes, others' functions
+    )
+    across: Floats  # (r, k) of the channel's own functions with the others, reduced
+    value: Floats  # (k,) eigenvalues
+    vector: Floats  # (k, k) eigenvectors
+    log_determinant: float  # of V_0, whitened by noise and scatter
+
+
+@dataclass(frozen=True)
+class ProcessDivisions:
+    """Products of the whitened functions of a process, and its divisions by channel."""
+
+    gram: Floats  # (q, q)
+    channel: NDArray[np.int64]  # (q,)
+    _kept: dict[tuple[int, bytes], Division] = field(default_factory=dict)
+
+    def at(self, amplitude: Floats, channel: int) -> Division:
+        """The division with one channel apart, others at their amplitudes (channels,)."""
+        others = np.delete(amplitude, channel)
+        key = channel, others.tobytes()
+        if key not in self._kept:
+            while len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = self._divided(amplitude, channel)
+        return self._kept[key]
+
+    def _divided(self, amplitude: Floats, channel: int) -> Division:
+        own = self.channel == channel
+        t = amplitude[self.channel[~own]]
+        beside = self.gram[np.ix_(~own, ~own)]
+        factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * beside * t)
+        reduce = np.linalg.solve(factor, np.diag(t))
+        across = reduce @ self.gram[np.ix_(~own, own)]
+        value, vector = np.linalg.eigh(self.gram[np.ix_(own, own)] - across.T @ across)
+        return Division(
+            own=own,
+            reduce=reduce,
+            across=across,
+            value=np.maximum(value, 0.0),
+            vector=vector,
+            log_determinant=2.0 * float(np.log(np.diag(factor)).sum()),
+        )
+
+
+@dataclass(frozen=True)
+class LinearisedFit:
+    """A fit's neighbourhood as a linear model, reduced to products with the process."""
+
+    divisions: ProcessDivisions
+    cross: Floats  # (q, p + 1) of the process with Jacobian and residual
+    plain: Floats  # (p + 1, p + 1) of Jacobian and residual
+    precision: Floats  # (p, p) of priors and tests of the soil
+    pull: Floats  # (p,) half the derivative of -2 ln prior density
+    movable: NDArray[np.bool_]  # (p,) not at a bound
+    constant: float  # -2 ln prior density of the coordinates
+
+    def along(self, amplitude: Floats, channel: int) -> Floats:
+        """Evidence (b,) with each of `AMPLITUDES` in one channel, others at `amplitude`."""
+        trials = np.tile(amplitude, (len(AMPLITUDES), 1))
+        trials[:, channel] = AMPLITUDES
+        part = self.divisions.at(amplitude, channel)
+        beside = part.reduce @ self.cross[~part.own]
+        rotated = part.vector.T @ (self.cross[part.own] - part.across.T @ beside)
+        square = AMPLITUDES[:, None] ** 2
+        shrink = square / (1.0 + square * part.value)  # (b, functions)
+        plain = self.plain - beside.T @ beside
+        explained = np.einsum("bq,qi,qj->bij", shrink, rotated, rotated, optimize=True)
+        growth = np.log1p(square * part.value).sum(axis=1)
+        value = self._solve(plain - explained)[0] + part.log_determinant + growth
+        return np.asarray(value + amplitude_penalty(trials))
+
+    def step_and_precision(self, amplitude: Floats) -> tuple[Floats, Floats]:
+        """Step (p,) to the optimum at amplitudes (channels,), and marginal precisions (p,)."""
+        _, step, h = self._solve(self._product(amplitude)[None])
+        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
+
+    def slope_and_curvature(self, amplitude: Floats) -> tuple[Floats, Floats]:
+        """Gradient (p,) and curvature (p, p) of ln p at amplitudes (channels,), bounds ignored."""
+        p, product = len(self.pull), self._product(amplitude)
+        return product[:p, p] - self.pull, product[:p, :p] + self.precision
+
+    def _product(self, amplitude: Floats) -> Floats:
+        """Products (p + 1, p + 1) of Jacobian and residual under amplitudes (channels,)."""
+        t = amplitude[self.divisions.channel]
+        factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * self.divisions.gram * t)
+        reduced = np.linalg.solve(factor, t[:, None] * self.cross)
+        return np.asarray(self.plain - reduced.T @ reduced)
+
+    def _solve(self, product: Floats) -> tuple[Floats, Floats, Floats]:
+        """Evidence (b,) without ln|V|, steps (b, p) and curvature (b, p, p).
+
+        `product`, (b, p + 1, p + 1), has the products of Jacobian and residual under each
+        covariance.
+        """
+        p = len(self.pull)
+        h = product[:, :p, :p] + self.precision
+        gradient = np.where(self.movable, product[:, :p, p] - self.pull, 0.0)
+        both = self.movable[:, None] & self.movable
+        inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
+        step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient
+        value = product[:, p, p] - (gradient * step).sum(axis=1)
+        if p:
+            value += np.linalg.slogdet(h)[1]
+        return value + self.constant, step, h
+
+
+#: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
+#: about 1.6, which change the evidence by less than 1 near its maximum.
+AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Prior probability that a channel has no discrepancy at all.
+NO_DISCREPANCY = 0.5
+#: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and
+#: the scale of its amplitude, in usual ones: 20 % of a range.
+UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0
+
+
+def _amplitude_masses() -> Floats:
+    """Prior probability of each of `AMPLITUDES`.
+
+    With probability `NO_DISCREPANCY` a channel has none. Otherwise its amplitude is exponentially
+    distributed with a mean of one usual amplitude, or, with probability `UNKNOWN_CAUSE`, that of a
+    cause which the catalogue lacks: half-Cauchy with the scale `UNKNOWN_SCALE`, whose heavy tail
+    does not reward effects that explain a part of it (Gelman, Bayesian Analysis 1(3), 2006).
+    """
+    positive = AMPLITUDES[1:]
+    edges = np.concatenate([[0.0], np.sqrt(positive[1:] * positive[:-1]), [np.inf]])
+    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
+    cumulative = (1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown
+    return np.concatenate([[NO_DISCREPANCY], (1.0 - NO_DISCREPANCY) * np.diff(cumulative)])
+
+
+#: -2 ln of the prior probability of each of `AMPLITUDES`.
+_AMPLITUDE_PENALTY = -2.0 * np.log(_amplitude_masses())
+
+
+def amplitude_penalty(amplitudes: Floats) -> Floats:
+    """-2 ln prior probability of amplitudes (b, channels) out of `AMPLITUDES`, by set, (b,)."""
+    nearest = np.abs(amplitudes[..., None] - AMPLITUDES).argmin(axis=-1)
+    return np.asarray(_AMPLITUDE_PENALTY[nearest].sum(axis=-1))

@@ -1,0 +1,91 @@
+"""Outliers: readings inconsistent with all other readings together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.gap.evidence.covariance import FIXED_EFFECT_TOLERANCES, Covariance
+from soilml.numerics.subspaces import column_space
+from soilml.quantities import Z_50
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Studentised residual above which a reading is an outlier: chance exceeds it once in 150 000
+#: readings.
+OUTLIER_SIGMA = 4.5
+#: Fraction of outliers above which they form a pattern, so that the data cannot be analysed.
+MAX_OUTLIER_FRACTION = 0.1
+#: Readings whose residual variance is below this fraction of their own are determined by the fit;
+#: their studentised residual is undefined.
+MIN_RESIDUAL_VARIANCE = 1e-3
+#: Studentised residual above which a repeat strays too, and the difference of two repeats, in its
+#: standard deviations, up to which they agree: each is exceeded by chance once in 370 readings.
+REPEAT_SIGMA = 3.0
+
+
+def outliers(
+    covariance: Covariance,
+    residual: Floats,
+    space: Floats,
+    alike: Integers | None = None,
+    run: Integers | None = None,
+) -> NDArray[np.bool_]:
+    r"""Readings (m,) whose studentised residual is large, and which no repeat confirms.
+
+    .. math:: t_i = (P r)_i / \sqrt{P_{ii}}, \quad
+        P = V^{-1} - V^{-1} X (X^T V^{-1} X)^{-1} X^T V^{-1}
+
+    compared with a robust scale, the median of \|t\|, where that exceeds 1.
+
+    Parameters
+    ----------
+    residual : array (m,)
+    space : array (m, q)
+        X, all that soil, effects and smooth functions could explain.
+    alike : array (m,), optional
+        Group of each reading: readings of one group are repeats of each other, of one channel. A
+        reading whose repeat strays to the same side and agrees with it is a strange but repeatable
+        response and no outlier.
+    run : array (m,), optional
+        Run of each reading. Where a group has several runs, only another run confirms a reading:
+        neighbouring samples of one run may share a fault.
+
+    References
+    ----------
+    Cook and Weisberg, Residuals and Influence in Regression, 1982.
+    """
+    whiten = covariance.whiten
+    basis = column_space(whiten @ space, **FIXED_EFFECT_TOLERANCES)
+    white, explained = whiten @ residual, whiten.T @ basis
+    projected = whiten.T @ (white - basis @ (basis.T @ white))  # P r
+    diagonal = (whiten**2).sum(axis=0) - (explained**2).sum(axis=1)  # of P
+    defined = diagonal > MIN_RESIDUAL_VARIANCE / covariance.std**2
+    t = np.where(defined, projected / np.sqrt(np.where(defined, diagonal, 1.0)), 0.0)
+    scale = 1.0
+    if defined.any():
+        scale = max(1.0, float(np.median(np.abs(t[defined]))) / Z_50)
+    strays = np.abs(t) > OUTLIER_SIGMA * scale
+    if alike is None:
+        return np.asarray(strays)
+    run = np.zeros(len(residual), dtype=np.int64) if run is None else run
+    confirmed = [
+        bool(strays[i]) and _is_confirmed(int(i), covariance, residual, t / scale, alike, run)
+        for i in range(len(residual))
+    ]
+    return np.asarray(strays & ~np.asarray(confirmed))
+
+
+def _is_confirmed(
+    i: int, covariance: Covariance, residual: Floats, t: Floats, alike: Integers, run: Integers
+) -> bool:
+    """Whether a repeat of reading `i` strays to the same side, and agrees with it."""
+    repeats = np.flatnonzero(alike == alike[i])
+    repeats = repeats[repeats != i]
+    of_other_runs = repeats[run[repeats] != run[i]]
+    repeats = of_other_runs if of_other_runs.size else repeats
+    matrix = covariance.matrix
+    variance = matrix[i, i] + np.diag(matrix)[repeats] - 2.0 * matrix[i, repeats]
+    agree = np.abs(residual[repeats] - residual[i]) <= REPEAT_SIGMA * np.sqrt(variance)
+    return bool(np.any(agree & (t[repeats] * np.sign(t[i]) > REPEAT_SIGMA)))

@@ -1,0 +1,266 @@
+"""The fit problem that all explanations share, and its fits beside a smooth discrepancy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.fitting.coordinates import (
+    Coordinate,
+    EffectCoordinate,
+    SoilCoordinate,
+    shape_coordinates,
+    size_coordinate,
+)
+from soilml.fitting.discrepancy_process import discrepancy_process
+from soilml.fitting.least_squares import FitRequest, Solution, descend_together
+from soilml.fitting.readings import Readings
+from soilml.fitting.whitening import Whitening
+from soilml.gap.candidate_effects import with_effect
+from soilml.gap.evidence.covariance import Covariance
+from soilml.gap.evidence.directions import current_size
+from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
+from soilml.physics.effects.base import Effect
+from soilml.quantities import column
+
+Floats = NDArray[np.float64]
+
+#: Size, in reference sizes, from which the fit of a new effect starts: away from zero, where the
+#: derivative of some effects vanishes.
+START_SIZE = 0.7
+#: Prior standard deviation of the error of a sensor or rig without calibration, in reference sizes.
+UNCALIBRATED_STD = 2.0
+#: Range of slip, and of log load, above which the dependence of an effect on it can be estimated; a
+#: load that scatters by this much about one level can suffice.
+MIN_SLIP_RANGE, MIN_LOG_LOAD_RANGE = 0.05, 0.1
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """Everything that stays the same while candidates are fitted.
+
+    `covariance` is that of noise and run-to-run scatter; `discrepancy` adds a smooth discrepancy.
+    `calibration` holds standard deviations of sensor and rig errors by effect name, in the unit of
+    the effect's size.
+    """
+
+    case: Case
+    soil: tuple[SoilCoordinate, ...]
+    readings: Readings
+    covariance: Covariance
+    effects: Mapping[str, type[Effect]]
+    calibration: Mapping[str, float]
+
+    @cached_property
+    def discrepancy(self) -> DiscrepancyModel:
+        """Noise, scatter and a smooth discrepancy of the readings."""
+        return DiscrepancyModel(
+            self.covariance, discrepancy_process(self.readings, self.case.discrepancy)
+        )
+
+    @cached_property
+    def declared_amplitude(self) -> Floats:
+        """Amplitude of the discrepancy that the case declares by channel, in usual ones: 1 or 0."""
+        declared = [column(name) in self.case.discrepancy for name in self.readings.channels]
+        return np.asarray(declared, dtype=np.float64)
+
+    def effects_not_in(self, fit: Solution) -> dict[str, type[Effect]]:
+        """The effects of the catalogue without coordinates in a fit.
+
+        An effect that all gears share and the same effect of one gear exclude each other.
+        """
+        fitted = {c.effect for c in fit.coordinates if isinstance(c, EffectCoordinate)}
+        excluded = {
+            other for name in fitted for other in self.effects if exclude_each_other(name, other)
+        }
+        return {name: effect for name, effect in self.effects.items() if name not in excluded}
+
+    def with_effects(self, names: Sequence[str]) -> Case:
+        """The case with these effects added."""
+        case = self.case
+        for name in names:
+            case = with_effect(case, self.effects[name])
+        return case
+
+    def size_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+        """The coordinates of the effects' sizes; sensor and rig errors have a Gaussian prior."""
+        coordinates = []
+        for name in names:
+            about = self.effects[name].about
+            default = UNCALIBRATED_STD * about.reference[about.size] if about.calibration else None
+            std = self.calibration.get(name, default)
+            coordinates.append(size_coordinate(self.effects[name], std))
+        return coordinates
+
+    def shape_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+        """The coordinates of the effects' shapes that the range of slip and load can determine."""
+        slips_vary = np.ptp(self.readings.slip) > MIN_SLIP_RANGE
+        varies = {
+            "slip_power": slips_vary,
+            "by_slip": slips_vary,
+            "by_load": bool(np.ptp(np.log(self.readings.load)) > MIN_LOG_LOAD_RANGE),
+        }
+        shapes = [c for name in names for c in shape_coordinates(self.effects[name])]
+        return [c for c in shapes if varies[c.name]]
+
+    def fit_soil(self, starts: Sequence[Floats]) -> Solution:
+        """The best of the fits of the soil alone, one from each start."""
+        whiten = self.covariance.whiten
+        fits = descend_together(
+            [FitRequest(self.case, self.soil, self.readings, whiten, start) for start in starts]
+        )
+        return min((_raised(fit) for fit in fits), key=lambda fit: fit.objective)
+
+    def fit(
+        self, case: Case, coordinates: Sequence[Coordinate], start: Mapping[str, float]
+    ) -> Solution:
+        """One fit; see `fit_many`."""
+        return _raised(fit_many(self, [StartedFit(case, coordinates, start)])[0])
+
+    def first_coordinates(
+        self, coordinates: Sequence[Coordinate], start: Mapping[str, float]
+    ) -> Floats:
+        """Where a fit starts: `start` by path, else the case's value or a small one."""
+        return np.asarray([start.get(c.path, self._default_start(c)) for c in coordinates])
+
+    def _default_start(self, coordinate: Coordinate) -> float:
+        """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
+        if isinstance(coordinate, EffectCoordinate) and coordinate.is_shape:
+            return 0.0
+        if coordinate.path in self.case.parameters():
+            return current_size(self.case, coordinate.path, coordinate.prior.upper)
+        return START_SIZE if coordinate.upper > 0.0 else -START_SIZE
+
+
+@dataclass(frozen=True)
+class StartedFit:
+    """A fit to be made to a problem's readings, and the coordinates, by path, that it starts at.
+
+    `whiten`, (m, m), replaces the inverse Cholesky factor of the problem's covariance.
+    """
+
+    case: Case
+    coordinates: Sequence[Coordinate]
+    start: Mapping[str, float]
+    whiten: Whitening | None = None
+
+
+def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution | InputError]:
+    """Fits that share each call of the model; their results are those of single fits.
+
+    Coordinates without a start begin at the case's value or small. Where the model refuses a trial
+    from there, the fit starts again with all effects at zero; where it refuses again, its
+    `InputError` takes the place of the fit.
+    """
+
+    def request(fit: StartedFit, first: Floats) -> FitRequest:
+        whiten = problem.covariance.whiten if fit.whiten is None else fit.whiten
+        return FitRequest(fit.case, fit.coordinates, problem.readings, whiten, first)
+
+    found = descend_together(
+        [request(fit, problem.first_coordinates(fit.coordinates, fit.start)) for fit in fits]
+    )
+    refused = [i for i, result in enumerate(found) if isinstance(result, InputError)]
+    again = descend_together(
+        [request(fits[i], _without_effects(fits[i].coordinates, fits[i].start)) for i in refused]
+    )
+    for i, result in zip(refused, again, strict=True):
+        found[i] = result
+    return found
+
+
+def _without_effects(coordinates: Sequence[Coordinate], start: Mapping[str, float]) -> Floats:
+    """The coordinates of the soil at their start, those of effects at zero."""
+    return np.asarray(
+        [start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0 for c in coordinates]
+    )
+
+
+def _raised(fit: Solution | InputError) -> Solution:
+    """The fit; an `InputError` in its place is raised."""
+    if isinstance(fit, InputError):
+        raise fit
+    return fit
+
+
+def exclude_each_other(name: str, other: str) -> bool:
+    """Whether two effects are the same one, or one of them is the other for a single gear."""
+    (base, _, gear), (other_base, _, other_gear) = name.partition("@"), other.partition("@")
+    return name == other or (base == other_base and not (gear and other_gear))
+
+
+#: Fits at most under successive estimates of the discrepancy; the estimate of the amplitudes hardly
+#: changes after the second.
+MAX_ROUNDS = 3
+#: Change of an amplitude, in usual ones and relative to itself, below which a fit is final: the
+#: weights of the readings then hardly change.
+AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
+#: Evidence, in -2 ln p above the best, beyond which a fit is not repeated: repetition lowers it by
+#: 35 at most, by less than 10 for most fits.
+HOPELESS = 40.0
+
+
+@dataclass(frozen=True)
+class MarginalFit:
+    """A fit under the discrepancy that its own evidence supports.
+
+    `first` is the fit under the amplitudes of the discrepancy that were started with.
+    """
+
+    fit: Solution
+    evidence: Evidence
+    first: Solution | None = None
+
+
+def fit_marginal(
+    problem: FitProblem,
+    requests: Sequence[tuple[StartedFit, Floats]],
+    lowest: float = float("inf"),
+) -> list[MarginalFit | None]:
+    """Fits and their evidence; None where the model refuses the fit.
+
+    Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
+    are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
+    above the lowest of them, and `lowest`, that of an earlier fit.
+    """
+    found: list[MarginalFit | None] = [None] * len(requests)
+    waiting = dict(enumerate(requests))
+    for _ in range(MAX_ROUNDS):
+        started = [
+            replace(fit, whiten=problem.discrepancy.whiten(amplitude))
+            for fit, amplitude in waiting.values()
+        ]
+        fits = fit_many(problem, started)
+        again = {}
+        for (i, (request, amplitude)), fit in zip(waiting.items(), fits, strict=True):
+            if isinstance(fit, InputError):
+                continue
+            evidence = problem.discrepancy.evidence(fit, amplitude)
+            if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
+                continue
+            earlier = found[i]
+            found[i] = MarginalFit(fit, evidence, earlier.first if earlier else fit)
+            lowest = min(lowest, evidence.value)
+            if _changed(amplitude, evidence.amplitude):
+                again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)
+        waiting = {}
+        for i, repeated in again.items():
+            marginal = found[i]
+            if marginal is not None and marginal.evidence.value < lowest + HOPELESS:
+                waiting[i] = repeated
+        if not waiting:
+            break
+    return found
+
+
+def _changed(before: Floats, after: Floats) -> bool:
+    """Whether the amplitudes of a discrepancy changed so much that a fit must be repeated."""
+    larger, smaller = np.maximum(before, after), np.minimum(before, after)
+    changed = (larger - smaller > AMPLITUDE_TOLERANCE) & (smaller < AMPLITUDE_RATIO * larger)
+    return bool(changed.any())

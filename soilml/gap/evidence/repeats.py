@@ -1,0 +1,218 @@
+"""Repeated rows: whether rows that are driven alike agree within noise and usual scatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.fitting.readings import Readings
+from soilml.gap.evidence.covariance import (
+    RUN_EFFECT_UNITS,
+    VarianceComponents,
+    assemble_covariance,
+    run_effect_columns,
+)
+from soilml.quantities import QUANTITIES, column
+from soilml.remarks import Remark
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Probability by chance below which repeats disagree, or scatter less than declared.
+SIGNIFICANCE = 0.01
+#: Ratio of the scatter of repeats to the declared noise below which the noise is overstated: the
+#: declared variance is then more than four times as large as the measured one.
+OVERSTATED_BELOW = 0.5
+#: Smaller reading, as a fraction of the larger, from which a difference is also given in per cent:
+#: of a reading near zero, per cent say nothing.
+MIN_FRACTION_FOR_PERCENT = 0.1
+
+
+@dataclass(frozen=True)
+class RepeatComparison:
+    """How the readings of one channel differ between rows that are driven alike.
+
+    Attributes
+    ----------
+    channel
+        Name of the channel, such as ``torque``.
+    chi_square, degrees_of_freedom
+        Squared differences in units of their covariance, and their number.
+    p_value
+        Probability of a chi-square as large by chance.
+    worst_pair
+        The readings that differ most in standard deviations: two indices of the stacked readings.
+    worst_sigma
+        Their difference in standard deviations.
+    sentence
+        The worst pair in words and units.
+    """
+
+    channel: str
+    chi_square: float
+    degrees_of_freedom: int
+    p_value: float
+    worst_pair: tuple[int, int]
+    worst_sigma: float
+    sentence: str
+
+    @property
+    def disagree(self) -> bool:
+        """Whether the repeats differ by more than their covariance explains."""
+        return self.p_value < SIGNIFICANCE
+
+    @property
+    def scatter_ratio(self) -> float:
+        """Root mean square of the differences in standard deviations; 1 where they are noise."""
+        return float(np.sqrt(self.chi_square / self.degrees_of_freedom))
+
+
+def repeat_disagreement(
+    readings: Readings, covariance: Floats | None = None, expected: Floats | None = None
+) -> list[RepeatComparison]:
+    r"""Compare the readings of rows that are driven alike, channel by channel.
+
+    .. math:: \chi^2 = d^T (C V C^T)^{-1} d, \quad d = C (y - \hat y)
+
+    where the rows of C subtract the first reading of each group of repeats from its others.
+
+    Parameters
+    ----------
+    readings : Readings
+        m readings.
+    covariance : array (m, m), optional
+        V, of the readings: declared noise and usual scatter from run to run, as from
+        `usual_covariance`. The declared noise alone by default. Noise that was scaled up to fit
+        the residuals would hide a disagreement.
+    expected : array (m,), optional
+        Predictions, whose small differences within the tolerance of a repeat are subtracted.
+
+    Returns
+    -------
+    list of RepeatComparison
+        Of the channels with repeats, the least probable first.
+
+    References
+    ----------
+    Rao, Linear Statistical Inference and Its Applications, 2nd edition 1973, section 8b.
+    """
+    matrix = np.diag(readings.std**2) if covariance is None else covariance
+    value = readings.reading if expected is None else readings.reading - expected
+    alike = readings.driven_alike
+    found = []
+    for channel in range(len(readings.channels)):
+        contrasts = _contrasts(alike, readings.channel == channel)
+        if not len(contrasts):
+            continue
+        first, other = contrasts.T
+        difference = value[other] - value[first]
+        rows = matrix[other] - matrix[first]  # C V
+        chi_square = float(
+            difference @ np.linalg.solve(rows[:, other] - rows[:, first], difference)
+        )
+        pair, sigma = _worst_pair(alike, readings.channel == channel, value, matrix)
+        found.append(
+            RepeatComparison(
+                readings.channels[channel],
+                chi_square,
+                len(contrasts),
+                _chi_square_tail(chi_square, len(contrasts)),
+                pair,
+                sigma,
+                _pair_sentence(readings, *pair),
+            )
+        )
+    return sorted(found, key=lambda found: (found.p_value, -found.scatter_ratio))
+
+
+def usual_covariance(case: Case, readings: Readings) -> Floats:
+    """Covariance (m, m) of the declared noise and the usual scatter of the soil between runs."""
+    usual = VarianceComponents(
+        np.ones(len(readings.channels)),
+        RUN_EFFECT_UNITS["friction_angle"],
+        RUN_EFFECT_UNITS["bearing"],
+        0.0,
+    )
+    return assemble_covariance(readings, run_effect_columns(case, readings), usual).matrix
+
+
+def overstated_noise(readings: Readings) -> dict[str, float]:
+    """Channels whose declared noise is far above the scatter of repeated rows.
+
+    Returns the ratio of that scatter to the declared noise, by channel, where it is below
+    `OVERSTATED_BELOW` and not so by chance.
+    """
+    found = {}
+    for comparison in repeat_disagreement(readings):
+        by_chance = 1.0 - _chi_square_tail(comparison.chi_square, comparison.degrees_of_freedom)
+        if comparison.scatter_ratio < OVERSTATED_BELOW and by_chance < SIGNIFICANCE:
+            found[comparison.channel] = comparison.scatter_ratio
+    return found
+
+
+def overstated_noise_notes(readings: Readings) -> list[Remark]:
+    """A note on each channel whose declared noise is far above the scatter of repeated rows."""
+    return [
+        Remark(
+            "noise-overstated",
+            f"repeated rows of {column(name)} scatter by {ratio:.2g} times the declared noise: the "
+            "noise is overstated, which hides small disagreements",
+            (column(name),),
+        )
+        for name, ratio in overstated_noise(readings).items()
+    ]
+
+
+def _contrasts(alike: Integers, in_channel: NDArray[np.bool_]) -> Integers:
+    """The first reading of each group of repeats with each of its others, (k, 2)."""
+    pairs = []
+    for group in np.unique(alike[in_channel]):
+        own = np.flatnonzero(in_channel & (alike == group))
+        pairs += [(own[0], other) for other in own[1:]]
+    return np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _worst_pair(
+    alike: Integers, in_channel: NDArray[np.bool_], value: Floats, matrix: Floats
+) -> tuple[tuple[int, int], float]:
+    """The two repeats that differ most in standard deviations, and by how many."""
+    own = np.flatnonzero(in_channel)
+    first, second = np.triu_indices(len(own), 1)
+    same = alike[own[first]] == alike[own[second]]
+    i, j = own[first[same]], own[second[same]]
+    variance = np.diag(matrix)
+    squares = variance[i] + variance[j] - 2.0 * matrix[i, j]
+    sigma = np.abs(value[i] - value[j]) / np.sqrt(np.where(squares > 0.0, squares, np.inf))
+    worst = int(np.argmax(sigma))
+    return (int(i[worst]), int(j[worst])), float(sigma[worst])
+
+
+def _pair_sentence(readings: Readings, i: int, j: int) -> str:
+    """Two readings in words: where they were taken, their values and their difference."""
+    names = [readings.runs[readings.run[readings.row[k]]] for k in (i, j)]
+    quantity = QUANTITIES[readings.channels[readings.channel[i]]]
+    low, high = sorted((float(readings.reading[i]), float(readings.reading[j])), key=abs)
+    slip = float(np.mean(readings.slip[[i, j]]))
+    load = float(np.mean(readings.load[[i, j]]))
+    who = f"run {names[0]} and run {names[1]}"
+    if names[0] == names[1]:
+        who = f"two rows of run {names[0]}"
+    first, second = readings.reading[i], readings.reading[j]
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    text = (
+        f"{who} at slip {slip:.2f} under {load:.3g} N: {quantity.name.replace('_', ' ')} "
+        f"{first:.3g} and {second:.3g}{unit}, which differ by "
+    )
+    if high != 0.0 and low / high >= MIN_FRACTION_FOR_PERCENT:
+        return text + f"{high / low - 1.0:.0%}".replace("%", " %")
+    return text + f"{abs(first - second):.2g}{unit}"
+
+
+def _chi_square_tail(value: float, degrees_of_freedom: int) -> float:
+    """Probability that a chi-square variable is above a value."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(degrees_of_freedom, value))

@@ -1,0 +1,332 @@
+"""The result of a gap analysis and its entries; `gap.json` has their attributes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.physics.soils.soil_tests import SoilTest, deviations
+from soilml.remarks import Remark
+
+Floats = NDArray[np.float64]
+
+#: Metadata of a field that gap.json does not have: it stands in another file.
+ELSEWHERE = {"json": False}
+
+
+@dataclass(frozen=True)
+class EstimatedValue:
+    """An estimated parameter with its standard deviation."""
+
+    value: float
+    std: float
+    unit: str
+
+
+class BeforeAfter(NamedTuple):
+    """A figure of the soil alone, and with what was added."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that was added to the model, with its parameters and its alternatives."""
+
+    name: str
+    parameters: dict[str, EstimatedValue]
+    #: effects of the other explanations that the data do not reject
+    alternatives: tuple[str, ...]
+    #: sigma that distinguish the effect, at its size, from the soil and its nearest rival
+    separating_snr: float
+    nearest_rival: str
+    #: posterior probability that the effect is present, and the natural logarithm of its odds
+    probability: float
+    log_odds: float
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An explanation with its odds against all others, under the conditions of the report."""
+
+    effects: tuple[str, ...]
+    log_odds: float  # natural logarithm
+
+
+@dataclass(frozen=True)
+class RemainingDiscrepancy:
+    """Smooth discrepancy of a channel, root mean square over its readings, before and after."""
+
+    unit: str
+    before_value: float
+    after_value: float
+    before_sigma: float
+    after_sigma: float
+    #: where the discrepancy after is largest, in words
+    description: str
+
+
+@dataclass(frozen=True)
+class RegionScore:
+    """A region of the data with its score against the soil alone and its family-wise p value."""
+
+    channel: str
+    slip: tuple[float, float]
+    load_N: tuple[float, float]  # noqa: N815 - the name of the column
+    z: float
+    p: float
+
+
+@dataclass(frozen=True)
+class GapReduction:
+    """Mean squared standardised residual before and after, in all and by channel; noise gives 1."""
+
+    before: float
+    after: float
+    channels: dict[str, BeforeAfter]
+    readings: int
+    description: str
+
+
+@dataclass(frozen=True)
+class CandidateSummary:
+    """A candidate: predicted and achieved decrease of the objective, and its verdict."""
+
+    effects: tuple[str, ...]
+    predicted_gain: float
+    achieved_gain: float
+    excess: float  # objective above that of the best candidate
+    verdict: Remark
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """A proposed run or check, with the predictions of each explanation."""
+
+    kind: str
+    text: str
+    discrimination: float  # expected, in sigma, between the remaining explanations
+    #: operating points and predictions of each explanation
+    rows: tuple[dict[str, float | str], ...] = field(metadata=ELSEWHERE)
+    cost: float | None = None  # where costs are given, in their unit
+
+
+@dataclass(frozen=True)
+class ReadingsAndPredictions:
+    """Readings (m,) with the predictions before and after, for figures."""
+
+    channels: tuple[str, ...]
+    channel: NDArray[np.int64]
+    run: tuple[str, ...]  # of each reading
+    slip: Floats
+    load: Floats
+    reading: Floats
+    std: Floats
+    before: Floats
+    after: Floats
+    after_std: Floats
+    held_out: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SoilTestAgreement:
+    """A plate or shear test, and the same quantity by the soil before and after.
+
+    `sigma_before` and `sigma_after` are the distances in standard deviations of the logarithm.
+    """
+
+    label: str
+    unit: str
+    measured: float
+    before: float
+    after: float
+    sigma_before: float
+    sigma_after: float
+
+
+def soil_test_agreement(
+    case: Case, before: Mapping[str, EstimatedValue], after: Mapping[str, EstimatedValue]
+) -> list[SoilTestAgreement]:
+    """The agreement of each test of the case, with the soil's estimates by name."""
+
+    def distance(test: SoilTest, soil: Mapping[str, EstimatedValue]) -> float:
+        values = np.asarray([estimate.value for estimate in soil.values()])
+        return float(deviations([test], case.soil, list(soil), values)[0])
+
+    found = []
+    for test in case.soil_tests:
+        first, last = distance(test, before), distance(test, after)
+        found.append(
+            SoilTestAgreement(
+                label=test.label(),
+                unit=test.unit,
+                measured=test.measured,
+                before=test.measured * float(np.exp(first * test.scatter)),
+                after=test.measured * float(np.exp(last * test.scatter)),
+                sigma_before=first,
+                sigma_after=last,
+            )
+        )
+    return found
+
+
+#: Status of a report, and its meaning.
+STATUSES = {
+    "no-gap": "model and measurements agree within the noise",
+    "named": "exactly one explanation of the catalogue accounts for the gap",
+    "partly-named": "the evidence supports these effects; a smooth remainder is left unexplained",
+    "class": "several explanations account for the gap; these runs cannot distinguish them",
+    "form-open": "one effect accounts for the gap, with a law that differs from the catalogue's",
+    "suspected": "ranked suspects: no cause can be named",
+    "unknown": "there is a gap, and no effect of the catalogue explains it",
+    "undecided": "measurements disagree with each other more than their noise allows",
+    "not-testable": "there is a gap, but these runs cannot identify its cause",
+    "bad-data": "the data cannot be analysed",
+}
+
+
+@dataclass(frozen=True)
+class GapReport:
+    """The result of a gap analysis, made by `soilml.gap.gap`.
+
+    Attributes
+    ----------
+    status : str
+        One of `STATUSES`.
+    sentence : str
+        The verdict in one sentence.
+    model : Case
+        The fitted model; it contains an effect only where one is claimed.
+    effects : tuple of NamedEffect
+        The effects that were added.
+    cause_set : tuple of tuple of str
+        The explanations that the data do not reject, as sets of effect names, the best first.
+    probabilities : dict of float
+        Posterior probability of each tested effect.
+    suspects : tuple of Suspect
+        Explanations with their odds, the likeliest first, wherever there is a gap.
+    conditions : tuple of Remark
+        Conditions under which these odds are valid.
+    discrepancy : dict of RemainingDiscrepancy
+        Smooth discrepancy of each channel before and after, by column.
+    best_unclaimed : tuple of str
+        The explanation that is likeliest where no cause is claimed; it is not in `model`.
+    suspected_model : Case, optional
+        The model with the likeliest suspect, where the status is `suspected`.
+    reasons : tuple of Remark
+        Why no cause can be named, or why the data cannot be analysed.
+    where : tuple of RegionScore
+        Regions of the data, the largest disagreement first.
+    gap : dict of GapReduction
+        Figures of the fitted rows (`train`) and of held-out runs and regions, before and after
+        adding what is named or first among the suspects.
+    soil_before, soil_after : dict of EstimatedValue
+        Soil parameters without and with the added effects.
+    mimic_radius : float
+        Largest cosine between the signature of an added effect and that of another one.
+    next_runs : tuple of NextRun
+        Proposed runs and checks, the most discriminating first.
+    candidates : tuple of CandidateSummary
+        All fitted candidates, the best first.
+    untestable : dict of Remark
+        Why these runs cannot test an effect, by its name.
+    notes : tuple of Remark
+        What a reader should know of the data and of the fit.
+    not_claimed : tuple of Remark
+        Conclusions that the report does not support.
+    variance_components : dict of float
+        Estimated noise scales, run-to-run standard deviations and autocorrelation.
+    residual_trend : dict of float
+        Unexplained smooth trend by channel, in sigma.
+    p_gap, p_residual : float
+        Family-wise p values of the soil alone and of the best candidate.
+    """
+
+    status: str
+    sentence: str
+    model: Case = field(metadata=ELSEWHERE)
+    effects: tuple[NamedEffect, ...] = ()
+    cause_set: tuple[tuple[str, ...], ...] = ()
+    probabilities: dict[str, float] = field(default_factory=dict)
+    suspects: tuple[Suspect, ...] = ()
+    conditions: tuple[Remark, ...] = ()
+    discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
+    best_unclaimed: tuple[str, ...] = ()
+    suspected_model: Case | None = field(default=None, metadata=ELSEWHERE)
+    reasons: tuple[Remark, ...] = ()
+    where: tuple[RegionScore, ...] = ()
+    gap: dict[str, GapReduction] = field(default_factory=dict)
+    soil_before: dict[str, EstimatedValue] = field(default_factory=dict)
+    soil_after: dict[str, EstimatedValue] = field(default_factory=dict)
+    mimic_radius: float = 0.0
+    next_runs: tuple[NextRun, ...] = ()
+    candidates: tuple[CandidateSummary, ...] = ()
+    untestable: dict[str, Remark] = field(default_factory=dict)
+    notes: tuple[Remark, ...] = ()
+    not_claimed: tuple[Remark, ...] = ()
+    variance_components: dict[str, float] = field(default_factory=dict)
+    residual_trend: dict[str, float] = field(default_factory=dict)
+    p_gap: float = 1.0
+    p_residual: float = 1.0
+    seed: int = 0
+    curves: ReadingsAndPredictions | None = field(default=None, metadata=ELSEWHERE)
+
+    def plot(self, ax: Any = None, part: str = "train") -> Any:
+        """Draw the mean squared residuals of all readings and of each channel, before and after.
+
+        Parameters
+        ----------
+        ax
+            Axes of matplotlib; a new figure where None.
+        part
+            A key of `gap`: the fitted rows (`train`), or a held-out part.
+
+        Returns
+        -------
+        Axes
+
+        Raises
+        ------
+        InputError
+            For a part that the report does not have, or several axes.
+        """
+        from soilml.gap.report.gap_figure import plot_gap
+
+        return plot_gap(self.gap, ax, part)
+
+    @property
+    def soil_tests(self) -> list[SoilTestAgreement]:
+        """The tests of the model's soil, beside the soil before and after."""
+        return soil_test_agreement(self.model, self.soil_before, self.soil_after)
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of gap.json."""
+        from soilml import __version__
+
+        content: dict[str, Any] = as_json_entry(self)
+        return content | {
+            "soil_tests": as_json_entry(self.soil_tests),
+            "soilml_version": __version__,
+        }
+
+
+def as_json_entry(value: Any) -> Any:
+    """A result as JSON takes it: dataclasses by the names of their fields, tuples as lists."""
+    if isinstance(value, Remark):
+        return value.as_json()
+    if is_dataclass(value):
+        shown = [f for f in fields(value) if f.metadata.get("json", True)]
+        return {f.name: as_json_entry(getattr(value, f.name)) for f in shown}
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        value = value._asdict()
+    if isinstance(value, dict):
+        return {key: as_json_entry(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_json_entry(entry) for entry in value]
+    return value

@@ -1,0 +1,178 @@
+"""Candidate fits: effects by their catalogue law, and with the shape of that law estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.fitting.coordinates import EffectCoordinate, shape_coordinates
+from soilml.fitting.least_squares import Solution
+from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
+from soilml.numerics.subspaces import ROUNDING, column_space, project_out
+
+Floats = NDArray[np.float64]
+
+#: -2 ln of the prior odds of one effect: one in twenty, for a catalogue of about twenty.
+EFFECT_PENALTY = 2.0 * float(np.log(20.0))
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A set of effects with two fits: by their catalogue laws, and with shape coefficients free.
+
+    Both fits are the same one where no shape was estimated. The empty set is the soil alone.
+    """
+
+    names: tuple[str, ...]
+    catalogue_law: MarginalFit
+    free_law: MarginalFit
+    #: where the catalogue's law explains most under noise alone, as another start of the free law
+    noise_only: Solution | None = None
+
+    @property
+    def shape_supported(self) -> bool:
+        """Whether the data support another law than the catalogue's."""
+        return self.free_law.evidence.value < self.catalogue_law.evidence.value
+
+    @property
+    def best(self) -> MarginalFit:
+        """The fit of larger evidence."""
+        return self.free_law if self.shape_supported else self.catalogue_law
+
+    @property
+    def fit(self) -> Solution:
+        """The optimum of larger evidence."""
+        return self.best.fit
+
+    @property
+    def amplitude(self) -> Floats:
+        """Amplitude of the remaining discrepancy by channel, in usual ones."""
+        return self.best.evidence.amplitude
+
+    @property
+    def objective(self) -> float:
+        """-2 ln of the posterior probability, up to a constant that all candidates share."""
+        return self.best.evidence.value + EFFECT_PENALTY * len(self.names)
+
+    @property
+    def shape_deviation(self) -> float:
+        """Squared distance of the shapes from the catalogue's law, in prior variances."""
+        x, precision = self.fit.x, self.fit.precision
+        shapes = [
+            i
+            for i, c in enumerate(self.fit.coordinates)
+            if isinstance(c, EffectCoordinate) and c.is_shape
+        ]
+        return float(np.sum(x[shapes] ** 2 * precision[shapes]))
+
+
+@dataclass(frozen=True)
+class CandidateRequest:
+    """A set of effects to be fitted.
+
+    `start` holds coordinates by path, and `amplitude` those of the discrepancy by channel, to start
+    with. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
+    """
+
+    names: tuple[str, ...]
+    start: Mapping[str, float]
+    amplitude: Floats
+    noise_start: Mapping[str, float] | None = None
+
+
+def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[CandidateFit]:
+    """Fit sets of effects jointly with the soil, each effect by its catalogue law.
+
+    With `noise_start`, a set is also fitted under noise alone, and from there beside a discrepancy:
+    beside a large one, a fit can stay where the effect is not needed. Sets that the
+    model refuses are left out.
+    """
+    none = np.zeros(len(problem.readings.channels))
+    beside = [(_started(problem, r.names, r.start), r.amplitude) for r in requests]
+    alone = [
+        (_started(problem, r.names, r.noise_start), none)
+        for r in requests
+        if r.noise_start is not None
+    ]
+    marginal = iter(fit_marginal(problem, [*beside, *alone]))
+    found = [next(marginal) for _ in requests]
+    from_noise = [next(marginal) if r.noise_start is not None else None for r in requests]
+    candidates = []
+    for request, first, second in zip(requests, found, from_noise, strict=True):
+        best = _better(first, second)
+        if best is not None:
+            noise_only = second.first if second else None
+            candidates.append(CandidateFit(request.names, best, best, noise_only))
+    return candidates
+
+
+def _started(problem: FitProblem, names: tuple[str, ...], start: Mapping[str, float]) -> StartedFit:
+    coordinates = [*problem.soil, *problem.size_coordinates(names)]
+    return StartedFit(problem.with_effects(names), coordinates, start)
+
+
+def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFit | None:
+    """The fit of larger evidence."""
+    if first is None or second is None:
+        return first or second
+    return first if first.evidence.value <= second.evidence.value else second
+
+
+def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """The candidates with the shape coefficients of their effects estimated as well."""
+    started, index = [], []
+    none = np.zeros(len(problem.readings.channels))
+    for i, candidate in enumerate(candidates):
+        shapes = problem.shape_coordinates(candidate.names)
+        first = [(candidate.catalogue_law.fit, candidate.amplitude)]
+        if candidate.noise_only is not None:
+            first.append((candidate.noise_only, none))
+        for fit, amplitude in first if shapes else []:
+            coordinates = [*fit.coordinates, *shapes]
+            started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))
+            index.append(i)
+    free: dict[int, MarginalFit | None] = {}
+    lowest = min((c.best.evidence.value for c in candidates), default=np.inf)
+    for i, marginal in zip(index, fit_marginal(problem, started, lowest), strict=True):
+        free[i] = _better(free.get(i), marginal)
+    fitted = list(candidates)
+    for i, best in free.items():
+        if best is not None:
+            fitted[i] = replace(candidates[i], free_law=best)
+    return fitted
+
+
+def shape_directions(problem: FitProblem, fit: Solution) -> list[Floats]:
+    """Changes of the readings by second-order terms in the laws of a fit's effects, (m, k) each.
+
+    The signature of each size times s^2, s w or w^2, with log slip s and log load w centred, in the
+    readings' unit. The estimated shapes cover the first order alone.
+    """
+    signatures = [
+        fit.derivatives[:, i]
+        for i, c in enumerate(fit.coordinates)
+        if isinstance(c, EffectCoordinate)
+        and shape_coordinates(problem.effects[c.effect])
+        and not c.is_shape
+    ]
+    if not signatures:
+        return []
+    s, w = problem.readings.log_slip_and_load
+    s, w = s - s.mean(), w - w.mean()
+    columns = np.stack(signatures, axis=1)
+    return [columns * term[:, None] for term in (s * s, s * w, w * w)]
+
+
+def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
+    """Upper bound of the improvement by free shapes: linearised and without a prior."""
+    fit = candidate.catalogue_law.fit
+    whiten = problem.discrepancy.whiten(candidate.catalogue_law.evidence.amplitude)
+    signatures = fit.derivatives[:, len(problem.soil) :]
+    terms = (problem.readings.slip, *problem.readings.log_slip_and_load)
+    columns = np.column_stack([signatures * term[:, None] for term in terms])
+    projected = project_out(whiten @ columns, fit.jacobian)
+    basis = column_space(projected, relative_tolerance=ROUNDING)
+    return float(np.sum((basis.T @ fit.residual) ** 2))

@@ -1,0 +1,148 @@
+"""Screening: which single effects are fitted in full, by the gains that they should achieve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from soilml.fitting.least_squares import Solution
+from soilml.gap.evidence.directions import Signature
+from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.numerics.subspaces import ROUNDING, project_out
+
+
+def predicted_with_and_without(
+    problem: FitProblem, none: CandidateFit, soil: Solution, signatures: Sequence[Signature]
+) -> dict[str, float]:
+    """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
+
+    A discrepancy of large amplitude can hide an effect that explains nearly everything.
+    """
+    plain = MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
+    with_discrepancy, without = (
+        predicted_gains(problem, CandidateFit((), fit, fit), none.objective, signatures)
+        for fit in (none.best, plain)
+    )
+    return {name: max(gain, without[name]) for name, gain in with_discrepancy.items()}
+
+
+def predicted_gains(
+    problem: FitProblem,
+    candidate: CandidateFit,
+    objective: float,
+    signatures: Sequence[Signature],
+) -> dict[str, float]:
+    """Decrease of an objective by one more effect, linearised at a candidate, by effect name.
+
+    An effect whose size would have an impossible sign gains nothing.
+    """
+    gains = {}
+    for s in signatures:
+        evidence = problem.discrepancy.evidence(
+            candidate.fit, candidate.amplitude, s.column[:, None]
+        )
+        possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
+        value = evidence.value + EFFECT_PENALTY * (len(candidate.names) + 1)
+        gains[s.name] = objective - value if possible else -EFFECT_PENALTY
+    return gains
+
+
+def free_law_gains(
+    problem: FitProblem, candidate: CandidateFit, fit: Solution, signatures: Sequence[Signature]
+) -> dict[str, float]:
+    """Decrease of a fit's sum of squares by each effect with free shapes, linearised.
+
+    The discrepancy has the amplitudes of the candidate. The shapes have no prior, so that these
+    are upper bounds, by which effects are selected whose law is not the catalogue's.
+    """
+    whiten = problem.discrepancy.whiten(candidate.amplitude)
+    fit = fit.whitened_by(whiten)
+    slip, load = problem.readings.log_slip_and_load
+    gains = {}
+    for s in signatures:
+        columns = s.column[:, None] * np.column_stack([np.ones_like(slip), slip, load])
+        projected = project_out(whiten @ columns, fit.jacobian)
+        coefficient = np.linalg.lstsq(projected, fit.residual, rcond=ROUNDING)[0]
+        possible = s.sign == 0 or coefficient[0] * s.sign > 0.0
+        explained = float(np.sum((projected @ coefficient) ** 2))
+        gains[s.name] = explained if possible else 0.0
+    return gains
+
+
+def noise_only_gains(
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
+) -> dict[str, float]:
+    """Decrease of a fit's sum of squares by each effect under noise alone, linearised."""
+    whiten = problem.covariance.whiten
+    fit = fit.whitened_by(whiten)
+    gains = {}
+    for s in signatures:
+        column = project_out((whiten @ s.column)[:, None], fit.jacobian)[:, 0]
+        power = float(column @ column)
+        moment = float(column @ fit.residual)
+        possible = power > 0.0 and (s.sign == 0 or moment * s.sign > 0.0)
+        gains[s.name] = moment**2 / power if possible else 0.0
+    return gains
+
+
+#: Effects are selected if their predicted gain is within this margin of the largest, and so many of
+#: the largest in any case; the prediction is linear and can be wrong by that much.
+GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
+#: So many effects more: those that would explain most by a law of their own.
+FITTED_BY_OWN_LAW = 6
+#: Beside a large discrepancy, so many effects more: those that explain most under noise alone.
+FITTED_HIDDEN = 6
+#: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.
+LARGE_DISCREPANCY = 2.5
+#: Objective above that of the best candidate up to which shapes are estimated, sets extended, and
+#: effects fitted again in a further search.
+WITHIN_REACH = 15.0
+
+#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
+Starts = Mapping[tuple[str, ...], CandidateFit]
+
+
+def effects_to_fit(
+    problem: FitProblem,
+    none: CandidateFit,
+    soil: Solution,
+    signatures: Sequence[Signature],
+    gains: Mapping[str, float],
+    starts: Starts,
+) -> list[str]:
+    """Names of the effects that are fitted in full, each alone.
+
+    A prediction from the soil alone is linear, while the soil has adapted to what is missing and
+    the law of the cause may be another one. Several predictions are therefore made, and the best of
+    each are selected, together with those that were within reach of the best in an earlier search.
+
+    Parameters
+    ----------
+    none, soil : CandidateFit, Solution
+        The soil alone, beside a discrepancy and under noise alone.
+    gains : mapping
+        Predicted decrease of the objective by each effect.
+    """
+    selected = _largest_gains(gains)
+    ranked = [_first(free_law_gains(problem, none, f, signatures)) for f in (none.fit, soil)]
+    if float(none.amplitude.max()) >= LARGE_DISCREPANCY:
+        ranked.append(_first(noise_only_gains(problem, soil, signatures), FITTED_HIDDEN))
+    lowest = min((c.objective for c in starts.values()), default=0.0)
+    single = [c for names, c in starts.items() if len(names) == 1]
+    ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
+    names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
+    return [name for name in names if name in gains]
+
+
+def _largest_gains(gains: Mapping[str, float]) -> list[str]:
+    """Effects in order of their predicted gain, those within the margin of the largest."""
+    ordered = _first(gains, len(gains))
+    close = [name for name in ordered if gains[name] > gains[ordered[0]] - GAIN_MARGIN]
+    return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
+
+
+def _first(gains: Mapping[str, float], number: int = FITTED_BY_OWN_LAW) -> list[str]:
+    """The effects of the largest gains."""
+    return sorted(gains, key=lambda name: -gains[name])[:number]

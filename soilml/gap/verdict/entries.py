@@ -1,0 +1,367 @@
+"""Entries of a report that come from the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.fitting.coordinates import (
+    Coordinate,
+    EffectCoordinate,
+    SoilCoordinate,
+    predict_readings,
+)
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
+from soilml.gap.checks import ONE_LOAD
+from soilml.gap.evidence.covariance import FEW_RUNS
+from soilml.gap.evidence.directions import effect_signatures
+from soilml.gap.evidence.held_out import gap_reduction, held_out
+from soilml.gap.evidence.linearised_fit import AMPLITUDES
+from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
+from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.evidence.repeats import overstated_noise_notes
+from soilml.gap.report.results import (
+    CandidateSummary,
+    GapReduction,
+    NamedEffect,
+    ReadingsAndPredictions,
+    Suspect,
+)
+from soilml.gap.search.analysis import Analysis
+from soilml.gap.search.explanation import CandidateFit
+from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
+from soilml.gap.verdict.estimates import effect_estimates
+from soilml.numerics.subspaces import project_out
+from soilml.quantities import column
+from soilml.remarks import Remark
+from soilml.report.numbers import format_quantity
+
+#: Outliers that a note lists by name.
+LISTED_OUTLIERS = 6
+#: Suspects that are listed.
+LISTED_SUSPECTS = 8
+#: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
+AT_BOUND = 1e-3
+#: Factor on the declared noise above which a note is made.
+NOTABLE_NOISE_SCALE = 1.25
+
+
+def gap_reductions(
+    analysis: Analysis, soil: MarginalFit, after: MarginalFit, seed: int
+) -> dict[str, GapReduction]:
+    """Figures of the fitted rows and of cross-validation, as far as the runs allow it.
+
+    Before is the soil alone, fitted under noise and scatter; after is the explanation shown.
+    """
+    problem = analysis.problem
+    std = problem.covariance.std
+    before, new = soil.fit.prediction, after.fit.prediction
+    fitted = gap_reduction(problem.readings, std, before, new, "all rows fitted")
+    return {"train": fitted, **held_out(problem, soil, after, seed)}
+
+
+def soil_marginal(analysis: Analysis) -> MarginalFit:
+    """The soil alone under noise and scatter, without any discrepancy."""
+    soil = analysis.result.soil
+    none = np.zeros(len(analysis.problem.readings.channels))
+    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x)), none))
+
+
+def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
+    """The soil alone beside a smooth discrepancy, which model.toml has where nothing is claimed.
+
+    At the largest amplitude that is tried, a discrepancy of any size is cheap, and the soil would
+    go wherever the rest looks smoothest; it then stays where noise and scatter alone put it, as it
+    does where no gap was found.
+    """
+    problem, none = analysis.problem, analysis.result.none
+    if none is None:
+        return MarginalFit(analysis.result.soil, problem.discrepancy.evidence(analysis.result.soil))
+    if not none.amplitude.any():
+        return soil_marginal(analysis)
+    if none.amplitude.max() < AMPLITUDES[-1]:
+        return none.best
+    soil = analysis.result.soil
+    return MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
+
+
+#: Codes of the verdicts on candidates, where a cause is claimed and where none is, in words.
+_VERDICTS = {
+    "not-converged": ("fit did not converge: no evidence",) * 2,
+    "best": ("explains the data", "fits best, not claimed"),
+    "not-rejected": ("more effects than needed", "not rejected, not claimed"),
+    "rejected": ("rejected against the best",) * 2,
+}
+
+
+def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
+    """All fitted candidates, the best first; `claimed`: whether the report claims a cause."""
+    result = analysis.result
+    if result.none is None:
+        return []
+    lowest = min((c.objective for c in result.candidates if c.names), default=0.0)
+    accepted = {c.names for c in result.accepted}
+    summaries = []
+    for c in result.candidates:
+        if not c.names:
+            continue
+        if c.names in accepted:
+            code = "best"
+        elif not c.catalogue_law.fit.converged:
+            code = "not-converged"
+        elif c.objective <= lowest + REJECTION_THRESHOLD:
+            code = "not-rejected"
+        else:
+            code = "rejected"
+        single = len(c.names) == 1
+        summaries.append(
+            CandidateSummary(
+                effects=c.names,
+                predicted_gain=result.predicted_gain.get(c.names[0], 0.0) if single else np.nan,
+                achieved_gain=result.none.objective - c.objective,
+                excess=c.objective - lowest,
+                verdict=Remark(code, _VERDICTS[code][0 if claimed else 1], c.names, "note"),
+            )
+        )
+    return summaries
+
+
+def suspects(analysis: Analysis) -> list[Suspect]:
+    """Explanations with their odds against all others, the likeliest first."""
+    ranked = analysis.result.posterior.ranked()
+    return [Suspect(names, odds) for names, odds in ranked[:LISTED_SUSPECTS]]
+
+
+def conditions_of_suspects(
+    analysis: Analysis, naming_obstacles: Sequence[Remark]
+) -> tuple[Remark, ...]:
+    """The conditions under which the odds of suspects are valid."""
+    text = "no other cause than those of the catalogue has a similar signature"
+    conditions = [Remark("catalogue-complete", text)]
+    if len(analysis.problem.readings.runs) == 1:
+        conditions.append(Remark("one-bed", "the bed was the same for all rows"))
+    if any(obstacle.code == ONE_LOAD for obstacle in naming_obstacles):
+        text = "the soil parameters lie inside their priors, because one load cannot test them"
+        conditions.append(Remark("inside-priors", text))
+    return tuple(conditions)
+
+
+def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
+    """The explanations to distinguish: those not rejected, or the best one and its runner-up."""
+    accepted = [c for c in analysis.result.accepted if c.names]
+    others = [c for c in analysis.result.candidates if c.names and c not in accepted]
+    if len(accepted) > 1:
+        return accepted
+    rivals = [c for c in others if not accepted or not set(accepted[0].names) < set(c.names)]
+    return [*accepted, *rivals][:2] if accepted else rivals[:3]
+
+
+def analysis_notes(
+    analysis: Analysis, after: Solution, shown: Solution, replicates: Sequence[Remark]
+) -> list[Remark]:
+    """Notes on outliers, estimates at a bound, sizes, repeats, noise and run-to-run variation.
+
+    `after` is the fit that model.toml contains, `shown` that of the explanation whose figures are
+    shown; `replicates` says which repeats disagree.
+    """
+    readings = analysis.problem.readings
+    components = analysis.problem.covariance.components
+    notes = []
+    if count := len(analysis.outliers):
+        listed = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
+        many = (
+            f"{count} readings are outliers and were"
+            if count > 1
+            else "1 reading is an outlier and was"
+        )
+        notes.append(Remark("outliers", f"{many} excluded: {listed}", analysis.outliers))
+    soil = analysis.result.soil
+    far = disagreeing_soil_tests(soil.case, soil.values()) if analysis.result.has_gap else []
+    notes += [
+        Remark(
+            "soil-test",
+            f"with the soil alone, the rows disagree with a test of the soil: {text}; part of the "
+            "gap lies there, unless the test was made on another soil",
+        )
+        for text in far
+    ]
+    notes += _bound_notes(after.coordinates, after.x.tolist())
+    notes += size_notes(shown.coordinates, shown.x.tolist())
+    for name, scale in zip(readings.channels, components.noise_scale, strict=True):
+        if scale > NOTABLE_NOISE_SCALE:
+            text = f"the noise of {column(name)} is {scale:.2g} times as large as declared"
+            notes.append(Remark("noise-scaled", text, (column(name),)))
+    notes += overstated_noise_notes(readings)
+    notes += [replace(r, text=f"replicate rows disagree: {r}") for r in replicates]
+    if 1 < len(readings.runs) < FEW_RUNS:
+        text = (
+            f"run-to-run variation of the soil cannot be estimated from fewer than {FEW_RUNS} "
+            f"runs: {np.degrees(components.friction_angle_std):.2g} deg of friction angle and "
+            f"{components.bearing_std:.0%} of bearing strength are assumed, so mean squared "
+            "residuals may be below 1"
+        )
+        notes.append(Remark("few-runs", text, severity="note"))
+    if components.autocorrelation > 0.0:
+        text = (
+            "the noise of neighbouring samples of a run is correlated "
+            f"({components.autocorrelation:.2g}), which reduces their weight"
+        )
+        notes.append(Remark("autocorrelated", text, severity="note"))
+    return notes
+
+
+def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
+    notes = []
+    for c, value in zip(coordinates, x, strict=True):
+        if isinstance(c, SoilCoordinate):
+            if min(value, 1.0 - value) < AT_BOUND:
+                notes.append(Remark("at-bound", f"{c.path} is at a bound of its prior", (c.path,)))
+        elif value > c.upper - AT_BOUND * (c.upper - c.lower):
+            notes.append(Remark("at-bound", f"{c.path} is at its upper bound", (c.path,)))
+    return notes
+
+
+def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
+    """Notes on effects that would have to be far larger than they usually are."""
+    notes = []
+    for c, size in zip(coordinates, x, strict=True):
+        if isinstance(c, EffectCoordinate) and not c.is_shape and abs(size) > LARGEST_SIZE:
+            value, usual = c.prior.at(np.asarray([size, 1.0]))
+            text = (
+                f"{c.name} of {c.effect} would have to be {format_quantity(value, c.unit)}, "
+                f"{abs(size):.3g} times its usual size ({format_quantity(usual, c.unit)}): the law "
+                "of the catalogue does not explain the gap by an effect of plausible size"
+            )
+            notes.append(Remark("implausible-size", text, (c.effect,)))
+    return notes
+
+
+def variance_component_entries(analysis: Analysis) -> dict[str, float]:
+    """The variance components by their names in gap.json."""
+    channels = analysis.problem.readings.channels
+    components = analysis.problem.covariance.components
+    scales = {
+        f"noise_scale_{column(name)}": float(scale)
+        for name, scale in zip(channels, components.noise_scale, strict=True)
+    }
+    return scales | {
+        "friction_angle_std": components.friction_angle_std,
+        "bearing_std": components.bearing_std,
+        "autocorrelation": components.autocorrelation,
+    }
+
+
+def readings_and_predictions(analysis: Analysis, after: Solution) -> ReadingsAndPredictions:
+    """Readings, predictions before and after, and the standard deviations of both."""
+    problem, readings = analysis.problem, analysis.problem.readings
+    jacobian = after.derivatives
+    variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
+    prediction = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
+    return ReadingsAndPredictions(
+        channels=tuple(column(n) for n in readings.channels),
+        channel=readings.channel,
+        run=tuple(readings.runs[readings.run[r]] for r in readings.row),
+        slip=readings.slip,
+        load=readings.load,
+        reading=readings.reading,
+        std=problem.covariance.std,
+        before=analysis.result.soil.prediction,
+        after=prediction,
+        after_std=np.sqrt(np.maximum(variance, 0.0)),
+        held_out=np.zeros(len(readings), dtype=np.bool_),
+    )
+
+
+Floats = NDArray[np.float64]
+
+
+def named_effects(
+    accepted: Sequence[CandidateFit],
+    fit: Solution,
+    similarity: SignatureSimilarity,
+    posterior: Posterior,
+) -> list[NamedEffect]:
+    """The effects of the best candidate, with the effects of the other accepted candidates.
+
+    `fit` is that of the best candidate, with its intervals.
+    """
+    best = accepted[0]
+    alternatives = {n for c in accepted[1:] for n in c.names} - set(best.names)
+    effects = []
+    for name in best.names:
+        snr, rival = similarity.separation(name, _size(best.fit, name))
+        estimates = effect_estimates(fit, name)
+        effects.append(
+            NamedEffect(
+                name,
+                estimates,
+                tuple(sorted(alternatives)),
+                snr,
+                rival,
+                posterior.probability(name),
+                posterior.effect_log_odds(name),
+            )
+        )
+    return effects
+
+
+def _size(fit: Solution, effect: str) -> float:
+    """Size of an effect in reference sizes; its coordinate precedes those of its shape."""
+    for c, x in zip(fit.coordinates, fit.x, strict=True):
+        if isinstance(c, EffectCoordinate) and c.effect == effect:
+            return float(x)
+    return 0.0
+
+
+@dataclass(frozen=True)
+class SignatureSimilarity:
+    """Norms (sigma) and cosines of the catalogue's signatures, with the soil projected out."""
+
+    names: tuple[str, ...]
+    norm: Floats  # (k,)
+    cosine: Floats  # (k, k), absolute, with a zero diagonal
+
+    def separation(self, name: str, size: float) -> tuple[float, str]:
+        """Separating signal-to-noise ratio of an effect at a size, and its nearest rival.
+
+        Norm of the effect's projected signature times the sine of the angle to the nearest
+        rival's, in sigma; `size` is in reference sizes.
+        """
+        if name not in self.names:
+            return 0.0, ""
+        i = self.names.index(name)
+        rival = int(np.argmax(self.cosine[i]))
+        sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
+        return abs(size) * float(self.norm[i]) * sine, self.names[rival]
+
+    def largest_cosine(self, names: Sequence[str]) -> float:
+        """Largest cosine between the signature of one of these effects and that of another."""
+        chosen = np.isin(self.names, names)
+        if not chosen.any() or chosen.all():
+            return 0.0
+        return float(self.cosine[chosen][:, ~chosen].max())
+
+
+def signature_similarity(
+    problem: FitProblem, fit: Solution, amplitude: Floats
+) -> SignatureSimilarity:
+    """Similarity of the catalogue's signatures beside a discrepancy, on the soil of a fit.
+
+    `amplitude` is that of the remaining discrepancy by channel, in usual ones.
+    """
+    whiten = problem.discrepancy.whiten(amplitude)
+    values = fit.values()
+    soil = {c.path: values[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
+    case = problem.case.with_values(soil)
+    signatures, _ = effect_signatures(case, problem.readings, problem.effects)
+    columns = whiten @ np.stack([s.column for s in signatures], axis=1)
+    columns = project_out(columns, whiten @ fit.derivatives[:, : len(problem.soil)])
+    norm = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(norm > 0, norm, 1.0)
+    cosine = np.abs(unit.T @ unit)
+    np.fill_diagonal(cosine, 0.0)
+    return SignatureSimilarity(tuple(s.name for s in signatures), norm, cosine)
