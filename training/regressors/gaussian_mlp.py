@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_regressor import (
-    GaussianHead,
-    GaussianRegressor,
-    Progress,
-    validate_training_data,
-)
-from training.regressors.standardisation import Standardisation
-from training.regressors.tanh_network import TanhNetwork
+from training.regressors.gaussian_regressor import GaussianRegressor, Progress
+from training.regressors.tanh_network import TanhNetwork, evaluate_layers, layer_pairs
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -87,37 +81,19 @@ class GaussianMLP(GaussianRegressor):
         self.validation = validation
         self.random_state = random_state
 
-    def fit(self, X: Any, y: Any) -> GaussianMLP:
-        """Fit rows X (n, d) to y (n,) or (n, q); a share of them is used for early stopping."""
-        return self._fit(X, y, None, lambda epoch, epochs: None)
+    def _set_aside(self, X: Floats, Y: Floats) -> tuple[Floats, Floats, Any]:
+        """A share of the rows is for early stopping."""
+        order = np.random.default_rng(self.random_state).permutation(len(X))
+        cut = max(int(self.validation * len(X)), 1)
+        return X[order[cut:]], Y[order[cut:]], (X[order[:cut]], Y[order[:cut]])
 
-    def fit_with_validation(
-        self, X: Floats, y: Floats, validation: tuple[Floats, Floats], progress: Progress
-    ) -> GaussianMLP:
-        """Fit rows X (n, d) to y (n,) or (n, q), with separate validation rows (X, y)."""
-        return self._fit(X, y, validation, progress)
-
-    def _fit(
-        self, X: Any, y: Any, validation: tuple[Floats, Floats] | None, progress: Progress
-    ) -> GaussianMLP:
-        X, Y, one_output = validate_training_data(self, X, y)
-        if validation is None:
-            order = np.random.default_rng(self.random_state).permutation(len(X))
-            cut = max(int(self.validation * len(X)), 1) if len(X) > 1 else 0
-            validation = (X[order[:cut]], Y[order[:cut]]) if cut else (X, Y)
-            X, Y = X[order[cut:]], Y[order[cut:]]
-        self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
-        standardised = (
-            self.x_scaling_.apply(validation[0]),
-            self.y_scaling_.apply(validation[1].reshape(len(validation[1]), -1)),
-        )
-        x = self.x_scaling_.apply(X)
+    def _fit_standardised(
+        self, x: Floats, z: Floats, validation: tuple[Floats, Floats] | None, progress: Progress
+    ) -> Floats:
         # one thread: sums in a fixed order; a step that is too long ends in infinities
         with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore"):
-            self._minimise(x, self.y_scaling_.apply(Y), standardised, progress)
-        log_variance = self._standardised_outputs(x)[1]
-        self.head_ = GaussianHead.of(self.y_scaling_, log_variance, one_output)
-        return self
+            self._minimise(x, z, validation or (x, z), progress)
+        return self._standardised_outputs(x)[1]
 
     def _minimise(
         self, x: Floats, z: Floats, validation: tuple[Floats, Floats], progress: Progress
@@ -156,27 +132,16 @@ class GaussianMLP(GaussianRegressor):
                     break
 
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        h = x
-        for weights, bias in self._layer_pairs()[:-1]:
-            h = np.tanh(h @ weights + bias)
-        weights, bias = self._layer_pairs()[-1]
-        both = h @ weights + bias
+        both = evaluate_layers(self.layers_, x)
         q = both.shape[1] // 2
         return both[:, :q], both[:, q:]
 
-    def _layer_pairs(self) -> list[tuple[Floats, Floats]]:
-        return list(zip(self.layers_[0::2], self.layers_[1::2], strict=True))
-
-    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
-        """Add the fitted layers to an ONNX graph; names of mean and std, (n, q)."""
-        h = graph.scaled(features, self.x_scaling_.mean, self.x_scaling_.scale)
-        for weights, bias in self._layer_pairs()[:-1]:
-            h = graph.op("Tanh", graph.affine(h, weights, bias))
-        weights, bias = self._layer_pairs()[-1]
-        both = graph.affine(h, weights, bias)
-        q = weights.shape[1] // 2
-        mean, log_variance = graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
-        return self.head_.add_to_graph(graph, mean, log_variance)
+    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
+        *inner, (weights, bias) = layer_pairs(self.layers_)
+        for inner_weights, inner_bias in inner:
+            x = graph.op("Tanh", graph.affine(x, inner_weights, inner_bias))
+        both, q = graph.affine(x, weights, bias), weights.shape[1] // 2
+        return graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
 
     def fitted_settings(self) -> str:
         """Layer widths, and epochs until training stopped."""

@@ -22,13 +22,6 @@ Progress = Callable[[int, int], None]
 TAIL = 0.001
 
 
-def validate_training_data(regressor: Any, X: Any, y: Any) -> tuple[Floats, Floats, bool]:
-    """X (n, d), y as (n, q), and whether y was (n,); raises `ValueError` as scikit-learn does."""
-    rules = {"multi_output": True, "y_numeric": True, "dtype": np.float64, "ensure_min_samples": 2}
-    X, y = validate_data(regressor, X, y, **rules)
-    return X, y.reshape(len(y), -1).astype(np.float64), y.ndim == 1
-
-
 @dataclass(frozen=True)
 class GaussianHead:
     """Converts standardised outputs to mean and standard deviation in the units of y.
@@ -83,7 +76,7 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     """Base of the regressors: mean and log-variance of standardised outputs.
 
     A subclass has a `type_name` for the spec, hyperparameters as keyword arguments of `__init__`,
-    `fit`, which sets the attributes below, `_standardised_outputs` and `add_to_graph`.
+    and the three abstract methods, which know standardised inputs (n, d) and outputs (n, q) alone.
 
     Attributes
     ----------
@@ -102,16 +95,57 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     head_: GaussianHead
 
     @abstractmethod
-    def fit(self, X: Any, y: Any) -> Self:
-        """Fit rows X (n, d) to y (n,) or (n, q)."""
+    def _fit_standardised(
+        self, x: Floats, z: Floats, validation: tuple[Floats, Floats] | None, progress: Progress
+    ) -> Floats:
+        """Fit inputs x to outputs z; the log-variances (k, q) of training rows."""
 
     @abstractmethod
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
-        """Mean and log-variance (n, q) of standardised outputs, from standardised inputs (n, d)."""
+        """Mean and log-variance (n, q)."""
 
     @abstractmethod
+    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
+        """Add the same to an ONNX graph: names of mean and log-variance (n, q)."""
+
+    def _set_aside(self, X: Floats, Y: Floats) -> tuple[Floats, Floats, Any]:
+        """Training rows and validation rows of a fit without separate ones; here none."""
+        return X, Y, None
+
+    def _input_factor(self) -> float:
+        """Factor on standardised inputs in the graph."""
+        return 1.0
+
+    def fit(self, X: Any, y: Any) -> Self:
+        """Fit rows X (n, d) to y (n,) or (n, q)."""
+        return self.fit_with_validation(X, y, None, lambda done, total: None)
+
+    def fit_with_validation(
+        self, X: Any, y: Any, validation: tuple[Floats, Floats] | None, progress: Progress
+    ) -> Self:
+        """Fit rows X (n, d) to y (n,) or (n, q), with validation rows (X, y) where that is useful.
+
+        They select hyperparameters, or stop the training early.
+        """
+        rules = {"multi_output": True, "y_numeric": True, "ensure_min_samples": 2}
+        X, y = validate_data(self, X, y, dtype=np.float64, **rules)
+        Y = y.reshape(len(y), -1).astype(np.float64)
+        if validation is None:
+            X, Y, validation = self._set_aside(X, Y)
+        self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
+        x, z = self.x_scaling_.apply(X), self.y_scaling_.apply(Y)
+        if validation is not None:
+            truth = validation[1].reshape(len(validation[1]), -1)
+            validation = (self.x_scaling_.apply(validation[0]), self.y_scaling_.apply(truth))
+        log_variances = self._fit_standardised(x, z, validation, progress)
+        self.head_ = GaussianHead.of(self.y_scaling_, log_variances, y.ndim == 1)
+        return self
+
     def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
         """Add the fitted regressor to an ONNX graph; names of mean and std, (n, q)."""
+        scale = self.x_scaling_.scale / self._input_factor()
+        x = graph.scaled(features, self.x_scaling_.mean, scale)
+        return self.head_.add_to_graph(graph, *self._add_standardised_outputs(graph, x))
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict rows X (n, d).
@@ -126,12 +160,6 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         X = validate_data(self, X, reset=False, dtype=np.float64)
         outputs = self._standardised_outputs(self.x_scaling_.apply(X))
         return self.head_.to_original_units(*outputs, return_std)
-
-    def fit_with_validation(
-        self, X: Floats, y: Floats, validation: tuple[Floats, Floats], progress: Progress
-    ) -> Self:
-        """Fit, where useful with validation rows (X, y) for early stopping; here without them."""
-        return self.fit(X, y)
 
     def requirements(self, rows: int, inputs: int, outputs: int) -> Requirements | None:
         """What a fit to so many rows takes; None where that is little."""

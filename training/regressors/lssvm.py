@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar, Self, final
+from typing import Any, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,8 @@ from numpy.typing import NDArray
 from training.onnx_graph.builder import Graph
 from training.regressors.exact_solution import ExactSolution
 from training.regressors.fixed_size_solution import FixedSizeSolution
-from training.regressors.gaussian_regressor import (
-    GaussianHead,
-    GaussianRegressor,
-    Progress,
-    Requirements,
-    validate_training_data,
-)
+from training.regressors.gaussian_regressor import GaussianRegressor, Progress, Requirements
 from training.regressors.rbf_expansion import Expansion, rbf
-from training.regressors.standardisation import Standardisation
 
 Floats = NDArray[np.float64]
 
@@ -43,29 +36,11 @@ class KernelExpansion(GaussianRegressor):
         """The solution that is used for a number of training rows."""
 
     @final
-    def fit(self, X: Any, y: Any) -> Self:
-        """Fit rows X (n, d) to y (n,) or (n, q); hyperparameters are selected by leave-one-out."""
-        return self._fit(X, y, None, lambda done, total: None)
-
-    @final
-    def fit_with_validation(
-        self, X: Floats, y: Floats, validation: tuple[Floats, Floats], progress: Progress
-    ) -> Self:
-        """Fit rows X (n, d) to y (n,) or (n, q); validation rows select the hyperparameters."""
-        return self._fit(X, y, validation, progress)
-
-    def _fit(
-        self, X: Any, y: Any, validation: tuple[Floats, Floats] | None, progress: Progress
-    ) -> Self:
-        X, Y, one_output = validate_training_data(self, X, y)
-        self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
-        x, z = self.x_scaling_.apply(X), self.y_scaling_.apply(Y)
-        if validation is not None:
-            truth = validation[1].reshape(len(validation[1]), -1)
-            validation = (self.x_scaling_.apply(validation[0]), self.y_scaling_.apply(truth))
+    def _fit_standardised(
+        self, x: Floats, z: Floats, validation: tuple[Floats, Floats] | None, progress: Progress
+    ) -> Floats:
         self.expansion_ = self.solution_for(len(x)).solve(x, z, validation, progress)
-        self.head_ = GaussianHead.of(self.y_scaling_, self.expansion_.log_variances, one_output)
-        return self
+        return self.expansion_.log_variances
 
     @final
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
@@ -80,20 +55,20 @@ class KernelExpansion(GaussianRegressor):
         return mean + found.bias, log_variance + found.log_variance_bias
 
     @final
-    def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
-        """Add the regressor to an ONNX graph in float64; names of mean and std, (n, q)."""
+    def _input_factor(self) -> float:
+        """With x and centres divided by sqrt(2) width the kernel is exp(-|x - c|^2)."""
+        return float(1.0 / (np.sqrt(2.0) * self.expansion_.width))
+
+    @final
+    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
         found = self.expansion_
-        # with x and centres divided by sqrt(2) width the kernel is exp(-|x - c|^2)
-        factor = 1.0 / (np.sqrt(2.0) * found.width)
-        x = graph.scaled(features, self.x_scaling_.mean, self.x_scaling_.scale / factor)
-        squared = graph.squared_distances(x, found.centres * factor)
+        squared = graph.squared_distances(x, found.centres * self._input_factor())
         kernel = graph.op("Exp", graph.op("Neg", squared))
         q = found.alpha.shape[1]
         weights = np.hstack([found.alpha, found.log_variance_alpha])
         bias = np.concatenate([found.bias, found.log_variance_bias])
         both = graph.affine(kernel, weights, bias)
-        mean, log_variance = graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
-        return self.head_.add_to_graph(graph, mean, log_variance)
+        return graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
 
     @final
     def requirements(self, rows: int, inputs: int, outputs: int) -> Requirements:

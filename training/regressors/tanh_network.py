@@ -109,6 +109,19 @@ class TanhNetwork:
         self._flat -= scratch
 
 
+def layer_pairs(layers: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
+    """Weights and bias of each layer, of `TanhNetwork.layers`."""
+    return list(zip(layers[0::2], layers[1::2], strict=True))
+
+
+def evaluate_layers(layers: Sequence[Floats], x: Floats) -> Floats:
+    """Outputs (n, q) of inputs (n, d) in double precision, by `TanhNetwork.layers`."""
+    *inner, (last_weights, last_bias) = layer_pairs(layers)
+    for weights, bias in inner:
+        x = np.tanh(x @ weights + bias)
+    return np.asarray(x @ last_weights + last_bias)
+
+
 def _views(flat: Singles, shapes: Sequence[tuple[int, ...]]) -> list[tuple[Singles, Singles]]:
     """Weights and biases of each layer as parts of a vector."""
     ends = np.cumsum([int(np.prod(shape)) for shape in shapes])

@@ -17,7 +17,7 @@ from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
-from training.regressors.tanh_network import TanhNetwork
+from training.regressors.tanh_network import TanhNetwork, evaluate_layers
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
@@ -138,12 +138,8 @@ class Response:
 
     def coefficients(self, features: Floats) -> Floats:
         """Coefficients (n, terms, channels) at features (n, f)."""
-        h = self.scaling.apply(features)
-        pairs = list(zip(self.layers[0::2], self.layers[1::2], strict=True))
-        for weights, bias in pairs[:-1]:
-            h = np.tanh(h @ weights + bias)
-        weights, bias = pairs[-1]
-        return np.asarray(h @ weights + bias).reshape(len(features), len(self.terms), -1)
+        found = evaluate_layers(self.layers, self.scaling.apply(features))
+        return found.reshape(len(features), len(self.terms), -1)
 
     def predict(self, features: Floats, x: Floats) -> Floats:
         """Channels (n, m, channels) at features (n, f) and coordinates (n, m, p) or (m, p)."""

@@ -38,36 +38,31 @@ def ints(*numbers):
 
 
 #: Operators of one number of any sign.
-ANY = """Abs Asinh Atan Ceil Cos Cosh Erf Exp Floor Identity Neg Reciprocal Relu Round Sigmoid Sign
-Sin Sinh Softplus Tan Tanh"""
+ANY = """Abs Asinh Atan Ceil Cos Cosh Erf Exp Floor Identity Neg Reciprocal Relu Round Sigmoid Sin
+Sinh Tan Tanh"""
 ONE = {
     **dict.fromkeys(("Log", "Sqrt", "Acosh"), BIG),
     **dict.fromkeys(("Acos", "Asin", "Atanh"), UNIT),
     **dict.fromkeys(ANY.split(), A),
 }
-ONES = numpy_helper.from_array(np.ones(1, np.float32))
 #: Name, operator, inputs that are given at run time, constants that follow them, attributes.
 CASES = [
     *((name.lower(), name, [x], [], {}) for name, x in ONE.items()),
     *((op.lower(), op, [A, B], [], {}) for op in ("Add", "Sub", "Mul", "Div", "Max", "Min")),
     *((op.lower(), op, [A, B], [], {}) for op in ("Equal", "Greater", "GreaterOrEqual", "Less")),
-    *((op.lower(), op, [TRUE, OTHER], [], {}) for op in ("And", "Or", "Xor")),
+    *((op.lower(), op, [TRUE, OTHER], [], {}) for op in ("And", "Or")),
     ("less or equal", "LessOrEqual", [A, A[:1]], [], {}),
     ("broadcast", "Add", [values(3, 1, 2), values(4, 1)], [], {}),
     ("max of three", "Max", [A, B, BIG], [], {}),
     ("largest with nan", "Max", [ODD, values(1, 4)], [], {}),
     ("smallest with nan", "Min", [ODD, values(1, 4)], [], {}),
     ("sum", "Sum", [A, B, BIG], [], {}),
-    ("mean", "Mean", [A, B, BIG], [], {}),
     ("not", "Not", [TRUE], [], {}),
     ("square", "Pow", [A], [np.float32(2.0)], {}),
     ("power", "Pow", [BIG, A], [], {}),
     ("clip", "Clip", [A], [np.float32(-0.5), np.float32(0.7)], {}),
     ("clip below", "Clip", [A], [np.float32(-0.5)], {}),
     ("where", "Where", [TRUE, A, B], [], {}),
-    ("is nan", "IsNaN", [ODD], [], {}),
-    ("is infinite", "IsInf", [ODD], [], {}),
-    ("is minus infinite", "IsInf", [ODD], [], {"detect_positive": 0}),
     ("to double", "Cast", [A], [], {"to": TensorProto.DOUBLE}),
     ("to int", "Cast", [A], [], {"to": TensorProto.INT32}),
     ("to bool", "Cast", [np.floor(A)], [], {"to": TensorProto.BOOL}),
@@ -80,8 +75,6 @@ CASES = [
     ),
     ("reduce outer axes", "ReduceSum", [CUBE], [ints(0, 2)], {"keepdims": 0}),
     ("softmax", "Softmax", [A], [], {"axis": 1}),
-    ("cumulative sum", "CumSum", [A], [ints(1)], {}),
-    ("cumulative sum down", "CumSum", [CUBE], [ints(1)], {}),
     ("matmul", "MatMul", [values(5, 7), values(7, 70)], [], {}),
     ("matmul of a batch", "MatMul", [values(2, 3, 5, 4), values(3, 4, 6)], [], {}),
     ("matrix by vector", "MatMul", [values(3, 4), values(4)], [], {}),
@@ -105,18 +98,12 @@ CASES = [
     ("squeeze", "Squeeze", [values(1, 3, 1)], [], {}),
     ("squeeze one", "Squeeze", [values(1, 3, 1)], [ints(-1)], {}),
     ("unsqueeze", "Unsqueeze", [A], [ints(0, 3)], {}),
-    ("flatten", "Flatten", [CUBE], [], {"axis": 2}),
-    ("dropout", "Dropout", [A], [], {}),
     ("shape", "Shape", [CUBE], [], {}),
-    ("size", "Size", [CUBE], [], {}),
     ("top", "TopK", [CUBE], [ints(3)], {"axis": 2}),
-    ("bottom", "TopK", [CUBE], [ints(2)], {"largest": 0}),
     ("compress", "Compress", [A, TRUE[:, 0]], [], {"axis": 0}),
-    ("largest index", "ArgMax", [CUBE], [], {"axis": 2}),
-    ("smallest index", "ArgMin", [CUBE], [], {"axis": 2, "keepdims": 0}),
 ]  # fmt: skip
 #: Outputs of a node: one unless named here.
-OUTPUTS = {"split": 2, "split by lengths": 2, "top": 2, "bottom": 2}
+OUTPUTS = {"split": 2, "split by lengths": 2, "top": 2}
 #: ONNX's own element type of whole numbers that C has as int.
 PASSED = {"int64": np.int32, "float32": np.float32, "float64": np.float64, "bool": np.bool_}
 
@@ -224,7 +211,7 @@ def test_as_onnxruntime(case, compiled):
 
 
 def test_every_operator_has_a_case():
-    assert {case[1] for case in CASES} | {"ConstantOfShape"} == set(OPERATORS)
+    assert {case[1] for case in CASES} == set(OPERATORS)
 
 
 def test_sizes_may_vary(tmp_path):
@@ -234,7 +221,7 @@ def test_sizes_may_vary(tmp_path):
     weights = values(4, 6)
     nodes = [
         helper.make_node("Shape", ["x"], ["size"], end=1),
-        helper.make_node("ConstantOfShape", ["size"], ["ones"], value=ONES),
+        helper.make_node("Expand", ["unit", "size"], ["ones"]),
         helper.make_node("Unsqueeze", ["ones", "one"], ["column"]),
         helper.make_node("Concat", ["x", "column"], ["wide"], axis=1),
         helper.make_node("Compress", ["wide", "chosen"], ["few"], axis=0),
@@ -250,7 +237,8 @@ def test_sizes_may_vary(tmp_path):
         [helper.make_tensor_value_info("x", 1, ["rows", 3]),
          helper.make_tensor_value_info("chosen", 9, ["rows"])],
         [helper.make_tensor_value_info(n, 1, None) for n in ("y", "total", "count")],
-        [numpy_helper.from_array(weights, "w"), numpy_helper.from_array(ints(1), "one"),
+        [numpy_helper.from_array(weights, "w"),
+         numpy_helper.from_array(np.ones(1, np.float32), "unit"), numpy_helper.from_array(ints(1), "one"),
          numpy_helper.from_array(ints(-1, 2), "flat")],
     )  # fmt: skip
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
@@ -278,8 +266,7 @@ def test_sizes_may_vary(tmp_path):
         ("Einsum", [A, B], [], {"equation": "ij,ij->i"}, "operator Einsum is not known"),
         ("Softmax", [A], [], {"axis": 0}, "Softmax along another axis"),
         ("Slice", [A], [ints(0), ints(4), ints(0), ints(2)], {}, "Slice with steps"),
-        ("TopK", [A], [ints(2)], {"axis": 0}, "TopK along another axis"),
-        ("CumSum", [A], [ints(1)], {"reverse": 1}, "CumSum with exclusive or reverse"),
+        ("TopK", [A], [ints(2)], {"axis": 0}, "TopK of least values"),
         ("Cast", [A], [], {"to": TensorProto.FLOAT16}, "element type 10"),
         ("Reshape", [A, ints(2, 6)], [], {}, "the shape of Reshape depends on the readings"),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import ModelFileError
+from training.export_c.c_text import number
 from training.export_c.program import Node, Program, Translation
 from training.export_c.tensor import Shape, Size, Tensor, broadcast, kind_of
 
@@ -19,7 +20,7 @@ FUNCTIONS = {
 ARITHMETIC = {"Add": "+", "Sub": "-", "Mul": "*", "Div": "/"}
 TRUTH = {
     "Equal": "==", "Greater": ">", "GreaterOrEqual": ">=", "Less": "<", "LessOrEqual": "<=",
-    "And": "&&", "Or": "||", "Xor": "!=",
+    "And": "&&", "Or": "||",
 }  # fmt: skip
 #: Kernels of two operands that keep their type.
 PAIRS = {"Max": "larger", "Min": "smaller"}
@@ -71,26 +72,14 @@ def translate_reciprocal(program: Program, node: Node) -> list[Tensor]:
     return _computed(program, node.input(0).kind, f"{one} / {{0}}", [node.input(0)])
 
 
-def translate_kernel(program: Program, node: Node) -> list[Tensor]:
-    """Functions of one value that the C library lacks."""
+def translate_activation(program: Program, node: Node) -> list[Tensor]:
+    """Functions of networks that the C library lacks."""
     x = node.input(0)
-    name = program.shared.kernel({"Sigmoid": "sigmoid", "Sign": "sign_of"}[node.kind], x.kind)
-    return _computed(program, x.kind, f"{name}({{0}})", [x])
-
-
-def translate_relu(program: Program, node: Node) -> list[Tensor]:
-    """Zero where the value is negative."""
-    x = node.input(0)
-    zero = "0.0f" if x.kind == "float" else "0"
-    return _computed(
-        program, x.kind, f"{program.shared.kernel('larger', x.kind)}({{0}}, {zero})", [x]
-    )
-
-
-def translate_softplus(program: Program, node: Node) -> list[Tensor]:
-    """The logarithm of one plus the exponential."""
-    x = node.input(0)
-    return _computed(program, x.kind, f"{program.shared.kernel('softplus', x.kind)}({{0}})", [x])
+    if node.kind == "Sigmoid":
+        name = program.shared.kernel("sigmoid", x.kind)
+        return _computed(program, x.kind, f"{name}({{0}})", [x])
+    zero, larger = number(0.0, x.kind), program.shared.kernel("larger", x.kind)
+    return _computed(program, x.kind, f"{larger}({{0}}, {zero})", [x])
 
 
 def translate_power(program: Program, node: Node) -> list[Tensor]:
@@ -116,14 +105,10 @@ def translate_pairs(program: Program, node: Node) -> list[Tensor]:
 
 
 def translate_sum(program: Program, node: Node) -> list[Tensor]:
-    """The sum or the mean of several values."""
-    given = node.given()
-    total = given[0]
-    for other in given[1:]:
+    """The sum of several values."""
+    total, *others = node.given()
+    for other in others:
         (total,) = _computed(program, total.kind, "{0} + {1}", [total, other])
-    if node.kind == "Mean":
-        one = "f" if total.kind == "float" else ""
-        return _computed(program, total.kind, f"{{0}} / {len(given)}.0{one}", [total])
     return [total]
 
 
@@ -141,24 +126,6 @@ def translate_where(program: Program, node: Node) -> list[Tensor]:
     """One value or the other, by a condition."""
     condition, x, y = (node.input(k) for k in range(3))
     return _computed(program, x.kind, "{0} ? {1} : {2}", [condition, x, y])
-
-
-def translate_is_nan(program: Program, node: Node) -> list[Tensor]:
-    """Whether the value is not a number."""
-    return _computed(program, "bool", "isnan({0}) != 0", [node.input(0)])
-
-
-def translate_is_infinite(program: Program, node: Node) -> list[Tensor]:
-    """Whether the value is infinite, of either sign or of one."""
-    positive = int(node.attributes.get("detect_positive", 1))
-    negative = int(node.attributes.get("detect_negative", 1))
-    text = "isinf({0}) != 0"
-    if not (positive and negative):
-        x = program.stored(node.input(0))
-        sign = ">" if positive else "<"
-        text += f" && {{0}} {sign} 0" if positive or negative else " && false"
-        return _computed(program, "bool", text, [x])
-    return _computed(program, "bool", text, [node.input(0)])
 
 
 def translate_cast(program: Program, node: Node) -> list[Tensor]:
@@ -198,17 +165,14 @@ OPERATORS: dict[str, Translation] = {
     **dict.fromkeys(ARITHMETIC, translate_arithmetic),
     **dict.fromkeys(TRUTH, translate_truth),
     **dict.fromkeys(PAIRS, translate_pairs),
-    **dict.fromkeys(("Sum", "Mean"), translate_sum),
-    **dict.fromkeys(("Sigmoid", "Sign"), translate_kernel),
     "Not": translate_not,
     "Neg": translate_negative,
     "Reciprocal": translate_reciprocal,
-    "Relu": translate_relu,
-    "Softplus": translate_softplus,
+    "Relu": translate_activation,
+    "Sigmoid": translate_activation,
+    "Sum": translate_sum,
     "Pow": translate_power,
     "Clip": translate_clip,
     "Where": translate_where,
-    "IsNaN": translate_is_nan,
-    "IsInf": translate_is_infinite,
     "Cast": translate_cast,
 }

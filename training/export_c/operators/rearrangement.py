@@ -166,13 +166,6 @@ def translate_unsqueeze(program: Program, node: Node) -> list[Tensor]:
     return [x.seen_as(tuple(Size(1) if k in axes else next(own) for k in range(rank)))]
 
 
-def translate_flatten(program: Program, node: Node) -> list[Tensor]:
-    """A tensor as a matrix."""
-    x = program.stored(node.input(0))
-    axis = int(node.attributes.get("axis", 1))
-    return [x.seen_as((total(x.shape[:axis]), total(x.shape[axis:])))]
-
-
 def translate_identity(program: Program, node: Node) -> list[Tensor]:
     """The tensor itself."""
     return [node.input(0)]
@@ -184,18 +177,6 @@ def translate_shape(program: Program, node: Node) -> list[Tensor]:
     first, last = int(node.attributes.get("start", 0)), node.attributes.get("end")
     sizes = shape[first : None if last is None else int(last)]
     return [Tensor("", "int", (Size(len(sizes)),), sizes=sizes)]
-
-
-def translate_size(program: Program, node: Node) -> list[Tensor]:
-    """The number of elements of a tensor."""
-    return [Tensor("", "int", (), sizes=(node.input(0).count,))]
-
-
-def translate_constant_of_shape(program: Program, node: Node) -> list[Tensor]:
-    """A tensor of one value everywhere."""
-    shape = node.input(0).as_sizes("the shape of ConstantOfShape")
-    value = Tensor.constant(np.asarray(node.attributes.get("value", np.zeros(1, np.float32))), "")
-    return [program.computed(value.kind, shape, "{0}", [value])]
 
 
 def _slice(program: Program, x: Tensor, axis: int, start: Size, length: Size) -> Tensor:
@@ -245,10 +226,6 @@ OPERATORS: dict[str, Translation] = {
     "Reshape": translate_reshape,
     "Squeeze": translate_squeeze,
     "Unsqueeze": translate_unsqueeze,
-    "Flatten": translate_flatten,
     "Identity": translate_identity,
-    "Dropout": translate_identity,
     "Shape": translate_shape,
-    "Size": translate_size,
-    "ConstantOfShape": translate_constant_of_shape,
 }

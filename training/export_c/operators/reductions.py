@@ -14,9 +14,6 @@ REDUCTIONS = {
     "ReduceSum": ("sum_of", "0", "{t} += {x};"),
     "ReduceMean": ("sum_of", "0", "{t} += {x};"),
     "ReduceSumSquare": ("squares_of", "0", "{t} += {x} * {x};"),
-    "ReduceL2": ("squares_of", "0", "{t} += {x} * {x};"),
-    "ReduceL1": ("absolutes_of", "0", "{t} += {x} < 0 ? -{x} : {x};"),
-    "ReduceProd": ("product_of", "1", "{t} *= {x};"),
     "ReduceMax": ("largest_of", "{x}", "{t} = {x} > {t} ? {x} : {t};"),
     "ReduceMin": ("smallest_of", "{x}", "{t} = {x} < {t} ? {x} : {t};"),
 }
@@ -42,9 +39,6 @@ def translate_reduction(program: Program, node: Node) -> list[Tensor]:
     before, after = x.shape[: axes[0]], x.shape[axes[-1] + 1 :]
     along = total(x.shape[axes[0] : axes[-1] + 1])
     reduced = _reduced(program, node.kind, x, (total(before), along, total(after)), shape)
-    if node.kind == "ReduceL2":
-        root = "sqrtf" if x.kind == "float" else "sqrt"
-        return [program.computed(x.kind, shape, f"{root}({{0}})", [reduced])]
     if node.kind == "ReduceMean":
         return [program.computed(x.kind, shape, f"{{0}} / ({x.kind}){along.c}", [reduced])]
     return [reduced]
@@ -96,25 +90,6 @@ def translate_softmax(program: Program, node: Node) -> list[Tensor]:
     return [out]
 
 
-def translate_cumulative_sum(program: Program, node: Node) -> list[Tensor]:
-    """Sums of all elements up to each one, along an axis."""
-    x, axis = program.stored(node.input(0)), node.numbers(1, "axis") or [0]
-    if int(node.attributes.get("exclusive", 0)) or int(node.attributes.get("reverse", 0)):
-        raise ModelFileError("operator CumSum with exclusive or reverse is not known to export-c")
-    out, a = program.new(x.kind, x.shape), axis[0] % x.rank
-    outer, along, inner = total(x.shape[:a]), x.shape[a], total(x.shape[a + 1 :])
-    i, j = indices_of([outer])[0], indices_of([inner], 1)[0]
-    place = offset([along * inner, inner, Size(1)], [i, "k", j])
-    before = offset([along * inner, inner, Size(1)], [i, "(k - 1)", j])
-    name = out.name
-    lines = (
-        f"for (int k = 0; k < {along.c}; ++k)\n"
-        f"{INDENT}{name}[{place}] = {x.name}[{place}] + (k > 0 ? {name}[{before}] : 0);"
-    )
-    program.emit(nest([outer, inner], [i, j], lines), out, x)
-    return [out]
-
-
 def _indented(text: str) -> str:
     return "\n".join(INDENT + line for line in text.splitlines())
 
@@ -146,16 +121,17 @@ def translate_compress(program: Program, node: Node) -> list[Tensor]:
 
 
 def translate_top(program: Program, node: Node) -> list[Tensor]:
-    """The largest or smallest elements along the last axis, in order, and their indices."""
+    """The largest elements along the last axis, in order, and their indices."""
     x, count = program.stored(node.input(0)), (node.numbers(1, "k") or [1])[0]
-    if node.axis(x.rank, -1) != x.rank - 1:
-        raise ModelFileError("operator TopK along another axis than the last is not known")
-    largest = int(node.attributes.get("largest", 1))
+    if node.axis(x.rank, -1) != x.rank - 1 or not int(node.attributes.get("largest", 1)):
+        raise ModelFileError(
+            "operator TopK along another axis than the last, or of the least, is not known"
+        )
     shape = (*x.shape[:-1], Size(count))
     out, where = program.new(x.kind, shape), program.new("int", shape)
     outer = [total(x.shape[:-1])]
     i = indices_of(outer)
-    kernel = program.shared.kernel("largest_few" if largest else "smallest_few", x.kind)
+    kernel = program.shared.kernel("largest_few", x.kind)
     at_x, at_out = offset([x.shape[-1]], i), offset([Size(count)], i)
     call = (
         f"{kernel}({x.name} + {at_x}, {x.shape[-1].c}, {count}, {out.name} + {at_out}, "
@@ -165,32 +141,9 @@ def translate_top(program: Program, node: Node) -> list[Tensor]:
     return [out, where]
 
 
-def translate_extreme_index(program: Program, node: Node) -> list[Tensor]:
-    """The index of the largest or smallest element along the last axis; the first of equal ones."""
-    x = program.stored(node.input(0))
-    if node.axis(x.rank) != x.rank - 1 or int(node.attributes.get("select_last_index", 0)):
-        raise ModelFileError(f"operator {node.kind} along another axis than the last is not known")
-    keep = int(node.attributes.get("keepdims", 1))
-    out = program.new("int", (*x.shape[:-1], *([Size(1)] if keep else [])))
-    outer = [total(x.shape[:-1])]
-    i = indices_of(outer)
-    sign = ">" if node.kind == "ArgMax" else "<"
-    first = offset([x.shape[-1]], i)
-    element, best = f"{x.name}[{first} + k]", f"{x.name}[{first} + {out.name}[{i[0]}]]"
-    body = (
-        f"{{\n    {out.name}[{i[0]}] = 0;\n    for (int k = 1; k < {x.shape[-1].c}; ++k)\n"
-        f"        if ({element} {sign} {best})\n            {out.name}[{i[0]}] = k;\n}}"
-    )
-    program.emit(nest(outer, i, body), out, x)
-    return [out]
-
-
 OPERATORS: dict[str, Translation] = {
     **dict.fromkeys(REDUCTIONS, translate_reduction),
     "Softmax": translate_softmax,
-    "CumSum": translate_cumulative_sum,
     "Compress": translate_compress,
     "TopK": translate_top,
-    "ArgMax": translate_extreme_index,
-    "ArgMin": translate_extreme_index,
 }
