@@ -71,7 +71,8 @@ class TrainedModel:
     domain : TrainingDomain
         Where estimates are in range.
     pooling : PoolingCalibration
-        Calibration of several rows of one soil, pooled as Gaussians.
+        Calibration of single rows, and of several rows of one soil that are pooled as Gaussians;
+        rows are not pooled where they have targets of their own, or a set posterior.
     prior : PriorSummary
         Prior of the targets.
     scores : dict of str to Metrics
@@ -172,7 +173,8 @@ def train(
     scores["estimator"] = score(estimator, third, prior.std)
     mean, std = estimator.predict(calibration.features)
     covariance = covariance_matrices(std, estimator.correlation)
-    calibrate = calibrate_single_rows if spec.per_row else calibrate_pooling
+    alone = spec.per_row or spec.set_posterior is not None  # rows are not pooled as Gaussians
+    calibrate = calibrate_single_rows if alone else calibrate_pooling
     pooling = calibrate(mean, covariance, calibration, prior, run_conditions(parts.train))
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     trained = TrainedModel(

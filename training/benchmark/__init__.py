@@ -6,8 +6,8 @@ the same on the user's test data, without a Bayes limit.
 """
 
 from training.benchmark.acceptance import Goal, goals
-from training.benchmark.paired_results import PairedResult
+from training.benchmark.paired_results import MethodResult, PairedResult
 from training.benchmark.suite import benchmark
-from training.benchmark.user_comparison import MethodScore, compare
+from training.benchmark.user_comparison import MethodScores, compare
 
-__all__ = ["Goal", "MethodScore", "PairedResult", "benchmark", "compare", "goals"]
+__all__ = ["Goal", "MethodResult", "MethodScores", "PairedResult", "benchmark", "compare", "goals"]

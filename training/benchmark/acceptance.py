@@ -97,12 +97,12 @@ def _limit_calibration(limit: Sequence[PairedResult]) -> Goal:
     inside = np.concatenate([r.hpd_levels for r in limit]) < NOMINAL
     low, high = COVERAGE_RANGE
     return Goal(
-        f"coverage of 90 % highest-density regions: {low:.0%} to {high:.0%}",
-        limit[0].method,
-        f"{inside.mean():.1%}",
-        f"{np.sqrt(0.09 / inside.size):.1%}",
-        "",
-        bool(low <= inside.mean() <= high),
+        criterion=f"coverage of 90 % highest-density regions: {low:.0%} to {high:.0%}",
+        method=limit[0].method,
+        measured=f"{inside.mean():.1%}",
+        standard_error=f"{np.sqrt(0.09 / inside.size):.1%}",
+        limit="",
+        met=bool(low <= inside.mean() <= high),
     )
 
 
@@ -116,7 +116,14 @@ def _rmse_ratio(results: Sequence[PairedResult], criterion: str, most: float) ->
     symbol = SHEAR_SYMBOLS[k]
     where = f"{symbol}, {worst.design.description}" if len(results) > 1 else symbol
     measured = f"{ratio[k]:.3f} ({where})"
-    yield Goal(criterion, worst.method, measured, f"{std[k]:.3f}", "1", bool(ratio[k] <= most))
+    yield Goal(
+        criterion=criterion,
+        method=worst.method,
+        measured=measured,
+        standard_error=f"{std[k]:.3f}",
+        limit="1",
+        met=bool(ratio[k] <= most),
+    )
 
 
 def coverage_by_third(result: PairedResult) -> Floats:
@@ -148,12 +155,12 @@ def _interval_coverage(
         # effective number of sets of a mean over designs of unequal size; a third of them each
         sets = len(own) ** 2 / sum(1.0 / r.sets for r in own) / (1 if name == "overall" else 3)
         yield Goal(
-            f"coverage of 90 % intervals, {name}: {low:.0%} to {high:.0%}",
-            own[0].method,
-            _join(f"{v:.1%}" for v in mean),
-            f"about {np.sqrt(0.09 / sets):.1%}",
-            _join(f"{v:.1%}" for v in limit_mean),
-            bool(((mean >= low) & (mean <= high)).all()),
+            criterion=f"coverage of 90 % intervals, {name}: {low:.0%} to {high:.0%}",
+            method=own[0].method,
+            measured=_join(f"{v:.1%}" for v in mean),
+            standard_error=f"about {np.sqrt(0.09 / sets):.1%}",
+            limit=_join(f"{v:.1%}" for v in limit_mean),
+            met=bool(((mean >= low) & (mean <= high)).all()),
         )
 
 
@@ -168,12 +175,12 @@ def _largest_set_rmse(own: Sequence[PairedResult], limit: Sequence[PairedResult]
         inside = (truth >= low) & (truth <= high)
         part = result.subset(inside)
         yield Goal(
-            f"{LARGEST_SET} rows, c {low / 1e3:g} to {high / 1e3:g} kPa: RMSE <= {most}",
-            result.method,
-            _in_display_units(part.rmse),
-            _in_display_units(part.rmse_std),
-            _in_display_units(reference.subset(inside).rmse),
-            bool((part.rmse <= np.asarray(MAX_RMSE)).all()),
+            criterion=f"{LARGEST_SET} rows, c {low / 1e3:g} to {high / 1e3:g} kPa: RMSE <= {most}",
+            method=result.method,
+            measured=_in_display_units(part.rmse),
+            standard_error=_in_display_units(part.rmse_std),
+            limit=_in_display_units(reference.subset(inside).rmse),
+            met=bool((part.rmse <= np.asarray(MAX_RMSE)).all()),
         )
 
 

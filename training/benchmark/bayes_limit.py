@@ -191,7 +191,15 @@ def benchmark_sets(
     for effect in UNMODELLED_EFFECTS:
         designs += [(effect, s) for s in unmodelled_sets(recipe, effect, names, max_sets)]
     return [
-        BenchmarkSet(effect, s.design.key, i, recipe.case, table, s.truth[i], tuple(names))
+        BenchmarkSet(
+            effect=effect,
+            design=s.design.key,
+            number=i,
+            case=recipe.case,
+            table=table,
+            truth=s.truth[i],
+            names=tuple(names),
+        )
         for effect, s in designs
         for i, table in enumerate(s.tables)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
 from typing import Protocol
@@ -99,14 +99,7 @@ class BayesLimit:
 
     def subset(self, part: slice) -> BayesLimit:
         """The posteriors of some sets."""
-        return BayesLimit(
-            self.mean[part],
-            self.covariance[part],
-            self.quantiles[part],
-            self.log_densities[part],
-            self.hpd_levels[part],
-            self.flagged[part],
-        )
+        return BayesLimit(**{f.name: getattr(self, f.name)[part] for f in fields(self)})
 
 
 def packaged_limit() -> Path:
@@ -178,7 +171,14 @@ def _from_columns(names: Sequence[str], flat: dict[str, Floats]) -> BayesLimit:
         [np.stack([flat[_quantile_column(n, f)] for n in names], axis=1) for f in FRACTIONS], axis=1
     )
     log_densities, hpd_levels, flags = (flat[name] for name in SCALAR_COLUMNS)
-    return BayesLimit(mean, covariance, quantiles, log_densities, hpd_levels, flags > 0.5)
+    return BayesLimit(
+        mean=mean,
+        covariance=covariance,
+        quantiles=quantiles,
+        log_densities=log_densities,
+        hpd_levels=hpd_levels,
+        flagged=flags > 0.5,
+    )
 
 
 def _to_columns(names: Sequence[str], summaries: Sequence[PosteriorSummary]) -> dict[str, Floats]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 
 import numpy as np
@@ -89,14 +89,8 @@ class MethodEstimates:
 
     def subset(self, index: NDArray[np.bool_]) -> MethodEstimates:
         """The estimates of some sets."""
-        return MethodEstimates(
-            self.mean[index],
-            self.covariance[index],
-            self.interval50[index],
-            self.interval90[index],
-            self.flagged[index],
-            self.seconds,
-        )
+        parts = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "seconds"}
+        return replace(self, **parts)
 
 
 @dataclass(frozen=True)
@@ -131,14 +125,9 @@ class Method:
                 estimates.append(failure if estimate is None else estimate)
                 seconds += duration / len(sets)
         progress(len(sets), len(sets))
-        return MethodEstimates(
-            np.stack([e.mean for e in estimates]),
-            np.stack([e.covariance for e in estimates]),
-            np.stack([e.interval50 for e in estimates]),
-            np.stack([e.interval90 for e in estimates]),
-            np.asarray([e.flagged for e in estimates]),
-            seconds,
-        )
+        names = [field.name for field in fields(MethodEstimate)]
+        stacked = {name: np.stack([getattr(e, name) for e in estimates]) for name in names}
+        return MethodEstimates(**stacked, seconds=seconds)
 
     def _timed_estimate(self, rows: Table) -> tuple[MethodEstimate | None, float]:
         """The estimate of one set, None where there is none, and the wall time."""
@@ -148,14 +137,6 @@ class Method:
         except FitError:
             estimate = None
         return estimate, time.perf_counter() - started
-
-
-def interval_coverage(truth: Floats, ends: Floats) -> Floats:
-    """Fraction (q,) of true values (n, q) in intervals (n, 2, q), of the intervals not NaN."""
-    finite = np.isfinite(ends).all(axis=1)
-    inside = (truth >= ends[:, 0]) & (truth <= ends[:, 1]) & finite
-    count = finite.sum(axis=0)
-    return np.where(count > 0, inside.sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
 def gaussian_estimate(
@@ -179,12 +160,7 @@ def prior_method(priors: Sequence[Prior]) -> Method:
 
 
 def model_file_method(label: str, estimator: Estimator) -> Method:
-    """A model file as a method: `Estimator.run`.
-
-    A single row is estimated by a plain call where the file is not for sets.
-    """
-    inputs = ", ".join(estimator.inputs)
-    channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
+    """A model file by `Estimator.run`, and without a set posterior single rows by a plain call."""
     plain = estimator.sets is None or estimator.sets.sets_only
 
     def estimate(rows: Table) -> MethodEstimate:
@@ -193,7 +169,9 @@ def model_file_method(label: str, estimator: Estimator) -> Method:
             return onboard_estimate(estimator(**{n: v[0] for n, v in readings.items()}))
         return onboard_estimate(estimator.run(**readings))
 
-    return Method(label, classify_estimator(estimator), inputs, channels, estimate)
+    channels = tuple(n for n in estimator.inputs if n not in ("slip", "load"))
+    kind, inputs = classify_estimator(estimator), ", ".join(estimator.inputs)
+    return Method(label, kind, inputs, channels, estimate)
 
 
 def onboard_estimate(estimate: Estimate) -> MethodEstimate:

@@ -1,4 +1,4 @@
-"""Scores of one method on the sets of one design, paired with the Bayes limit of those sets."""
+"""Scores of a method on sets whose soil is known, alone and paired with their Bayes limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from soilml.numerics.prior import Prior
 from training.benchmark.designs import Design
-from training.benchmark.methods import MethodEstimates, MethodKind, interval_coverage
+from training.benchmark.methods import MethodEstimates, MethodKind
 
 Floats = NDArray[np.float64]
 
@@ -20,19 +20,87 @@ NOMINAL = 0.9
 
 
 @dataclass(frozen=True)
-class PairedResult:
-    """Estimates of a method, with the true values and the Bayes limit of the same n sets.
+class MethodResult:
+    """Estimates of a method, with the true values of the same n sets of one size.
+
+    Estimates outside the prior are clipped to it, and a failed one counts as its median. Figures of
+    parameters that the method does not estimate are NaN.
 
     Attributes
     ----------
-    design, effect
-        Experimental design, and the effect that the method's model lacks (blank where none).
+    rows
+        Readings of a set.
     method, kind, inputs
         Label, kind and inputs of the method.
     priors, truth
         Priors and true values (n, q) of the parameters, SI units.
     estimates
         The method's estimates.
+    """
+
+    rows: int
+    method: str
+    kind: MethodKind
+    inputs: str
+    priors: tuple[Prior, ...]
+    truth: Floats
+    estimates: MethodEstimates
+
+    @property
+    def sets(self) -> int:
+        """Number of sets."""
+        return len(self.truth)
+
+    @property
+    def not_estimated(self) -> NDArray[np.bool_]:
+        """Parameters (q,) that the method does not estimate."""
+        return np.asarray(~np.isfinite(self.estimates.mean).any(axis=0))
+
+    @property
+    def failed(self) -> int:
+        """Number of sets without an estimate."""
+        answered = np.isfinite(self.estimates.mean[:, ~self.not_estimated])
+        return int((~answered).any(axis=1).sum()) if answered.shape[1] else self.sets
+
+    @property
+    def error(self) -> Floats:
+        """Estimate less truth (n, q), SI units."""
+        median = _of_priors(self.priors, lambda p: float(p.at(np.asarray(0.5))))
+        lower = _of_priors(self.priors, lambda p: p.lower)
+        upper = _of_priors(self.priors, lambda p: p.upper)
+        mean = self.estimates.mean
+        value = np.where(np.isfinite(mean), np.clip(mean, lower, upper), median)
+        return np.where(self.not_estimated, np.nan, value - self.truth)
+
+    @property
+    def rmse(self) -> Floats:
+        """Root mean squared error (q,), SI units."""
+        return np.asarray(np.sqrt(np.mean(self.error**2, axis=0)))
+
+    @property
+    def rmse_over_prior(self) -> Floats:
+        """RMSE (q,) over the prior's standard deviation."""
+        return self.rmse / _of_priors(self.priors, lambda p: p.std)
+
+    @property
+    def coverage50(self) -> Floats:
+        """Coverage (q,) of the method's 50 % intervals, of the sets answered."""
+        return _interval_coverage(self.truth, self.estimates.interval50)
+
+    @property
+    def coverage90(self) -> Floats:
+        """Coverage (q,) of the method's 90 % intervals, of the sets answered."""
+        return _interval_coverage(self.truth, self.estimates.interval90)
+
+
+@dataclass(frozen=True)
+class PairedResult(MethodResult):
+    """The same with the Bayes limit of these sets, which have one design.
+
+    Attributes
+    ----------
+    design, effect
+        Experimental design, and the effect that the method's model lacks (blank where none).
     limit_mean
         Mean (n, q) of the exact posterior.
     log_densities
@@ -44,12 +112,6 @@ class PairedResult:
 
     design: Design
     effect: str
-    method: str
-    kind: MethodKind
-    inputs: str
-    priors: tuple[Prior, ...]
-    truth: Floats
-    estimates: MethodEstimates
     limit_mean: Floats
     log_densities: Floats
     hpd_levels: Floats
@@ -71,45 +133,6 @@ class PairedResult:
         return ", ".join(filter(None, (self.design.description, self.effect)))
 
     @property
-    def sets(self) -> int:
-        """Number of sets."""
-        return len(self.truth)
-
-    @property
-    def not_estimated(self) -> NDArray[np.bool_]:
-        """Parameters (q,) that the method does not estimate."""
-        return np.asarray(~np.isfinite(self.estimates.mean).any(axis=0))
-
-    @property
-    def failed(self) -> int:
-        """Number of sets without an estimate."""
-        answered = np.isfinite(self.estimates.mean[:, ~self.not_estimated])
-        return int((~answered).any(axis=1).sum()) if answered.shape[1] else self.sets
-
-    @property
-    def error(self) -> Floats:
-        """Estimate less truth (n, q), SI units, NaN for parameters that are not estimated.
-
-        Estimates outside the prior are clipped to it; a failed fit counts as the prior's median.
-        """
-        median = _of_priors(self.priors, lambda p: float(p.at(np.asarray(0.5))))
-        lower = _of_priors(self.priors, lambda p: p.lower)
-        upper = _of_priors(self.priors, lambda p: p.upper)
-        mean = self.estimates.mean
-        value = np.where(np.isfinite(mean), np.clip(mean, lower, upper), median)
-        return np.where(self.not_estimated, np.nan, value - self.truth)
-
-    @property
-    def rmse(self) -> Floats:
-        """Root mean squared error (q,), SI units."""
-        return np.asarray(np.sqrt(np.mean(self.error**2, axis=0)))
-
-    @property
-    def rmse_over_prior(self) -> Floats:
-        """RMSE (q,) over the prior's standard deviation."""
-        return self.rmse / _of_priors(self.priors, lambda p: p.std)
-
-    @property
     def rmse_ratio(self) -> Floats:
         """RMSE (q,) over that of the Bayes limit on the same sets."""
         return np.asarray(self.rmse / np.sqrt(np.mean((self.limit_mean - self.truth) ** 2, axis=0)))
@@ -124,16 +147,6 @@ class PairedResult:
         """Standard error (q,) of `rmse` over sets, SI units."""
         square = self.error**2
         return np.asarray(square.std(axis=0) / np.sqrt(self.sets) / (2.0 * self.rmse))
-
-    @property
-    def coverage50(self) -> Floats:
-        """Coverage (q,) of the method's 50 % intervals, of the sets answered."""
-        return interval_coverage(self.truth, self.estimates.interval50)
-
-    @property
-    def coverage90(self) -> Floats:
-        """Coverage (q,) of the method's 90 % intervals, of the sets answered."""
-        return interval_coverage(self.truth, self.estimates.interval90)
 
     @property
     def joint_coverage90(self) -> float:
@@ -199,6 +212,14 @@ class PairedResult:
 
 def _of_priors(priors: Sequence[Prior], figure: Callable[[Prior], float]) -> Floats:
     return np.asarray([figure(p) for p in priors])
+
+
+def _interval_coverage(truth: Floats, ends: Floats) -> Floats:
+    """Fraction (q,) of true values (n, q) in intervals (n, 2, q), of the intervals not NaN."""
+    finite = np.isfinite(ends).all(axis=1)
+    inside = (truth >= ends[:, 0]) & (truth <= ends[:, 1]) & finite
+    count = finite.sum(axis=0)
+    return np.where(count > 0, inside.sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
 def jackknife_rmse_ratio_std(squares: Floats, reference_squares: Floats) -> Floats:

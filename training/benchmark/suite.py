@@ -177,6 +177,7 @@ def _limit_result(
         seconds=float("nan"),
     )
     return PairedResult(
+        rows=design.rows,
         design=design,
         effect=effect,
         method=POSTERIOR_LABEL if effect else LIMIT_LABEL,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -26,15 +25,8 @@ from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import column
-from training.benchmark.methods import (
-    Method,
-    MethodEstimates,
-    MethodKind,
-    analytic_method,
-    interval_coverage,
-    model_file_method,
-    prior_method,
-)
+from training.benchmark.methods import Method, analytic_method, model_file_method, prior_method
+from training.benchmark.paired_results import MethodResult
 
 Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -98,30 +90,10 @@ ANALYTIC_SETS = 120
 MIN_SETS = 20
 
 
-@dataclass(frozen=True)
-class MethodScore:
-    """Scores of a method on sets of one size, per parameter (q,); NaN where not estimated.
-
-    `rows` is the number of readings per set; `rmse` is in SI units; `seconds` is per estimate.
-    """
-
-    rows: int
-    method: str
-    kind: MethodKind
-    inputs: str
-    sets: int
-    failed: int
-    rmse: Floats
-    rmse_over_prior: Floats
-    coverage50: Floats
-    coverage90: Floats
-    seconds: float
-
-
-class Comparison(list[MethodScore]):
+class MethodScores(list[MethodResult]):
     """Scores by size of set, then by method, of the parameters `names`."""
 
-    def __init__(self, scores: Iterable[MethodScore], names: Sequence[str]) -> None:
+    def __init__(self, scores: Iterable[MethodResult], names: Sequence[str]) -> None:
         super().__init__(scores)
         self.names = tuple(names)
 
@@ -153,11 +125,11 @@ def compare(
     estimators: Mapping[str, Estimator],
     progress: Progress = lambda text, done, total: None,
     analytic_sets: int = ANALYTIC_SETS,
-) -> Comparison:
+) -> MethodScores:
     """Score the prior, model files and analytic methods on single readings and on whole runs.
 
     Every method sees the same readings: slip, torque and load; a method that reads more channels
-    lists them in `MethodScore.inputs`. Estimates outside the prior are clipped to it, and a failed
+    lists them in `MethodResult.inputs`. Estimates outside the prior are clipped to it, and a failed
     fit counts as the prior's median.
 
     Parameters
@@ -175,8 +147,8 @@ def compare(
 
     Returns
     -------
-    Comparison
-        A list of `MethodScore`, by size of set, then by method; its `plot` draws it.
+    MethodScores
+        A list of `MethodResult`, by size of set, then by method; its `plot` draws it.
 
     Raises
     ------
@@ -187,26 +159,40 @@ def compare(
     first = next(iter(estimators.values()))
     names = first.names
     _check_parameters(estimators)
-    prior = [case.prior.get(n) or Prior(lo, hi) for n, lo, hi in _prior_ranges(first)]
+    ends = zip(names, first.prior.lower, first.prior.upper, strict=True)
+    priors = tuple(case.prior.get(n) or Prior(float(low), float(high)) for n, low, high in ends)
     table = _scorable_rows(table, names)
-    fast = [prior_method(prior)]
+    fast = [prior_method(priors)]
     for label, estimator in estimators.items():
         fast.append(model_file_method(label, estimator))
     slow = [analytic_method(case, name, names) for name in METHODS]
     scores = []
+
+    def score(
+        method: Method,
+        sets: Sequence[Table],
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> None:
+        estimates = method.estimate_sets(sets, len(names), progress)
+        result = MethodResult(
+            rows=len(sets[0]),
+            method=method.label,
+            kind=method.kind,
+            inputs=method.inputs,
+            priors=priors,
+            truth=np.asarray([[s[column(n)][0] for n in names] for s in sets]),
+            estimates=estimates,
+        )
+        scores.append(result)
+
     for size, sets in _sets_by_size(table).items():
-        truth = _truth(sets, names)
         for method in fast:
-            estimates = method.estimate_sets(sets, len(names))
-            scores.append(_score(size, method, truth, estimates, prior))
+            score(method, sets)
         fewer = sets[:: max(len(sets) // analytic_sets, 1)][:analytic_sets]
-        truth = _truth(fewer, names)
         for method in slow:
             if all(column(c) in fewer[0] for c in method.channels):
-                report = partial(progress, f"{method.label}, {size} rows")
-                estimates = method.estimate_sets(fewer, len(names), report)
-                scores.append(_score(size, method, truth, estimates, prior))
-    return Comparison(scores, names)
+                score(method, fewer, partial(progress, f"{method.label}, {size} rows"))
+    return MethodScores(scores, names)
 
 
 def _check_parameters(estimators: Mapping[str, Estimator]) -> None:
@@ -225,11 +211,6 @@ def _check_parameters(estimators: Mapping[str, Estimator]) -> None:
             )
 
 
-def _prior_ranges(estimator: Estimator) -> list[tuple[str, float, float]]:
-    ends = zip(estimator.prior.lower, estimator.prior.upper, strict=True)
-    return [(n, float(a), float(b)) for n, (a, b) in zip(estimator.names, ends, strict=True)]
-
-
 def _scorable_rows(table: Table, names: Sequence[str]) -> Table:
     """Rows with a torque and an equilibrium; raises `InputError` without true values."""
     for name in names:
@@ -238,10 +219,6 @@ def _scorable_rows(table: Table, names: Sequence[str]) -> Table:
                 f"{table.source}: column {column(name)} is missing: no truth to score against"
             )
     return table.rows(np.isfinite(table["torque_Nm"]) & table.answered)
-
-
-def _truth(sets: Sequence[Table], names: Sequence[str]) -> Floats:
-    return np.asarray([[s[column(n)][0] for n in names] for s in sets])
 
 
 def _sets_by_size(table: Table) -> dict[int, list[Table]]:
@@ -254,28 +231,3 @@ def _sets_by_size(table: Table) -> dict[int, list[Table]]:
         if len(equal) >= MIN_SETS:
             sets[size] = equal
     return sets
-
-
-def _score(
-    size: int, method: Method, truth: Floats, estimates: MethodEstimates, prior: Sequence[Prior]
-) -> MethodScore:
-    lower, upper = np.asarray([p.lower for p in prior]), np.asarray([p.upper for p in prior])
-    median = np.asarray([float(p.at(np.asarray([0.5]))[0]) for p in prior])
-    prior_std = np.asarray([p.std for p in prior])
-    failed = ~np.isfinite(estimates.mean)
-    value = np.where(failed, median, np.clip(estimates.mean, lower, upper))
-    never = failed.all(axis=0)  # a parameter that the method does not estimate
-    rmse = np.where(never, np.nan, np.sqrt(np.mean((truth - value) ** 2, axis=0)))
-    return MethodScore(
-        rows=size,
-        method=method.label,
-        kind=method.kind,
-        inputs=method.inputs,
-        sets=len(truth),
-        failed=int(failed[:, ~never].any(axis=1).sum()) if not never.all() else len(truth),
-        rmse=rmse,
-        rmse_over_prior=rmse / prior_std,
-        coverage50=interval_coverage(truth, estimates.interval50),
-        coverage90=interval_coverage(truth, estimates.interval90),
-        seconds=estimates.seconds,
-    )

@@ -16,14 +16,14 @@ from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import shown_unit
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
+from training.benchmark.paired_results import MethodResult
 from training.benchmark.report import columns_of_rows, format_number
-from training.benchmark.user_comparison import MethodScore
 
 #: Most characters of the name of a method on a terminal.
 _MOST_NAME = 24
 
 
-def csv_columns(scores: Sequence[MethodScore], names: Sequence[str]) -> dict[str, list[Any]]:
+def csv_columns(scores: Sequence[MethodResult], names: Sequence[str]) -> dict[str, list[Any]]:
     """The CSV table, in SI units: one row per size of set, method and parameter."""
     return columns_of_rows(
         {
@@ -37,14 +37,14 @@ def csv_columns(scores: Sequence[MethodScore], names: Sequence[str]) -> dict[str
             "rmse_share_of_prior": float(score.rmse_over_prior[k]),
             "cover50": float(score.coverage50[k]),
             "cover90": float(score.coverage90[k]),
-            "seconds_per_estimate": score.seconds,
+            "seconds_per_estimate": score.estimates.seconds,
         }
         for score in scores
         for k, name in enumerate(names)
     )
 
 
-def format_tables(scores: Sequence[MethodScore], names: Sequence[str]) -> str:
+def format_tables(scores: Sequence[MethodResult], names: Sequence[str]) -> str:
     """A text table for each size of set, without the columns that are in the file alone."""
     header, blocks = _blocks(scores, names)
     kept = [i for i, name in enumerate(header) if name not in ("inputs", "ms")]
@@ -60,7 +60,7 @@ def _short(method: str) -> str:
 
 
 def _blocks(
-    scores: Sequence[MethodScore], names: Sequence[str]
+    scores: Sequence[MethodResult], names: Sequence[str]
 ) -> tuple[list[str], list[tuple[str, list[list[str]]]]]:
     """Header, and title and rows for each size of set."""
     header = ["method", "inputs"]
@@ -76,7 +76,7 @@ def _blocks(
     return header, blocks
 
 
-def _cells(score: MethodScore, names: Sequence[str]) -> list[str]:
+def _cells(score: MethodResult, names: Sequence[str]) -> list[str]:
     cells = [score.method, score.inputs]
     for k, name in enumerate(names):
         cells += [
@@ -84,12 +84,12 @@ def _cells(score: MethodScore, names: Sequence[str]) -> list[str]:
             format_number(score.rmse_over_prior[k], ".3f"),
             "" if np.isnan(score.rmse[k]) else f"{score.coverage90[k]:.0%}",
         ]
-    milliseconds = f"{1e3 * score.seconds:.2g}" if score.seconds else ""
+    milliseconds = f"{1e3 * score.estimates.seconds:.2g}" if score.estimates.seconds else ""
     return [*cells, f"{score.failed}/{score.sets}", milliseconds]
 
 
 def plot_comparison(
-    scores: Sequence[MethodScore], names: Sequence[str], ax: Any = None
+    scores: Sequence[MethodResult], names: Sequence[str], ax: Any = None
 ) -> NDArray[Any]:
     """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
 
@@ -135,7 +135,7 @@ def figure_size(names: Sequence[str]) -> tuple[float, float]:
     return 3.9 * len(names), 6.4
 
 
-def comparison_report(scores: Sequence[MethodScore], names: Sequence[str], test: str) -> Report:
+def comparison_report(scores: Sequence[MethodResult], names: Sequence[str], test: str) -> Report:
     """The page of a comparison on test data of this name."""
     single = [
         score

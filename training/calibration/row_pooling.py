@@ -56,8 +56,8 @@ def calibrate_pooling(
     """Calibrate the pooling of several rows, by the operating conditions that the run varied.
 
     For every pattern of varying conditions and every number of rows, the information share with
-    the largest likelihood is taken, with the factors that make the intervals hold. For a pattern
-    with too few runs, pooling does not reduce the uncertainty.
+    the largest likelihood is taken, with the factors that give the intervals their coverage. For a
+    pattern with too few runs, pooling does not reduce the uncertainty.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def calibrate_single_rows(
     prior: PriorSummary,
     conditions: RunConditions,
 ) -> PoolingCalibration:
-    """The same for targets that differ between the rows of a run, which cannot be pooled."""
+    """The same for rows that are not pooled: they have targets of their own, or a set posterior."""
     rows = row_groups(data.runs(), 1)[:, 0]
     factor = _coverage_factor(mean[rows], covariance[rows], data.targets[rows], prior)
     return PoolingCalibration(conditions, (), factor, np.full(2, NO_LIMIT))

@@ -15,6 +15,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.experiment_design.candidate_rows import CandidateRow
 from soilml.gap.report.results import GapReduction, GapReport
+from soilml.numerics.prior import Prior
 from soilml.traction.report import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -68,12 +69,33 @@ def imported(case):
 
 
 def comparison(case):
-    from training.benchmark.methods import MethodKind
-    from training.benchmark.user_comparison import Comparison, MethodScore
+    from training.benchmark.methods import MethodEstimates, MethodKind
+    from training.benchmark.paired_results import MethodResult
+    from training.benchmark.user_comparison import MethodScores
 
-    half = np.full(2, 0.5)
-    score = MethodScore(1, "m", MethodKind.ANALYTIC, "torque", 9, 0, half, half, half, half, 0.1)
-    return Comparison([score, replace(score, rows=6)], ["cohesion", "friction_angle"])
+    rng = np.random.default_rng(0)
+    priors = (Prior(0.0, 1e3), Prior(0.4, 0.8))
+    truth = np.stack([p.at(rng.random(9)) for p in priors], axis=1)
+    std = np.asarray([p.std for p in priors])
+    ends = np.stack([truth - std, truth + std], axis=1)
+    estimates = MethodEstimates(
+        mean=truth + 0.5 * std * rng.standard_normal((9, 2)),
+        covariance=np.broadcast_to(np.diag(std**2), (9, 2, 2)),
+        interval50=ends,
+        interval90=ends,
+        flagged=np.zeros(9, bool),
+        seconds=0.1,
+    )
+    score = MethodResult(
+        rows=1,
+        method="m",
+        kind=MethodKind.ANALYTIC,
+        inputs="torque",
+        priors=priors,
+        truth=truth,
+        estimates=estimates,
+    )
+    return MethodScores([score, replace(score, rows=6)], ["cohesion", "friction_angle"])
 
 
 def audited(case):

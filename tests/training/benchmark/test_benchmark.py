@@ -26,6 +26,7 @@ from training.benchmark.methods import (
     MethodKind,
     classify_estimator,
     gaussian_estimate,
+    model_file_method,
 )
 from training.benchmark.suite import (
     LIMIT_LABEL,
@@ -212,6 +213,13 @@ def test_the_exact_posterior_meets_the_goals_and_the_prior_misses_them(results):
     by_criterion = {g.criterion: g for g in goals(prior) if g.method == "mine"}
     assert not by_criterion["every size: RMSE / limit <= 1.05"].met
     assert not next(g for what, g in by_criterion.items() if what.startswith("18 rows")).met
+
+
+def test_a_model_file_is_one_method_whose_kind_is_in_its_metadata(small_model):
+    single = model_file_method("small", Estimator.load(small_model))
+    assert (single.label, single.kind) == ("small", MethodKind.REGRESSION)
+    of_sets = model_file_method("wheel", Estimator.load(EXPORTED / "wheel.onnx"))
+    assert (of_sets.label, of_sets.kind) == ("wheel", MethodKind.SET_POSTERIOR)
 
 
 @pytest.mark.slow

@@ -238,7 +238,8 @@ def test_sizes_may_vary(tmp_path):
          helper.make_tensor_value_info("chosen", 9, ["rows"])],
         [helper.make_tensor_value_info(n, 1, None) for n in ("y", "total", "count")],
         [numpy_helper.from_array(weights, "w"),
-         numpy_helper.from_array(np.ones(1, np.float32), "unit"), numpy_helper.from_array(ints(1), "one"),
+         numpy_helper.from_array(np.ones(1, np.float32), "unit"),
+         numpy_helper.from_array(ints(1), "one"),
          numpy_helper.from_array(ints(-1, 2), "flat")],
     )  # fmt: skip
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=9)
@@ -266,7 +267,7 @@ def test_sizes_may_vary(tmp_path):
         ("Einsum", [A, B], [], {"equation": "ij,ij->i"}, "operator Einsum is not known"),
         ("Softmax", [A], [], {"axis": 0}, "Softmax along another axis"),
         ("Slice", [A], [ints(0), ints(4), ints(0), ints(2)], {}, "Slice with steps"),
-        ("TopK", [A], [ints(2)], {"axis": 0}, "TopK of least values"),
+        ("TopK", [A], [ints(2)], {"axis": 0}, "TopK along another axis"),
         ("Cast", [A], [], {"to": TensorProto.FLOAT16}, "element type 10"),
         ("Reshape", [A, ints(2, 6)], [], {}, "the shape of Reshape depends on the readings"),
     ],
