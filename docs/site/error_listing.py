@@ -29,7 +29,7 @@ RAISED = (
     "MissingLibraryError",
     "argparse.ArgumentTypeError",
 )
-#: Hints at a wrong map are yielded, and become part of one message.
+#: Hints at a wrong map are yielded as remarks, and become part of one message.
 HINTS = "soilml/log_import/checks/"
 _GROUP = re.compile(r"<!-- messages: (.*?) -->", re.DOTALL)
 
@@ -59,8 +59,12 @@ def _of(source: str, module: str) -> Iterator[Message]:
                 yield Message(module, name, _text(node.exc.args[0]))
         elif isinstance(node, ast.Call) and ast.unparse(node.func) == "fail" and node.args:
             yield Message(module, "SoilmlError", _text(node.args[0]))
-        elif isinstance(node, ast.Yield) and node.value and module.startswith(HINTS):
-            yield Message(module, "InputError", _text(node.value))
+        elif (
+            isinstance(node, ast.Yield)
+            and isinstance(node.value, ast.Call)
+            and module.startswith(HINTS)
+        ):
+            yield Message(module, "InputError", _text(node.value.args[1]))
 
 
 def _text(node: ast.expr) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from soilml.log_import.figures import run_figure, slip_figures
 from soilml.log_import.result import ImportedLog
 from soilml.optional_imports import need
+from soilml.remarks import Remark
 from soilml.report.numbers import format_number, format_with_std
 from soilml.report.page import Provenance, Report, render
 
@@ -85,10 +86,10 @@ def summary(imported: ImportedLog) -> Report:
     rows, runs = len(imported.table), imported.runs
     odd = (*imported.implausible, *imported.remarks)
     if imported.implausible:
-        answer, tone = f"The map looks wrong: {odd[0]}", "bad-data"
+        answer, tone = f"The map looks wrong: {odd[0].text}", "bad-data"
         step = "Correct the map, and import again."
     elif odd:
-        answer, tone = odd[0], "suspected"
+        answer, tone = odd[0].text, "suspected"
         step = "Look at the remarks and the pictures; then identify the soil from the rows."
     else:
         answer, tone = "Nothing looks odd.", "no-gap"
@@ -134,7 +135,7 @@ def _rows(imported: ImportedLog) -> list[dict[str, Any]]:
 
 def _left_out(imported: ImportedLog) -> list[dict[str, Any]]:
     """What is left out by run and reason, the longest first."""
-    seconds: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    seconds: dict[tuple[str, Remark | None], list[tuple[float, float]]] = {}
     for run, s in imported.left_out():
         seconds.setdefault((run, s.why), []).append((s.start, s.stop))
     entries = [

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +44,7 @@ class Recording:
     units: dict[str, str] = field(default_factory=dict)
     clock: Floats | None = None
     about: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
     def __len__(self) -> int:
         if self.clock is not None:
@@ -53,13 +55,9 @@ class Recording:
     def rows(self, keep: NDArray[np.bool_]) -> Recording:
         """The samples of a mask (n,)."""
         picked = np.flatnonzero(keep)
-        return Recording(
-            self.name,
-            self.file,
-            {name: values[keep] for name, values in self.columns.items()},
-            {name: [cells[i] for i in picked] for name, cells in self.texts.items()},
-            self.units,
-            None if self.clock is None else self.clock[keep],
-            self.about,
-            self.notes,
+        return replace(
+            self,
+            columns={name: values[keep] for name, values in self.columns.items()},
+            texts={name: [cells[i] for i in picked] for name, cells in self.texts.items()},
+            clock=None if self.clock is None else self.clock[keep],
         )

@@ -13,6 +13,7 @@ from soilml.io.table import Table
 from soilml.log_import.channels.shared_errors import SharedError
 from soilml.log_import.rows import WheelSeries
 from soilml.log_import.windows.steady import Stretch
+from soilml.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,8 @@ class ImportedLog:
     bias: dict[str, Noise]
     shared: tuple[SharedError, ...]
     series: tuple[WheelSeries, ...]
-    remarks: tuple[str, ...] = ()
-    implausible: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+    implausible: tuple[Remark, ...] = ()
     radius: float = float("nan")
     sources: tuple[str, ...] = ()
     map_name: str = "map"
@@ -106,8 +107,9 @@ class ImportedLog:
                 {"constant": s.constant, "quantity": s.quantity, "rms": s.rms} for s in self.shared
             ],
             "left_out": [
-                {"run": run, "from_s": s.start, "until_s": s.stop, "why": s.why}
+                {"run": run, "from_s": s.start, "until_s": s.stop, "why": s.why.as_json()}
                 for run, s in self.left_out()
+                if s.why is not None
             ],
             "runs": [
                 {
@@ -115,11 +117,11 @@ class ImportedLog:
                     "duration_s": float(s.time[-1] - s.time[0]),
                     "step_s": float(s.time[1] - s.time[0]),
                     "windows": [[w.start, w.stop] for w in s.stretches if not w.why],
-                    "notes": list(s.notes),
+                    "notes": [note.as_json() for note in s.notes],
                 }
                 for s in self.series
             ],
-            "remarks": [*self.implausible, *self.remarks],
+            "remarks": [remark.as_json() for remark in (*self.implausible, *self.remarks)],
         }
 
 

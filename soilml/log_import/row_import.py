@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from soilml.log_import.rows import (
 )
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 #: Channels that only samples over time can be.
 _OF_SAMPLES = ("wheel_angle", "position")
@@ -47,8 +49,8 @@ def import_rows(
     """
     names = run_names([log[0].file for log in logs])
     groups: list[tuple[WheelMap, Run, Sequence[WindowRow]]] = []
-    left: list[str] = []
-    wrong: list[str] = []
+    left: list[Remark] = []
+    wrong: list[Remark] = []
     rows_of_wheels: list[tuple[WheelMap, list[WindowRow]]] = []
     for wheel in log_map.wheels:
         rows: list[WindowRow] = []
@@ -61,7 +63,8 @@ def import_rows(
                 every += found
                 for i, row in enumerate(found):
                     if why := unusable(row, {}):
-                        left.append(f"row {i + 1} of {recording.file.name} is left out: {why}")
+                        text = f"row {i + 1} of {recording.file.name} is left out: {why}"
+                        left.append(replace(why, text=text))
                         continue
                     groups.append((wheel, Run(labels[i], (recording,), run.times), [row]))
                     rows.append(row)
@@ -83,9 +86,16 @@ def import_rows(
     remarks = [*left[:5], *without_torque(table), *_without_errors(table)]
     remarks += table_hints(table.columns, radius)
     return ImportedLog(
-        table, bias, tuple(parts), (), tuple(dict.fromkeys(remarks)), tuple(wrong),
-        radius or float("nan"), tuple(str(log[0].file) for log in logs), log_map.source,
-    )  # fmt: skip
+        table=table,
+        bias=bias,
+        shared=tuple(parts),
+        series=(),
+        remarks=tuple(dict.fromkeys(remarks)),
+        implausible=tuple(wrong),
+        radius=radius or float("nan"),
+        sources=tuple(str(log[0].file) for log in logs),
+        map_name=log_map.source,
+    )
 
 
 def _labels(run: Run, log_map: LogMap) -> list[str]:
@@ -129,7 +139,7 @@ def _rows(run: Run, wheel: WheelMap, log_map: LogMap) -> list[WindowRow]:
 
     return [
         WindowRow(
-            Stretch(float(i), float(i), ""), at(means, i), at(values, i),
+            Stretch(float(i), float(i)), at(means, i), at(values, i),
             {k: v for k, v in at(std, i).items() if v > 0.0},
         )
         for i in range(count)
@@ -170,7 +180,7 @@ def _columns(rows: Sequence[WindowRow]) -> dict[str, Floats]:
     return found
 
 
-def _without_errors(table: Table) -> list[str]:
+def _without_errors(table: Table) -> list[Remark]:
     """A remark on measured quantities that no column gives a standard error of."""
     bare = [
         name for name in ("torque", "drawbar_pull", "sinkage")
@@ -181,8 +191,9 @@ def _without_errors(table: Table) -> list[str]:
         return []
     lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
     shown = ", ".join(f"[{name}]" for name in bare)
-    return [
+    text = (
         f"no standard errors of {shown}: name their columns (std = 'COLUMN'), write noise = '5 %' "
         f"there, or declare them in the model file, as [noise] {lines}: estimates are no better "
         "than this number"
-    ]
+    )
+    return [Remark("no-standard-errors", text, tuple(bare))]

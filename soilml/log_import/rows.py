@@ -19,6 +19,7 @@ from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 #: Quantities of a row that are means of samples.
 AVERAGED = ("torque", "load", "drawbar_pull", "sinkage")
@@ -74,7 +75,7 @@ class WheelSeries:
     time: Floats
     quantities: dict[str, Floats]
     stretches: tuple[Stretch, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
 
 def plain_constants(log_map: LogMap, wheel: WheelMap) -> dict[str, float]:
@@ -197,14 +198,14 @@ def add_stated_errors(row: WindowRow, inputs: Inputs, log_map: LogMap, wheel: Wh
                     row.std[name] = float(np.hypot(row.std.get(name, 0.0), change))
 
 
-def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, int], str]:
+def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, int], Remark]:
     """Reasons by (run, window) for windows that are irregular in slip or in drawbar pull.
 
     The wandering of a window is the standard error of its mean times the square root of its
     length, which does not depend on the length. Hands on the carriage, a cable that tightens or a
     wheel that meets a stone raise it.
     """
-    found: dict[tuple[int, int], str] = {}
+    found: dict[tuple[int, int], Remark] = {}
     for name, least in (("drawbar_pull", 0.0), ("slip", _LEAST_ERROR)):
         places = [(i, k) for i, rows in enumerate(runs) for k in range(len(rows))]
         errors = np.asarray([runs[i][k].std.get(name, np.nan) for i, k in places])
@@ -217,38 +218,41 @@ def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, in
         for place, size, error in zip(places, wandering, errors, strict=True):
             if size > _TIMES * usual and error > least:
                 words = name.replace("_", " ")
-                found[place] = (
+                text = (
                     f"it is irregular: the {words} wanders {size / usual:.2g} times as much as "
                     "in the middle of the windows, as if someone had touched the rig"
                 )
+                found[place] = Remark("irregular", text, (name,))
     return found
 
 
-def unusable(row: WindowRow, dead: Mapping[str, str]) -> str:
-    """Why a window cannot be a row; "" where it can."""
+def unusable(row: WindowRow, dead: Mapping[str, str]) -> Remark | None:
+    """Why a window cannot be a row; None where it can. `dead` are the sensors, with the reason."""
     for name in ("slip", "load"):
         if not np.isfinite(row.values.get(name, np.nan)):
-            role = next((r for r in dead if r == name), "")
-            return f"its {name} is not known{f': {dead[role]}' if role else ''}"
+            why = f": {dead[name]}" if name in dead else ""
+            return Remark("unknown-quantity", f"its {name} is not known{why}", (name,))
     if not abs(row.values["slip"]) < _MOST_SLIP:
-        return f"its slip is {row.values['slip']:.3g}: the wheel spins on the spot, or locks"
+        text = f"its slip is {row.values['slip']:.3g}: the wheel spins on the spot, or locks"
+        return Remark("slip-out-of-range", text, ("slip",))
     if row.values["load"] <= 0.0:
-        return f"its load is {row.values['load']:.3g} N"
+        return Remark("load-out-of-range", f"its load is {row.values['load']:.3g} N", ("load",))
     measured = [row.values.get(n, np.nan) for n in ("torque", "drawbar_pull", "sinkage")]
     if not np.isfinite(measured).any() and dead:
         role, why = next(iter(dead.items()))
-        return f"the sensor of [{role}] is dead: {why}"
-    return ""
+        return Remark("dead-sensor", f"the sensor of [{role}] is dead: {why}", (role,))
+    return None
 
 
-def without_torque(table: Table) -> list[str]:
+def without_torque(table: Table) -> list[Remark]:
     """A remark where no row has a torque, without which there is no estimate on board."""
     if np.isfinite(table[column("torque")]).any():
         return []
-    return [
+    text = (
         "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
         "identify a torque, a drawbar pull or a sinkage"
-    ]
+    )
+    return [Remark("no-torque", text, ("torque",))]
 
 
 def rows_as_table(

@@ -43,6 +43,7 @@ from soilml.log_import.rows import (
     without_torque,
 )
 from soilml.log_import.windows.steady import Stretch, steady_windows
+from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
 Progress = Callable[[str, int, int], None]
@@ -96,7 +97,7 @@ def import_log(
         return import_rows(recordings, found, accept)
     runs = runs_of(recordings, found)
     analyses = [_Wheel(found, wheel, runs, tell) for wheel in found.wheels]
-    wrong = [text for analysis in analyses for text in analysis.map_hints()]
+    wrong = [hint for analysis in analyses for hint in analysis.map_hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
     table = rows_as_table(
@@ -118,19 +119,19 @@ def import_log(
             )
         parts += contributions
     radius = found.wheels[0].radius
-    remarks = [text for analysis in analyses for text in analysis.remarks()]
+    remarks = [remark for analysis in analyses for remark in analysis.remarks()]
     remarks += without_torque(table)
     remarks += table_hints(table.columns, radius.value if radius else None)
     return ImportedLog(
-        table,
-        bias,
-        tuple(parts),
-        tuple(a.series(i) for i in range(len(runs)) for a in analyses),
-        tuple(dict.fromkeys(remarks)),
-        tuple(wrong),
-        radius.value if radius else float("nan"),
-        tuple(str(file) for file in files),
-        found.source,
+        table=table,
+        bias=bias,
+        shared=tuple(parts),
+        series=tuple(a.series(i) for i in range(len(runs)) for a in analyses),
+        remarks=tuple(dict.fromkeys(remarks)),
+        implausible=tuple(wrong),
+        radius=radius.value if radius else float("nan"),
+        sources=tuple(str(file) for file in files),
+        map_name=found.source,
     )
 
 
@@ -191,7 +192,7 @@ class _Wheel:
         for i, rows in enumerate(self.rows):
             kept = []
             for k, row in enumerate(rows):
-                why = unusable(row, self.dead[i]) or odd.get((i, k), "")
+                why = unusable(row, self.dead[i]) or odd.get((i, k))
                 if why:
                     self.stretches[i].append(replace(row.window, why=why))
                 else:
@@ -207,7 +208,7 @@ class _Wheel:
             found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
         return found
 
-    def map_hints(self) -> list[str]:
+    def map_hints(self) -> list[Remark]:
         """What says that the map is wrong."""
         return map_hints(self.log_map, self.wheel, self._windows())
 
@@ -225,18 +226,18 @@ class _Wheel:
             constants_of(self.wheel, self.log_map.vehicle),
         )
 
-    def remarks(self) -> list[str]:
+    def remarks(self) -> list[Remark]:
         """Dead and untared sensors."""
         of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
         found = []
         for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
             if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
-                found.append(f"run {run.name}: no sensor{of} says anything: an empty log?")
+                text = f"run {run.name}: no sensor{of} says anything: an empty log?"
+                found.append(Remark("empty-log", text, (run.name,)))
                 continue
-            found += [
-                f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
-                for role, why in dead.items()
-            ]
+            for role, why in dead.items():
+                text = f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
+                found.append(Remark("dead-sensor", text, (role, run.name)))
         found += untared_sensors(self.wheel, self.inputs)
         found += untared_load(self.wheel, self.inputs)
         return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
@@ -246,22 +247,25 @@ class _Wheel:
         run = self.runs[i]
         windows = [row.window for row in self.kept[i]]
         notes = (*run.notes, *self.inputs[i].notes)
-        notes += tuple(f"[{role}] is dead: {why}" for role, why in self.dead[i].items())
+        notes += tuple(
+            Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
+            for role, why in self.dead[i].items()
+        )
         return WheelSeries(
-            f"{run.name}_{self.wheel.name}" if self.wheel.name else run.name,
-            run.name,
-            self.inputs[i].time,
-            self.quantities[i],
-            tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
-            notes,
+            run=f"{run.name}_{self.wheel.name}" if self.wheel.name else run.name,
+            drive=run.name,
+            time=self.inputs[i].time,
+            quantities=self.quantities[i],
+            stretches=tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
+            notes=notes,
         )
 
 
 def _most_frequent(analyses: Sequence[_Wheel]) -> str:
     """The reason for which most of the time was left out."""
-    seconds: dict[str, float] = {}
-    for analysis in analyses:
-        for stretches in analysis.stretches:
-            for s in stretches:
-                seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
-    return max(seconds, key=lambda why: seconds[why], default="the logs are empty")
+    left_out = [s for analysis in analyses for own in analysis.stretches for s in own]
+    seconds: dict[Remark | None, float] = {}
+    for s in left_out:
+        seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
+    most = max(seconds, key=lambda why: seconds[why], default=None)
+    return most.text if most else "the logs are empty"

@@ -139,16 +139,15 @@ def _counted(number: int, name: str) -> str:
 
 def _init(args: argparse.Namespace) -> int:
     from soilml.cli.output import tell, write_stdout
-    from soilml.log_import.guesses.map_text import init_map
+    from soilml.log_import.guesses.map_text import draft_map
 
-    text = init_map(args.files)
+    draft = draft_map(args.files)
     if args.out is None:
-        write_stdout(text)
+        write_stdout(draft.text)
         return 0
-    save_text(args.out, text)
-    changes = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
-    lines = "1 line needs" if changes == 1 else f"{changes} lines need"
-    todo = f"{lines} a look (CHANGE, NEEDED)" if changes else "look at its guesses"
+    save_text(args.out, draft.text)
+    lines = "1 line needs" if draft.marked == 1 else f"{draft.marked} lines need"
+    todo = f"{lines} a look (CHANGE, NEEDED)" if draft.marked else "look at its guesses"
     logs = [str(file) for file in args.files]
     shown = shlex.join(logs) if len(logs) <= _MOST_NAMED else "LOG..."
     tell(f"{args.out} written; {todo}; then: soilml import {shown} --map {args.out} --out runs.csv")

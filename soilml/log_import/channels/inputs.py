@@ -22,6 +22,7 @@ from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.recording import Floats
 from soilml.log_import.windows.mean_errors import mean_error
+from soilml.remarks import Remark
 
 #: Span of the derivative of places and angles, s.
 SMOOTH = 0.5
@@ -68,7 +69,7 @@ class Inputs:
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
     tare: dict[str, float] = field(default_factory=dict)
     tare_error: dict[str, float] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    notes: list[Remark] = field(default_factory=list)
 
     @property
     def step(self) -> float:
@@ -225,10 +226,11 @@ def _tare(inputs: Inputs, wheel: WheelMap) -> None:
             continue
         if channel.tare == "rest":
             if rest is None:
-                inputs.notes.append(
+                text = (
                     f"[{role}] is not tared: the wheel does not rest at the start of the run; "
                     "state a stretch, such as tare = [0.5, 3.0]"
                 )
+                inputs.notes.append(Remark("not-tared", text, (role,)))
                 continue
             stretch = values[rest]
         else:
@@ -236,7 +238,8 @@ def _tare(inputs: Inputs, wheel: WheelMap) -> None:
             start, stop = channel.tare
             stretch = values[(inputs.time >= start) & (inputs.time <= stop)]
         if np.isfinite(stretch).sum() < 5:
-            inputs.notes.append(f"[{role}] is not tared: the stretch has fewer than 5 samples")
+            text = f"[{role}] is not tared: the stretch has fewer than 5 samples"
+            inputs.notes.append(Remark("not-tared", text, (role,)))
             continue
         zero, error = mean_error(stretch, inputs.step)[:2]
         inputs.values[role] = values - zero

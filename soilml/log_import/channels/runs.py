@@ -16,6 +16,7 @@ from soilml.errors import InputError
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.units import factor
+from soilml.remarks import Remark
 
 #: A recording, and the kind of its file where a run has several kinds.
 Member = tuple[Recording, FileKind | None]
@@ -31,7 +32,7 @@ class Run:
     name: str
     recordings: tuple[Recording, ...]
     times: tuple[Floats, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
     @property
     def about(self) -> tuple[str, ...]:
@@ -168,13 +169,15 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
         spread = spread_over_seconds(clock)
         if spread is not clock:
             clock = spread
-            notes.append("the clock shows whole seconds: lines of one second are spread over it")
+            text = "the clock shows whole seconds: lines of one second are spread over it"
+            notes.append(Remark("whole-seconds", text, severity="note"))
         good = _increasing(clock)
         if not good.any():
             continue
         if not good.all():
             count = int(np.sum(~good))
-            notes.append(f"{count} samples go back in time or have none, and are left out")
+            text = f"{count} samples go back in time or have none, and are left out"
+            notes.append(Remark("times-not-increasing", text))
             recording, clock = recording.rows(good), clock[good]
         if kind is not None and kind.clock == "start":
             clock = clock - clock[0]

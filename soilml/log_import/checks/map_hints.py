@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip,
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Floats
 from soilml.log_import.units import spelling
+from soilml.remarks import Remark
 
 #: Ratio of what was read to what is meant, for rotations; and for travel.
 _ROTATION = (
@@ -28,7 +30,7 @@ _SLOW_ROTATION = (
 _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 
 
-def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> list[str]:
+def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> list[Remark]:
     """What says that the map of a wheel is wrong.
 
     Parameters
@@ -42,21 +44,25 @@ def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> l
     found = [*_slope(wheel, windows), *_ratio(log_map, wheel, windows)]
     found += [*_load(log_map, wheel, windows), *_torque(log_map, wheel, windows)]
     found += _sinkage(wheel, windows)
-    return [f"{log_map.source}{of}: {text}" for text in found]
+    return [replace(hint, text=f"{log_map.source}{of}: {hint.text}") for hint in found]
 
 
-def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     if "slip" in wheel.channels:
         slip = windows.get("slip", np.zeros(0))
         if slip.size and float(np.nanmedian(np.abs(slip))) >= 1.0:
-            yield (
+            yield Remark(
+                "slip-unit",
                 f"slip is {float(np.nanmedian(slip)):.3g} in the middle of the windows: probably "
-                "it is in per cent; write unit = '%' in [slip]"
+                "it is in per cent; write unit = '%' in [slip]",
+                ("slip",),
             )
         elif falls_with_slip(windows):
-            yield (
+            yield Remark(
+                "slip-definition",
                 "torque falls as slip grows: probably the log has the ratio of travel to rim "
-                "speed; write definition = 'v/(r omega)' in [slip]"
+                "speed; write definition = 'v/(r omega)' in [slip]",
+                ("slip",),
             )
         return
     if not {"rim_speed", "speed"} <= windows.keys():
@@ -70,27 +76,35 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
     rotation = next(r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in wheel.channels)
     travel = "position" if "position" in wheel.channels else "ground_speed"
     if middle < -0.02:
-        yield (
+        yield Remark(
+            "sign",
             f"travel and rotation have opposite signs in {np.mean(ratio < 0.0):.0%} of windows: "
-            f"write reverse = true in [{travel}] or in [{rotation}]"
+            f"write reverse = true in [{travel}] or in [{rotation}]",
+            (travel, rotation),
         )
         ratio = np.abs(ratio)
         middle, fastest = float(np.median(ratio)), float(np.max(ratio))
     if 0.0 < fastest < 0.3:
-        yield (
+        yield Remark(
+            "rotation-too-fast",
             f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
             f"{1.0 / fastest:.3g} times as fast as the travel; "
-            f"{_too_fast(wheel, rotation, 1.0 / fastest)}"
+            f"{_too_fast(wheel, rotation, 1.0 / fastest)}",
+            (rotation,),
         )
     elif middle > 3.0:
-        yield (
+        yield Remark(
+            "travel-too-fast",
             f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
-            f"{_too_slow(wheel, travel, rotation, middle)}"
+            f"{_too_slow(wheel, travel, rotation, middle)}",
+            (travel, rotation),
         )
     elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
-        yield (
+        yield Remark(
+            "radius-as-diameter",
             f"slip is {1.0 - fastest:.2g} or more in all windows; was the radius of "
-            f"{wheel.radius.value if wheel.radius else math.nan:g} m measured as diameter?"
+            f"{wheel.radius.value if wheel.radius else math.nan:g} m measured as diameter?",
+            ("radius",),
         )
 
 
@@ -132,28 +146,32 @@ def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str
     return f"probably the unit of [{travel}] or of [{rotation}] is wrong"
 
 
-def _load(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+def _load(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     load = windows.get("load", np.zeros(0))
     load = load[np.isfinite(load)]
     if load.size == 0:
         return
     middle = float(np.median(load))
     if middle <= 0.0:
-        yield (
+        yield Remark(
+            "sign",
             f"the load is {middle:.3g} N in the middle of the windows: probably its sign is "
-            "turned; write reverse = true in [load]"
+            "turned; write reverse = true in [load]",
+            ("load",),
         )
         return
     if log_map.vehicle is not None and "load" in wheel.channels:
         weight = log_map.vehicle.mass.value * log_map.vehicle.gravity / log_map.vehicle.wheels
         if 0.7 < weight / middle / 9.80665 < 1.4:
-            yield (
+            yield Remark(
+                "unit",
                 f"the load of {middle:.3g} N is a tenth of the weight: probably it is in kg; write "
-                "unit = 'kgf' in [load]"
+                "unit = 'kgf' in [load]",
+                ("load",),
             )
 
 
-def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     if not {"torque", "load"} <= windows.keys() or wheel.radius is None:
         return
     torque, load = windows["torque"], windows["load"]
@@ -171,21 +189,33 @@ def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Ite
             cause = "torque_constant is in mN m/A, or the current in mA"
         elif wheel.radius.value < 0.01:
             cause = "the radius is in another unit"
-        yield f"torque is {traction:.3g} times W r in the middle of the windows: probably {cause}"
+        yield Remark(
+            "traction-out-of-range",
+            f"torque is {traction:.3g} times W r in the middle of the windows: probably {cause}",
+            (role,),
+        )
     elif cause:
         unit = wheel.channels[role].unit
         if spelling(unit) == "mN*m" and 0.02 < 1000.0 * traction < MOST_TRACTION:
             cause = f"[torque] is in N m, and was read as {unit}"
         elif role == "motor_current":
             cause = "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
-        yield f"torque is only {traction:.2g} times W r: probably {cause}"
+        yield Remark(
+            "traction-out-of-range",
+            f"torque is only {traction:.2g} times W r: probably {cause}",
+            (role,),
+        )
     slip = windows.get("slip", np.full(torque.shape, np.nan))
     driving = good & (slip > 0.05)
     if driving.sum() >= 2 and np.mean(torque[driving] < 0.0) > 0.6:
-        yield f"torque is below zero while the wheel drives: write reverse = true in [{role}]"
+        yield Remark(
+            "sign",
+            f"torque is below zero while the wheel drives: write reverse = true in [{role}]",
+            (role,),
+        )
 
 
-def _sinkage(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+def _sinkage(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     sinkage = windows.get("sinkage", np.zeros(0))
     sinkage = sinkage[np.isfinite(sinkage)]
     if wheel.radius is None or sinkage.size == 0:
@@ -195,13 +225,19 @@ def _sinkage(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
         cause = "it has its zero elsewhere; write tare = 'rest' in [sinkage]"
         if middle / 1000.0 < wheel.radius.value:
             cause = "it is in mm; write unit = 'mm' in [sinkage]"
-        yield f"sinkage is {middle:.3g} m, more than the diameter of the wheel: probably {cause}"
+        yield Remark(
+            "sinkage-out-of-range",
+            f"sinkage is {middle:.3g} m, more than the diameter of the wheel: probably {cause}",
+            ("sinkage",),
+        )
 
 
-def _slope(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[str]:
+def _slope(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     slope = windows.get("slope", np.zeros(0))
     if slope.size and np.isfinite(slope).any() and float(np.nanmax(np.abs(slope))) > 1.0:
-        yield (
+        yield Remark(
+            "unit",
             f"the slope goes to {float(np.nanmax(np.abs(slope))):.3g} rad: probably it is in "
-            "degrees; write unit = 'deg' in [slope]"
+            "degrees; write unit = 'deg' in [slope]",
+            ("slope",),
         )

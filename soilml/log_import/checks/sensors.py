@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.recording import Floats
+from soilml.remarks import Remark
 
 #: Sensors that respond when a wheel drives.
 _RESPONDING = ("torque", "motor_current", "load", "drawbar_pull", "sinkage")
@@ -82,7 +83,7 @@ def _driving(inputs: Inputs) -> NDArray[np.bool_]:
     return np.asarray(size > 0.3 * np.percentile(size, 90))
 
 
-def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
+def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[Remark]:
     """Sensors that read something at rest, where they should read zero, and are not tared."""
     found = []
     for role, unit in (("torque", "N m"), ("drawbar_pull", "N"), ("motor_current", "A"),
@@ -105,15 +106,16 @@ def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
                 offsets.append(mean)
                 shares.append(abs(mean) / level if level else np.inf)
         if offsets and float(np.median(shares)) > _OFFSET:
-            found.append(
+            text = (
                 f"[{role}] reads {float(np.median(offsets)):.3g} {unit} before the wheel starts "
                 f"({len(offsets)} of {len(runs)} runs), {float(np.median(shares)):.0%} of its "
                 "reading while driving: add tare = 'rest' where it should read zero there"
             )
+            found.append(Remark("not-tared", text, (role,)))
     return found
 
 
-def untared_load(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
+def untared_load(wheel: WheelMap, runs: list[Inputs]) -> list[Remark]:
     """A load that is not tared, beside a pull of the same kind of sensor with a large offset.
 
     What a load sensor reads too much cannot be seen while the wheel stands in the soil.
@@ -134,15 +136,18 @@ def untared_load(wheel: WheelMap, runs: list[Inputs]) -> list[str]:
         np.median([abs(i.tare["drawbar_pull"]) for i in runs if "drawbar_pull" in i.tare])
     )
     share = f"{float(np.median(shares)):.0%} of the load"
-    return [
+    text = (
         f"[drawbar_pull] read {offset:.3g} N before the wheel started, {share}: if one sensor "
         "measures both, the load may be wrong by as much, which no log shows; tare it with the "
         f"wheel lifted, give [load] value = the weight, or write bias = '1 % + {offset:.2g}' in "
         "[load]"
-    ]
+    )
+    return [Remark("load-not-tared", text, ("load", "drawbar_pull"))]
 
 
-def lifted_at_the_end(wheel: WheelMap, names: Sequence[str], runs: Sequence[Inputs]) -> list[str]:
+def lifted_at_the_end(
+    wheel: WheelMap, names: Sequence[str], runs: Sequence[Inputs]
+) -> list[Remark]:
     """A remark where a load that is not tared falls at the end of runs, and not to zero."""
     channel = wheel.channels.get("load")
     if channel is None or not channel.columns or channel.tare is not None:
@@ -164,8 +169,9 @@ def lifted_at_the_end(wheel: WheelMap, names: Sequence[str], runs: Sequence[Inpu
     if not found:
         return []
     name, zero, usual, first, last = found[0]
-    return [
+    text = (
         f"[load] falls from {usual:.3g} to {zero:.3g} N at the end of {len(found)} of {len(runs)} "
         f"runs: if the wheel is lifted there, that is the zero of the sensor; write tare = "
         f"[{first:.1f}, {last:.1f}] in [load], times of the run {name}"
-    ]
+    )
+    return [Remark("wheel-lifted", text, ("load", *(entry[0] for entry in found)))]

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from soilml.log_import.recording import Floats
+from soilml.remarks import Remark
 
 #: Range of T / (W r) of driving wheels on soil, and its usual value.
 LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
@@ -30,7 +31,7 @@ _TOO_SMALL = (
 )
 
 
-def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) -> list[str]:
+def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) -> list[Remark]:
     """Hints at columns in a wrong unit or with a wrong sign, most important first.
 
     Parameters
@@ -46,10 +47,11 @@ def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) ->
     >>> slip, load = np.array([0.1, 0.3, 0.5]), np.full(3, 60.0)
     >>> table_hints({"slip": slip, "load_N": load, "torque_Nm": np.array([1.5, 3, 4])}, 0.15)
     []
-    >>> table_hints({"slip": slip, "load_N": load / 9.81, "torque_Nm": np.array([1.5, 3, 4])}, 0.15)
-    ['torque is 3.27 times W r in the middle of the rows: probably the load is in kg and was taken as N']
-    """  # noqa: E501
-    found: list[str] = []
+    >>> wrong = {"slip": slip, "load_N": load / 9.81, "torque_Nm": np.array([1.5, 3, 4])}
+    >>> [(hint.code, hint.about) for hint in table_hints(wrong, 0.15)]
+    [('traction-out-of-range', ('torque_Nm', 'load_N'))]
+    """
+    found: list[Remark] = []
     for check in (
         _traction,
         _signs,
@@ -96,17 +98,19 @@ def falls_with_slip(columns: Mapping[str, Floats]) -> bool:
     return bool(varies and np.corrcoef(slip[good], traction[good])[0, 1] < -0.9)
 
 
-def _definition(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _definition(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     named = {"slip": "slip", "torque": "torque_Nm", "load": "load_N"}
     held = {key: columns[name] for key, name in named.items() if name in columns}
     if falls_with_slip(held):
-        yield (
+        yield Remark(
+            "slip-definition",
             "torque falls as slip grows: is slip the ratio of travel to rim speed, v/(r omega)? "
-            "Needed is 1 less it"
+            "Needed is 1 less it",
+            ("slip", "torque_Nm"),
         )
 
 
-def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     if radius is None or not {"slip", "load_N", "torque_Nm"} <= columns.keys():
         return
     load = columns["load_N"] * radius
@@ -116,62 +120,84 @@ def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> I
     traction = np.abs(columns["torque_Nm"][judged]) / load[judged]
     middle = float(np.median(traction))
     if cause := traction_cause(middle):
-        yield f"torque is {middle:.3g} times W r in the middle of the rows: probably {cause}"
+        yield Remark(
+            "traction-out-of-range",
+            f"torque is {middle:.3g} times W r in the middle of the rows: probably {cause}",
+            ("torque_Nm", "load_N"),
+        )
     elif (odd := np.flatnonzero(traction > 2.0 * MOST_TRACTION)).size:
         row = int(np.flatnonzero(judged)[odd[0]]) + 1
-        yield (
+        yield Remark(
+            "odd-row",
             f"torque is {float(traction[odd[0]]):.3g} times W r in row {row}, and at most "
-            f"{float(np.sort(traction)[-odd.size - 1]):.2g} times in the others: look at that row"
+            f"{float(np.sort(traction)[-odd.size - 1]):.2g} times in the others: look at that row",
+            ("torque_Nm",),
         )
 
 
-def _signs(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _signs(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     if not {"slip", "torque_Nm"} <= columns.keys():
         return
     slip, torque = columns["slip"], columns["torque_Nm"]
     judged = np.isfinite(torque) & (slip > _SLIPS) & (torque != 0.0)
     if judged.sum() >= 2 and np.mean(torque[judged] < 0.0) > 0.6:
-        yield (
+        yield Remark(
+            "sign",
             f"torque is below zero in {int(np.sum(torque[judged] < 0.0))} of {int(judged.sum())} "
-            "driving rows: probably its sign is turned"
+            "driving rows: probably its sign is turned",
+            ("torque_Nm",),
         )
 
 
-def _slip(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _slip(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     slip = columns.get("slip")
     if slip is None or slip.size < 3:
         return
     lowest = float(np.min(slip))
     if lowest > 0.9:
-        yield (
+        yield Remark(
+            "slip-unit",
             f"slip is {lowest:.2g} or more in all rows: probably the rotation was measured before "
-            "a gearbox, or is in another unit"
+            "a gearbox, or is in another unit",
+            ("slip",),
         )
     elif lowest > 0.45 and np.ptp(slip) > 0.03:
-        yield (
+        yield Remark(
+            "radius-as-diameter",
             f"slip is {lowest:.2g} or more in all rows: is the radius given as diameter? (slip "
-            f"would begin at {2.0 * lowest - 1.0:.2g})"
+            f"would begin at {2.0 * lowest - 1.0:.2g})",
+            ("slip",),
         )
     elif lowest < -0.3 and float(np.max(slip)) < 0.0:
-        yield (
+        yield Remark(
+            "slip-negative",
             f"slip is below zero in all rows, {lowest:.2g} at least: are rim and travel speed "
-            "exchanged, or is the radius too small?"
+            "exchanged, or is the radius too small?",
+            ("slip",),
         )
     elif 0.0 < float(np.max(np.abs(slip))) < 0.01:
-        yield "slip is below 0.01 in all rows: was it divided by 100 twice?"
+        yield Remark(
+            "slip-unit", "slip is below 0.01 in all rows: was it divided by 100 twice?", ("slip",)
+        )
 
 
-def _constant_torque(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _constant_torque(
+    columns: Mapping[str, Floats], radius: Floats | float | None
+) -> Iterator[Remark]:
     if not {"slip", "torque_Nm"} <= columns.keys():
         return
     known = np.isfinite(columns["torque_Nm"])
     if known.sum() >= 4 and np.ptp(columns["slip"][known]) > 0.05:
         torque = columns["torque_Nm"][known]
         if np.ptp(torque) == 0.0:
-            yield f"torque is {float(torque[0]):g} N m at every slip: probably its sensor is dead"
+            yield Remark(
+                "constant-reading",
+                f"torque is {float(torque[0]):g} N m at every slip: probably its sensor is dead",
+                ("torque_Nm",),
+            )
 
 
-def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     if not {"load_N", "drawbar_pull_N"} <= columns.keys():
         return
     known = np.isfinite(columns["drawbar_pull_N"])
@@ -179,19 +205,25 @@ def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Itera
         return
     ratio = columns["drawbar_pull_N"][known] / columns["load_N"][known]
     if float(np.median(np.abs(ratio))) > 1.2:
-        yield (
+        yield Remark(
+            "pull-out-of-range",
             f"drawbar pull is {float(np.median(np.abs(ratio))):.3g} times the load in the middle "
-            "of the rows: probably one of them is in another unit, or the sensor was not tared"
+            "of the rows: probably one of them is in another unit, or the sensor was not tared",
+            ("drawbar_pull_N", "load_N"),
         )
     slip = columns.get("slip")
     if slip is not None and known.sum() >= 4 and np.ptp(slip[known]) > 0.2:
         # at large slip a pull may fall, but not from small slip on
         order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.05 else 0.0
         if order < -0.8 and float(np.min(slip[known])) < 0.25:
-            yield "drawbar pull falls as slip grows: probably its sign is turned"
+            yield Remark(
+                "sign",
+                "drawbar pull falls as slip grows: probably its sign is turned",
+                ("drawbar_pull_N",),
+            )
 
 
-def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     sinkage = columns.get("sinkage_m")
     if sinkage is None or not np.isfinite(sinkage).any():
         return
@@ -203,13 +235,25 @@ def _sinkage(columns: Mapping[str, Floats], radius: Floats | float | None) -> It
             if _USUAL_SINKAGE[0] < middle / factor / one < _USUAL_SINKAGE[1]
         ]
         unit = " or ".join(units) or "another unit"
-        yield f"sinkage is {middle:.3g} m, more than the radius: probably it is in {unit}"
+        yield Remark(
+            "unit",
+            f"sinkage is {middle:.3g} m, more than the radius: probably it is in {unit}",
+            ("sinkage_m",),
+        )
     elif middle < -0.002:
-        yield f"sinkage is {middle:.3g} m in the middle of the rows: probably its sign is turned"
+        yield Remark(
+            "sign",
+            f"sinkage is {middle:.3g} m in the middle of the rows: probably its sign is turned",
+            ("sinkage_m",),
+        )
 
 
-def _angles(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[str]:
+def _angles(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     for name in ("slip_angle_rad", "slope_rad"):
         values = columns.get(name)
         if values is not None and np.isfinite(values).any() and np.nanmax(np.abs(values)) > 1.571:
-            yield f"{name} goes to {np.nanmax(np.abs(values)):.3g}: probably it is in degrees"
+            yield Remark(
+                "unit",
+                f"{name} goes to {np.nanmax(np.abs(values)):.3g}: probably it is in degrees",
+                (name,),
+            )

@@ -10,7 +10,7 @@ import numpy as np
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
 from soilml.log_import.guesses.constants import stated_radius, stated_scale
-from soilml.log_import.guesses.draft import Draft, inputs_of
+from soilml.log_import.guesses.draft import Draft, Marked, inputs_of
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.guesses.signs_and_tares import (
     far_sinkage,
@@ -31,10 +31,12 @@ _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf"
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
 #: What several columns of a channel are.
 _SEVERAL = {
-    "load": "CHANGE: cells that carry the wheel together are added; leave out others",
-    "drawbar_pull": "CHANGE: cells that pull together are added; leave out others",
+    "load": Marked("CHANGE: cells that carry the wheel together are added; leave out others"),
+    "drawbar_pull": Marked("CHANGE: cells that pull together are added; leave out others"),
     "sinkage": "the mean of them",
-    "slope": "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w",
+    "slope": Marked(
+        "CHANGE: accelerations forward, to the left and up; or a quaternion x, y, z, w"
+    ),
 }
 #: Words of columns that are errors of others.
 _ERRORS = {
@@ -137,7 +139,7 @@ def draft_of(
         return draft  # an angle, whatever the unit of accelerations
     unit, why = guess_unit(role, column, moving)
     if role == "position" and dimension(unit) == "count":
-        draft.put("scale", "1 mm", f"CHANGE: travel for one count ({unit})")
+        draft.put("scale", "1 mm", Marked(f"CHANGE: travel for one count ({unit})"))
     elif is_raw_signal(unit) and role in CALIBRATED:
         lines = [line for recording in run.recordings for line in recording.about]
         known_scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
@@ -145,7 +147,7 @@ def draft_of(
         draft.put(
             "scale", known_scale or example,
             f"for 1 {unit}; stated in the log: {line[:60]}" if known_scale else
-            f"CHANGE: what 1 {unit} is, from the calibration of the sensor",
+            Marked(f"CHANGE: what 1 {unit} is, from the calibration of the sensor"),
         )  # fmt: skip
     elif dimension(unit) == "1" and role in ("torque", "motor_current"):
         rated, one = ("torque", "N m") if role == "torque" else ("current", "A")
@@ -157,7 +159,7 @@ def draft_of(
             else f"0.01 {one}",
             f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
             if said
-            else f"CHANGE: what 1 % is, a hundredth of the rated {rated}",
+            else Marked(f"CHANGE: what 1 % is, a hundredth of the rated {rated}"),
         )
     elif dimension(unit) in ("count", "count/s"):
         number = stated.get("counts_per_turn", ("1", ""))[0]
@@ -166,7 +168,9 @@ def draft_of(
         draft.put(
             "counts_per_turn",
             float(number) if known_turn else 1.0,
-            "stated in the log" if known_turn else "CHANGE: counts for one turn of the encoder",
+            "stated in the log"
+            if known_turn
+            else Marked("CHANGE: counts for one turn of the encoder"),
         )
     else:
         draft.put("unit", unit, why)
@@ -188,7 +192,7 @@ def draft_of(
         else:
             why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
             if role == "motor_current" or "mot" in column.address.lower():
-                why = "CHANGE: turns of the motor for one of the wheel"
+                why = Marked("CHANGE: turns of the motor for one of the wheel")
             draft.put("gear_ratio", 1.0, why)
     if role == "motor_current":
         constant = stated.get("torque_constant")
@@ -196,10 +200,12 @@ def draft_of(
             draft.put("torque_constant", f"{constant[0]} +- 5 %", f"stated: {constant[1]}")
         else:
             draft.put(
-                "torque_constant", "1.0 N m/A +- 5 %", "CHANGE: from the data sheet of the motor"
+                "torque_constant",
+                "1.0 N m/A +- 5 %",
+                Marked("CHANGE: from the data sheet of the motor"),
             )
         efficiency = stated.get("efficiency", ("0.7", ""))[0]
-        why = "of the gearbox" if "efficiency" in stated else "CHANGE: of the gearbox"
+        why = "of the gearbox" if "efficiency" in stated else Marked("CHANGE: of the gearbox")
         draft.put("efficiency", f"{efficiency} +- 0.05", why)
         draft.put("idle_current", "0 A +- 0.02 A", "what the lifted wheel takes at this speed")
     return draft
@@ -266,10 +272,8 @@ def add_errors(drafts: dict[str, Draft], found: Assignment, errors: Sequence[Can
             if not same and role not in name_scores(" ".join(_plain(error.name))):
                 continue
             draft = drafts[role]
-            draft.put(
-                "std", error.address,
-                "CHANGE where it is the scatter of samples or repeats: of the mean, it is less",
-            )  # fmt: skip
+            why = "CHANGE where it is the scatter of samples or repeats: of the mean, it is less"
+            draft.put("std", error.address, Marked(why))
             if error.unit and error.unit != column.unit:
                 draft.put("std_unit", error.unit)
             break

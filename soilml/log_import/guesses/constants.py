@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from soilml.log_import.guesses.columns import name_scores, words_of
 from soilml.log_import.recording import Recording
@@ -104,13 +105,24 @@ def stated_radius(stated: dict[str, tuple[str, str]]) -> float:
     return 0.0
 
 
-def agreed_constants(
-    logs: Sequence[Sequence[Recording]],
-) -> tuple[dict[str, tuple[str, str]], dict[str, tuple[str, str, list[str]]]]:
-    """Constants that the logs state alike, and those that differ between them.
+@dataclass(frozen=True)
+class StatedConstants:
+    """Constants that logs state in the lines before their headers, by name.
 
-    Of those that differ, a pattern for the number in the line, its unit, and the numbers.
+    Attributes
+    ----------
+    common
+        Those that all logs state alike: as they would be written in a map, and the line.
+    of_each
+        Those that differ: a pattern for the number in the line, its unit, and the numbers.
     """
+
+    common: dict[str, tuple[str, str]]
+    of_each: dict[str, tuple[str, str, list[str]]]
+
+
+def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
+    """The constants that logs state."""
     each = [stated_constants([line for own in log for line in own.about]) for log in logs]
     alike, differing = {}, {}
     for name in dict.fromkeys(name for found in each for name in found):
@@ -124,7 +136,7 @@ def agreed_constants(
         if start > 0 and all(name in found for found in each):
             pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
             differing[name] = (pattern, unit, values)
-    return alike, differing
+    return StatedConstants(alike, differing)
 
 
 def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:

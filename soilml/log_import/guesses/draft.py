@@ -39,6 +39,16 @@ def toml_value(value: Any) -> str:
     return "".join(c if is_plain(c) else f"\\U{ord(c):08x}" for c in written)
 
 
+class Marked(str):
+    """A line of a map, or the comment of a key, with what no log can tell: a person must look."""
+
+
+def key_line(key: str, value: Any, comment: str = "") -> str:
+    """The line of a key, which is marked where its comment is."""
+    line = f"{key} = {toml_value(value)}" + (f"  # {comment}" if comment else "")
+    return Marked(line) if isinstance(comment, Marked) else line
+
+
 @dataclass
 class Draft:
     """The table of one channel: its keys, and a comment for each of them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from soilml.errors import InputError
@@ -34,7 +34,14 @@ from soilml.log_import.guesses.columns import (
     words_of,
 )
 from soilml.log_import.guesses.constants import agreed_constants
-from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, keys_alike, toml_value
+from soilml.log_import.guesses.draft import (
+    Draft,
+    Marked,
+    fastest_ratio,
+    inputs_of,
+    key_line,
+    keys_alike,
+)
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
 from soilml.log_import.mapping.channel_map import ROLES
@@ -50,7 +57,7 @@ _MOST_LISTED, _LOOKED = 40, 8
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 
 
-def guess_windows(runs: Sequence[Run], drafts: dict[str, Draft]) -> list[str]:
+def _window_lines(runs: Sequence[Run]) -> list[str]:
     """Lines of the table; short runs get shorter windows."""
     lengths = sorted(times[-1] - times[0] for run in runs for times in run.times)
     middle = lengths[len(lengths) // 2] if lengths else 0.0
@@ -71,6 +78,14 @@ def guess_windows(runs: Sequence[Run], drafts: dict[str, Draft]) -> list[str]:
     ]
 
 
+@dataclass(frozen=True)
+class DraftedMap:
+    """A map as TOML with comments, and how many of its lines are marked as not known."""
+
+    text: str
+    marked: int
+
+
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
     """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
 
@@ -79,15 +94,20 @@ def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
 
     Raises `InputError` where a file cannot be read or has no columns.
     """
+    return draft_map(logs).text
+
+
+def draft_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> DraftedMap:
+    """What `init_map` gives, with the number of lines that are marked."""
     files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
     if not files:
         raise InputError("no log was given; needed is at least one file")
     recordings = [read_log(Path(file)) for file in files]
-    return _MapText(recordings).text()
+    return _MapDrafting(recordings).draft()
 
 
-class _MapText:
-    """The map of some logs, section by section."""
+class _MapDrafting:
+    """The draft of a map of some logs, section by section."""
 
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
         self.logs = logs
@@ -107,10 +127,10 @@ class _MapText:
             self.pauses, self.longest = 0, math.inf
         for log in logs:
             refuse_a_table_of_runs(log)
-        self.stated, self.heads = agreed_constants(logs)
+        self.stated = agreed_constants(logs)
         self.rate = 0.0
         if not self.time_column and all(recording.clock is None for recording in first):
-            self.rate = float(self.stated.get("rate", ("100", ""))[0].split()[0])
+            self.rate = float(self.stated.common.get("rate", ("100", ""))[0].split()[0])
         self.kinds = self._with_clocks(guess_file_kinds(logs))
         self.runs = runs_of(logs, self._map(self.kinds))
         self.run = liveliest(self.runs[:_LOOKED])
@@ -123,16 +143,16 @@ class _MapText:
 
     def _map(self, kinds: Sequence[FileKind]) -> LogMap:
         return LogMap(
-            "map",
-            (),
-            tuple(kinds),
-            self.time_column,
-            self.time_unit,
-            self.rate,
-            self.run_column,
-            self.restarts > 0 and not self.structs,
-            self.structs > 0,
-            self.longest,
+            source="map",
+            wheels=(),
+            files=tuple(kinds),
+            time_column=self.time_column,
+            time_unit=self.time_unit,
+            rate=self.rate,
+            run_column=self.run_column,
+            split_at_reset=self.restarts > 0 and not self.structs,
+            each_struct=self.structs > 0,
+            split_at_pause=self.longest,
         )
 
     def _with_clocks(self, kinds: Sequence[FileKind]) -> tuple[FileKind, ...]:
@@ -151,26 +171,26 @@ class _MapText:
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
-    def text(self) -> str:
+    def draft(self) -> DraftedMap:
         """The whole map."""
         lines = self._head()
         lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
         drafts = {
-            name: draft_channels(self.found.shared | own, self.run, self.stated, self.found.parts)
+            name: draft_channels(
+                self.found.shared | own, self.run, self.stated.common, self.found.parts
+            )
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
         add_errors(first, self.found, self.errors)
         lines += self._wheel(first)
-        lines += load_lines(self.found, self.stated, self.heads, self.run_names, len(self.labels))
+        lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
         for role in ROLES:
             if role in self.found.shared:
                 lines += self._channel(f"[{role}]", role, first[role])
             elif role not in self.found.roles():
-                lines += absent_lines(
-                    role, self.found, self.columns, self.run_names, self.stated, self.heads
-                )
+                lines += absent_lines(role, self.found, self.columns, self.stated, self.run_names)
         of_wheels = self.found.wheels.items()
         alike = keys_alike([{role: drafts[name][role] for role in own} for name, own in of_wheels])
         for role, draft in alike.items():
@@ -183,9 +203,10 @@ class _MapText:
                 draft = drafts[name][role].without(alike[role])
                 lines += self._table(f"[wheels.{name}.{role}]", role, draft)
         if not self.steady:
-            lines += guess_windows(self.runs, first)
+            lines += _window_lines(self.runs)
         # values are plain already; names and lines of the log also stand in comments
-        return "\n".join(escaped(line).replace("\n", "\\n") for line in lines) + "\n"
+        text = "\n".join(escaped(line).replace("\n", "\\n") for line in lines) + "\n"
+        return DraftedMap(text, sum(isinstance(line, Marked) for line in lines))
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
@@ -214,60 +235,63 @@ class _MapText:
     def _files(self) -> list[str]:
         lines = []
         for kind in self.kinds:
-            lines += ["", f"[files.{kind.name}]", f"pattern = {toml_value(kind.pattern)}"]
+            lines += ["", f"[files.{kind.name}]", key_line("pattern", kind.pattern)]
             why = "their clocks share no time: each starts at 0" if kind.clock == "start" else (
                 "times can be compared; 'start' where each clock starts at 0"
             )  # fmt: skip
-            lines.append(f'clock = "{kind.clock}"  # {why}')
+            lines.append(key_line("clock", kind.clock, why))
             if kind.time_column:
-                lines.append(f"time = {toml_value(kind.time_column)}")
-                lines.append(f"time_unit = {toml_value(kind.time_unit)}")
+                lines.append(key_line("time", kind.time_column))
+                lines.append(key_line("time_unit", kind.time_unit))
         return lines
 
     def _time_lines(self) -> list[str]:
         if self.steady:
             return []
         if self.time_column:
-            column, unit = toml_value(self.time_column), toml_value(self.time_unit)
-            return ["", "[time]", f"column = {column}", f"unit = {unit}"]
+            column = key_line("column", self.time_column)
+            return ["", "[time]", column, key_line("unit", self.time_unit)]
         if not self.rate:
             return ["", "# Time comes from the messages."]
-        stated = "stated in the log" if "rate" in self.stated else "CHANGE: no column is a clock"
-        return ["", "[time]", f'rate = "{self.rate:g} Hz"  # {stated}']
+        why = "stated in the log"
+        if "rate" not in self.stated.common:
+            why = Marked("CHANGE: no column is a clock")
+        return ["", "[time]", key_line("rate", f"{self.rate:g} Hz", why)]
 
     def _run_lines(self) -> list[str]:
         if self.steady:
-            lines = [
-                "",
-                "[runs]",
-                f"each_row = true  # {self.steady} rows and no time: each is a run",
-            ]
-            name = run_of_rows(self.run.recordings)
-            why = "rows with one name were driven on one soil"
-            return [*lines, f"column = {toml_value(name)}  # {why}"] if name else lines
+            why = f"{self.steady} rows and no time: each is a run"
+            lines = ["", "[runs]", key_line("each_row", True, why)]
+            if name := run_of_rows(self.run.recordings):
+                why = "rows with one name were driven on one soil"
+                lines.append(key_line("column", name, why))
+            return lines
+        key, why = "", ""
+        value: str | bool = True
         if self.run_column:
-            column = toml_value(self.run_column)
-            what = f"{self.run_count} values, one run each"
+            key, value, why = "column", self.run_column, f"{self.run_count} values, one run each"
             if self.labels:
-                what = f"a line for each wheel ({', '.join(self.labels[:4])}): each is a run"
-            return ["", "[runs]", f"column = {column}  # {what}"]
-        if self.structs:
-            return ["", "[runs]", f"each_struct = true  # {self.structs} with the same columns"]
-        if self.restarts:
+                why = f"a line for each wheel ({', '.join(self.labels[:4])}): each is a run"
+        elif self.structs:
+            key, why = "each_struct", f"{self.structs} with the same columns"
+        elif self.restarts:
+            key = "split_where_time_restarts"
             why = f"the time starts again {self.restarts} times"
-            return ["", "[runs]", f"split_where_time_restarts = true  # {why}"]
-        if self.pauses:
+        elif self.pauses:
+            key, value = "split_at_pauses_over", f"{self.longest:g} s"
             why = f"the log pauses {self.pauses} times"
-            return ["", "[runs]", f'split_at_pauses_over = "{self.longest:g} s"  # {why}']
-        return []
+        return ["", "[runs]", key_line(key, value, why)] if key else []
 
     def _wheel(self, drafts: dict[str, Draft]) -> list[str]:
         lines = ["", "[wheel]"]
         for key in ("radius", "diameter"):
-            if key in self.stated:
-                value, line = self.stated[key]
+            if key in self.stated.common:
+                value, line = self.stated.common[key]
                 number = value if " " in value else f"{value} m"
-                return [*lines, f'{key} = "{number} +- 1 %"  # stated in the log: {line[:60]}']
+                return [
+                    *lines,
+                    key_line(key, f"{number} +- 1 %", f"stated in the log: {line[:60]}"),
+                ]
         needed = not {"slip", "rim_speed"} & self.found.roles() and bool(
             {"wheel_speed", "wheel_angle"} & self.found.roles()
         )
@@ -285,14 +309,15 @@ class _MapText:
                     f"; travel over rotation is {ratio:.3g} m: a unit is wrong, or the rotation is "
                     "measured before a gearbox"
                 )
-        word = "NEEDED" if needed else "for checks"
-        return [*lines, f'# radius = "0.15 m +- 1 %"  # {word}{hint}']
+        example = '# radius = "0.15 m +- 1 %"'
+        if needed:
+            return [*lines, Marked(f"{example}  # NEEDED{hint}")]
+        return [*lines, f"{example}  # for checks{hint}"]
 
     def _table(self, header: str, role: str, draft: Draft) -> list[str]:
         lines = ["", header]
         for key, value in draft.keys.items():
-            comment = draft.comments.get(key, "")
-            lines.append(f"{key} = {toml_value(value)}" + (f"  # {comment}" if comment else ""))
+            lines.append(key_line(key, value, draft.comments.get(key, "")))
         others = [c.address for c in self.found.others.get(role, [])[:4]]
         if others and "column" in draft.keys:
             lines.append(f"# or: {', '.join(others)}")
@@ -300,8 +325,6 @@ class _MapText:
 
     def _channel(self, header: str, role: str, draft: Draft, more: str = "") -> list[str]:
         lines = self._table(f"{header}  # {ROLES[role][1]}{more}", role, draft)
-        if role in ("torque", "load", "drawbar_pull", "position", "ground_speed", "rim_speed"):
-            share = {"torque": "2 %", "load": "1 %"}.get(role)
-            if share:
-                lines.append(f'bias = "{share}"  # calibration error that all rows share')
+        if share := {"torque": "2 %", "load": "1 %"}.get(role):
+            lines.append(key_line("bias", share, "calibration error that all rows share"))
         return lines

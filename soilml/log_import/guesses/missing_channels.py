@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from soilml.log_import.guesses.columns import Candidate, words_of
-from soilml.log_import.guesses.constants import number_in_names
-from soilml.log_import.guesses.draft import toml_value
+from soilml.log_import.guesses.constants import StatedConstants, number_in_names
+from soilml.log_import.guesses.draft import Marked, key_line, toml_value
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
 
@@ -17,11 +17,7 @@ _OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
 
 
 def load_lines(
-    found: Assignment,
-    stated: dict[str, tuple[str, str]],
-    heads: dict[str, tuple[str, str, list[str]]],
-    run_names: Sequence[str],
-    labels: int = 1,
+    found: Assignment, stated: StatedConstants, run_names: Sequence[str], labels: int = 1
 ) -> list[str]:
     """What stands for the load where no column is one: what logs or names say, or the mass.
 
@@ -29,130 +25,108 @@ def load_lines(
     """
     if "load" in found.roles():
         return []
-    if "load" in stated and "mass" not in stated:
-        value, line = stated["load"]
-        return ["", "[load]", f'value = "{value} +- 1 %"  # stated in the log: {line[:60]}']
-    if "load" in heads:
-        pattern, unit, stated_there = heads["load"]
-        return [
-            "",
-            "[load]",
-            f"head = {toml_value(pattern)}  # the logs state {', '.join(stated_there[:4])}",
-            f"unit = {toml_value(unit or 'N')}",
-        ]
-    in_name = number_in_names("load", run_names)
-    if in_name is not None:
-        pattern, unit, numbers = in_name
-        shown = ", ".join(f"{n:g}" for n in numbers[:4])
-        return [
-            "",
-            "[load]",
-            f"file_name = {toml_value(pattern)}  # the names say {shown}",
-            f"unit = {toml_value(unit)}",
-        ]
+    said = [] if {"load", "mass"} <= stated.common.keys() else _said("load", stated, "1 %", "N")
+    said = said or _said_by_names("load", run_names)
+    if said:
+        return said
     count, why = max(1, len(found.wheels), labels), ""
     if count == 1:
-        why = "  # CHANGE: how many wheels carry this mass"
-        if "wheels" in stated:
-            count, why = (
-                int(stated["wheels"][0]),
-                f"  # stated in the log: {stated['wheels'][1][:60]}",
-            )
-    mass, line = stated.get("mass", ("", ""))
+        why = Marked("CHANGE: how many wheels carry this mass")
+        if "wheels" in stated.common:
+            number, line = stated.common["wheels"]
+            count, why = int(number), f"stated in the log: {line[:60]}"
     lines = ["", "# No column is a vertical load: it follows from the mass."]
-    if mass:
-        return [
-            *lines,
-            "[vehicle]",
-            f'mass = "{mass} +- 1 %"  # stated in the log: {line[:60]}',
-            f"wheels = {count}{why}",
-        ]
+    wheels = key_line("wheels", count, why)
+    if "mass" in stated.common:
+        return [*lines, "[vehicle]", _stated_line("mass", stated.common["mass"], "1 %"), wheels]
     return [
         *lines,
-        "# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'",
+        Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'"),
         '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
-        f"# wheels = {count}{why}",
+        Marked(f"# {wheels}") if isinstance(wheels, Marked) else f"# {wheels}",
     ]
 
 
-def _slip_of_heads(
-    stated: dict[str, tuple[str, str]], heads: dict[str, tuple[str, str, list[str]]]
-) -> list[str]:
-    """A slip that the lines before the headers state, of all logs together or of each its own."""
-    if "slip" in stated:
-        value, line = stated["slip"]
-        return ["", "[slip]", f'value = "{value} +- 0.01"  # stated in the log: {line[:60]}']
-    if "slip" not in heads:
+def _stated_line(key: str, stated: tuple[str, str], std: str) -> str:
+    value, line = stated
+    return key_line(key, f"{value} +- {std}", f"stated in the log: {line[:60]}")
+
+
+def _said(role: str, stated: StatedConstants, std: str, unit: str) -> list[str]:
+    """The table of a role that the lines before the headers state, of all logs or of each."""
+    if role in stated.common:
+        return ["", f"[{role}]", _stated_line("value", stated.common[role], std)]
+    if role not in stated.of_each:
         return []
-    pattern, unit, values = heads["slip"]
-    large = max(float(value.split()[0]) for value in values) > 1.0
+    pattern, own, values = stated.of_each[role]
     return [
         "",
-        "[slip]",
-        f"head = {toml_value(pattern)}  # the logs state {', '.join(values[:4])}",
-        f"unit = {toml_value(unit or ('%' if large else '1'))}",
-        "noise = 0.01  # CHANGE: how far the slip may be from what was set",
+        f"[{role}]",
+        key_line("head", pattern, f"the logs state {', '.join(values[:4])}"),
+        key_line("unit", own or unit),
     ]
+
+
+def _said_by_names(role: str, run_names: Sequence[str]) -> list[str]:
+    """The table of a role whose number stands in the names of all runs."""
+    in_name = number_in_names(role, run_names)
+    if in_name is None:
+        return []
+    pattern, unit, numbers = in_name
+    shown = ", ".join(f"{n:g}" for n in numbers[:4])
+    line = key_line("file_name", pattern, f"the names say {shown}")
+    return ["", f"[{role}]", line, key_line("unit", unit)]
+
+
+def _slip_lines(stated: StatedConstants, run_names: Sequence[str]) -> list[str]:
+    """A slip that was set, as the heads or the names of the logs say."""
+    values = stated.of_each["slip"][2] if "slip" in stated.of_each else []
+    large = any(float(value.split()[0]) > 1.0 for value in values)
+    if not (lines := _said("slip", stated, "0.01", "%" if large else "1")):
+        return _said_by_names("slip", run_names)
+    if "slip" not in stated.common:
+        why = Marked("CHANGE: how far the slip may be from what was set")
+        lines.append(key_line("noise", 0.01, why))
+    return lines
 
 
 def absent_lines(
     role: str,
     found: Assignment,
     columns: Sequence[Candidate],
+    stated: StatedConstants,
     run_names: Sequence[str],
-    stated: dict[str, tuple[str, str]],
-    heads: dict[str, tuple[str, str, list[str]]],
 ) -> list[str]:
     """What stands for another role that no column has: what is needed, or the runner-up."""
-    others: list[Candidate] = found.others.get(role, [])
-    if role == "slip" and not ({"position", "ground_speed"} & found.roles()):
-        if lines := _slip_of_heads(stated, heads):
-            return lines
-        in_name = number_in_names("slip", run_names)
-        if in_name is not None:
-            return [
-                "",
-                "[slip]",
-                f"file_name = {toml_value(in_name[0])}",
-                f"unit = {toml_value(in_name[1])}",
-            ]
-    rotation = {"wheel_speed", "wheel_angle", "rim_speed", "slip"} & found.roles()
+    roles, others = found.roles(), found.others.get(role, [])
+    if (
+        role == "slip"
+        and not {"position", "ground_speed"} & roles
+        and (lines := _slip_lines(stated, run_names))
+    ):
+        return lines
+    rotation = {"wheel_speed", "wheel_angle", "rim_speed", "slip"} & roles
     if role == "wheel_speed" and not rotation and not others:
         commanded = [c.address for c in columns if "slip" in words_of(c.name)]
         return [
             "",
-            "# NEEDED: no column is the rotation of the wheel. One of these:",
+            Marked("# NEEDED: no column is the rotation of the wheel. One of these:"),
             "# [wheel_angle]",
             "# [wheel_speed]",
             *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
         ]
-    if role == "ground_speed" and not {"position", "slip"} & found.roles():
-        if "ground_speed" in stated:
-            value, line = stated["ground_speed"]
-            return ["", "[ground_speed]",
-                    f'value = "{value} +- 1 %"  # stated in the log: {line[:60]}']  # fmt: skip
-        if "ground_speed" in heads:
-            pattern, unit, values = heads["ground_speed"]
-            return ["", "[ground_speed]",
-                    f"head = {toml_value(pattern)}  # the logs state {', '.join(values[:4])}",
-                    f"unit = {toml_value(unit or 'm/s')}"]  # fmt: skip
-    if role == "torque" and not ("motor_current" in found.roles() or others):
-        return [
-            "",
-            "# NEEDED for a soil: no column is a torque. One of these:",
-            "# [torque]",
-            *(
-                line
-                for c in columns
-                if c.kind == "N" and _OF_TORQUE & {*words_of(c.name)}
-                for line in (
-                    f"# column = {toml_value(c.address)}",
-                    '# scale = "0.2 N m +- 1 %"  # 1 N on a lever arm of 0.2 m',
-                )
-            ),
-            "# [motor_current]",
-        ]
-    if role == "ground_speed" and not ({"position", "slip"} & found.roles() or others):
+    travel = {"position", "slip"} & roles
+    if role == "ground_speed" and not travel and (lines := _said(role, stated, "1 %", "m/s")):
+        return lines
+    if role == "torque" and not ("motor_current" in roles or others):
+        forces = [c for c in columns if c.kind == "N" and _OF_TORQUE & {*words_of(c.name)}]
+        needed = Marked("# NEEDED for a soil: no column is a torque. One of these:")
+        lines = ["", needed, "# [torque]"]
+        for c in forces:
+            lines.append(f"# column = {toml_value(c.address)}")
+            lines.append('# scale = "0.2 N m +- 1 %"  # 1 N on a lever arm of 0.2 m')
+        return [*lines, "# [motor_current]"]
+    if role == "ground_speed" and not (travel or others):
         degrees = [c.address for c in columns if _GLOBE & {*words_of(c.name)}]
         return [
             "",
@@ -160,7 +134,7 @@ def absent_lines(
                 f"# {name}: degrees on the globe are no place; add columns in m, north and east"
                 for name in degrees
             ),
-            "# NEEDED: no column is the travel. One of these:",
+            Marked("# NEEDED: no column is the travel. One of these:"),
             "# [ground_speed]",
             '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
         ]

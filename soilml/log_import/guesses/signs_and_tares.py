@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, resting
 from soilml.log_import.guesses.columns import words_of
-from soilml.log_import.guesses.draft import Draft, moving
+from soilml.log_import.guesses.draft import Draft, Marked, moving
 
 #: Share of the reading while driving from which a reading at rest is an offset.
 _OFFSET = 0.01
@@ -123,7 +123,7 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
     if abs(rest) < far and abs(level) < _FAR and not falls:
         height = draft.column is not None and _HEIGHTS & {*words_of(draft.column.name)}
         if height and not abs(rest) > _STANDS:
-            draft.comments["column"] = (
+            draft.comments["column"] = Marked(
                 "CHANGE: a height is a sinkage where its zero is the undisturbed surface; else add "
                 'tare = "rest" and bias = 0.01'
             )
@@ -139,7 +139,8 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
         draft.keys.pop("reverse", None)
     why = "sinkage counts from where the wheel rests"
     draft.put("tare", "rest", f"it reads {1e3 * abs(rest):.3g} mm there; {why}")
-    draft.put("bias", _SUNK, "CHANGE: m, by how much the wheel may have sunk in before it started")
+    why = "CHANGE: m, by how much the wheel may have sunk in before it started"
+    draft.put("bias", _SUNK, Marked(why))
 
 
 def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
@@ -161,9 +162,10 @@ def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
     start, stop = float(inputs.time[0]), float(inputs.time[0] + 0.8 * end * inputs.step)
     if abs(first) > _OFFSET * abs(driving):
         drafts["load"].put(
-            "tare", [round(start, 2), round(stop, 2)], f"CHANGE: from, until, s; it reads "
-            f"{first:.3g} there and {driving:.3g} while driving: right if the wheel was above the "
-            "ground"
+            "tare", [round(start, 2), round(stop, 2)], Marked(
+                f"CHANGE: from, until, s; it reads {first:.3g} there and {driving:.3g} while "
+                "driving: right if the wheel was above the ground"
+            ),
         )  # fmt: skip
     on_ground = np.abs(values - first) > 0.9 * abs(driving - first)
     if drafts.get("sinkage", Draft()).keys.get("tare") == "rest" and on_ground.any():

@@ -11,6 +11,7 @@ from soilml.errors import InputError, MissingLibraryError
 from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
+from soilml.remarks import Remark, texts
 
 
 def read_bag(path: Path) -> list[Recording]:
@@ -23,7 +24,7 @@ def read_bag(path: Path) -> list[Recording]:
         need(library, "import", "logs")
     topics: dict[str, TopicColumns] = {}
     messages = _mcap_messages if path.suffix == ".mcap" else _ros_messages
-    notes: list[str] = []
+    notes: list[Remark] = []
     try:
         for topic, seconds, message in messages(path, notes):
             topics.setdefault(topic, TopicColumns()).add(seconds, message)
@@ -38,11 +39,13 @@ def read_bag(path: Path) -> list[Recording]:
         if (columns := held.columns())
     ]
     if not found:
-        raise InputError(f"{path}: no topic has numbers that can be read; {'; '.join(notes)}")
+        raise InputError(
+            f"{path}: no topic has numbers that can be read; {'; '.join(texts(notes))}"
+        )
     return found
 
 
-def _ros_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, Any]]:
+def _ros_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any]]:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -56,12 +59,13 @@ def _ros_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, An
                 message = reader.deserialize(raw, connection.msgtype)
             except KeyError:
                 unknown.add(connection.topic)
-                notes.append(f"{connection.topic}: type {connection.msgtype} is not known")
+                text = f"{connection.topic}: type {connection.msgtype} is not known"
+                notes.append(Remark("unknown-type", text, (connection.topic,)))
                 continue
             yield connection.topic, 1e-9 * nanoseconds, message
 
 
-def _mcap_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, Any]]:
+def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any]]:
     from mcap.reader import make_reader
 
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
@@ -71,9 +75,10 @@ def _mcap_messages(path: Path, notes: list[str]) -> Iterator[tuple[str, float, A
                 decoders[channel.id] = _decoder(schema, channel.message_encoding)
                 if decoders[channel.id] is None:
                     kind = channel.message_encoding or "unknown"
-                    notes.append(
+                    text = (
                         f"{channel.topic}: encoding {kind} is not read (json, protobuf, cdr, ros1)"
                     )
+                    notes.append(Remark("unknown-encoding", text, (channel.topic,)))
             decode = decoders[channel.id]
             if decode is not None:
                 yield channel.topic, 1e-9 * message.log_time, decode(message.data)

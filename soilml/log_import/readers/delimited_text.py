@@ -23,6 +23,7 @@ from soilml.log_import.readers.text_layout import (
     split_line,
 )
 from soilml.log_import.recording import Floats, Recording
+from soilml.remarks import Remark
 
 #: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
 _LOOKED, _NUMBERS = 300, 0.5
@@ -64,13 +65,15 @@ def read_delimited_text(path: Path) -> list[Recording]:
     rows, bad = _rows(samples, layout)
     notes = []
     if encoding not in ("utf-8", "utf-8-sig"):
-        notes.append(f"read as {encoding}")
+        notes.append(Remark("encoding", f"read as {encoding}", severity="note"))
     if layout.decimal_comma:
-        notes.append("numbers have decimal commas")
+        notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
     if bad:
-        notes.append(f"{bad} lines have a wrong number of cells and are left out")
+        said = f"{bad} lines have a wrong number of cells and are left out"
+        notes.append(Remark("lines-left-out", said))
     if blocks:
-        notes.append(f"the header stands {len(set(blocks))} times: a run below each ({BLOCK!r})")
+        said = f"the header stands {len(set(blocks))} times: a run below each ({BLOCK!r})"
+        notes.append(Remark("blocks", said, (BLOCK,), "note"))
     columns, texts = _columns([row for row, _ in rows], layout)
     if blocks:
         texts[BLOCK] = [blocks[i] for _, i in rows]
@@ -237,7 +240,8 @@ def signals_of(recording: Recording) -> list[Recording]:
         if units:
             unit[name] = own.texts[units][0]
         columns = {clock: own.columns[clock], name: own.columns[values[0]]}
-        notes = (*recording.notes, f"each line is one reading of {signal!r}")
+        said = f"each line is one reading of {signal!r}"
+        notes = (*recording.notes, Remark("long-table", said, (signal,), "note"))
         found.append(
             Recording("", recording.file, columns, {}, unit, about=recording.about, notes=notes)
         )

@@ -12,6 +12,7 @@ from soilml.errors import InputError
 from soilml.log_import.readers.message_fields import TopicColumns
 from soilml.log_import.readers.text_layout import decode_text
 from soilml.log_import.recording import Recording
+from soilml.remarks import Remark
 
 #: Fewer samples are none, as in text logs.
 _FEWEST = 3
@@ -24,7 +25,8 @@ def read_json_log(path: Path) -> list[Recording]:
     """
     text, _ = decode_text(path.read_bytes(), path)
     samples, bad = _samples(text)
-    notes = (f"{bad} lines are no JSON objects and are left out",) if bad else ()
+    said = f"{bad} lines are no JSON objects and are left out"
+    notes = (Remark("lines-left-out", said),) if bad else ()
     found = TopicColumns()
     for number, sample in enumerate(samples):
         found.add(float(number), sample)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.log_import.recording import Floats, Recording
+from soilml.remarks import Remark
 
 #: Ends of the ranges of integers, which converters without a signal show.
 _ENDS = (32767.0, -32768.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
@@ -35,7 +36,8 @@ def without_codes(recording: Recording) -> Recording:
         if code is not None:
             found = values == code
             columns[name] = np.where(found, np.nan, values)
-            notes.append(f"{name}: {code:g} is no reading, and left out {int(found.sum())} times")
+            text = f"{name}: {code:g} is no reading, and left out {int(found.sum())} times"
+            notes.append(Remark("missing-code", text, (name,)))
     if len(notes) == len(recording.notes):
         return recording
     return replace(recording, columns=columns, clock=clock, notes=tuple(notes))
@@ -45,8 +47,9 @@ def _huge(values: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.abs(values) >= _HUGE)
 
 
-def _note(name: str, left_out: NDArray[np.bool_]) -> str:
-    return f"{name}: {int(left_out.sum())} numbers of {_HUGE:g} or more are no readings"
+def _note(name: str, left_out: NDArray[np.bool_]) -> Remark:
+    text = f"{name}: {int(left_out.sum())} numbers of {_HUGE:g} or more are no readings"
+    return Remark("huge-numbers", text, (name,))
 
 
 def _code_of(values: Floats) -> float | None:

@@ -13,6 +13,7 @@ from soilml.log_import.mapping.log_map import LeaveOut, WindowSettings
 from soilml.log_import.recording import Floats
 from soilml.log_import.windows.change_points import steady_pieces, without_transients
 from soilml.log_import.windows.mean_errors import mean_error
+from soilml.remarks import Remark
 
 #: Quantities whose changes end a window, and the least change that counts, as a share of the
 #: quantity's usual size in the run.
@@ -34,11 +35,11 @@ _FIRST, _OTHER_SLIP = 0.4, 0.03
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of a run, s after its start; `why` is "" for a steady window."""
+    """A stretch of a run, s after its start; `why` it is left out, None for a steady window."""
 
     start: float
     stop: float
-    why: str = ""
+    why: Remark | None = None
 
 
 def steady_windows(
@@ -73,9 +74,8 @@ def steady_windows(
         for p, q in _without(*_trim(time, start, stop, step, settings), settings, left_out):
             found += _judged(time, step, quantities, watched, p, q, settings)
     for entry in left_out:
-        found.append(
-            Stretch(max(entry.start, float(time[0])), min(entry.stop, float(time[-1])), entry.why)
-        )
+        ends = max(entry.start, float(time[0])), min(entry.stop, float(time[-1]))
+        found.append(Stretch(*ends, Remark("left-out-by-map", entry.why, severity="note")))
     return _joined(sorted(found, key=lambda s: s.start), settings)
 
 
@@ -84,15 +84,16 @@ def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]
     found: list[Stretch] = []
     short: list[Stretch] = []
     for stretch in [*stretches, None]:
-        if stretch is not None and "too short" in stretch.why:
+        if stretch is not None and stretch.why is not None and stretch.why.code == "too-short":
             short.append(stretch)
             continue
         if len(short) < 3:
             found += short
         else:
-            why = (
+            text = (
                 f"nothing stays the same for {settings.shortest:g} s, as if someone had touched it"
             )
+            why = Remark("nothing-steady", text)
             found.append(Stretch(short[0].start, short[-1].stop, why))
         short = []
         found += [stretch] if stretch is not None else []
@@ -112,10 +113,10 @@ def _judged(
     """A piece as one stretch; where it drifts, as what a finer search makes of it."""
     a, b = without_transients(time, quantities, start, stop)
     why = _why_not(time, step, quantities, a, b, settings)
-    if why != "drift":
+    if why is None or why.code != "not-steady":
         return [Stretch(a, b, why)]
     if not finer:
-        return [Stretch(*_shortened(time, step, quantities, a, b, settings))]
+        return [_shortened(time, step, quantities, Stretch(a, b, why), settings)]
     rows = np.flatnonzero(_inside(time, start, stop))
     part = {name: values[rows] for name, values in watched.items()}
     closer = replace(settings, sensitivity=_FINER * settings.sensitivity)
@@ -215,32 +216,33 @@ def _why_not(
     start: float,
     stop: float,
     settings: WindowSettings,
-) -> str:
-    """Why a stretch is no steady window, "drift" where a part of it may be; "" where it is one."""
+) -> Remark | None:
+    """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
     rows = _inside(time, start, stop)
     low, high = settings.within
     if stop <= low or start >= high:
-        return "outside of [windows] within"
-    if rests := why_at_rest(step, quantities, rows):
+        return Remark("outside", "outside of [windows] within", severity="note")
+    if rests := _why_at_rest(step, quantities, rows):
         return rests
     if stop - start < settings.shortest:
-        return f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
+        text = f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
+        return Remark("too-short", text, severity="note")
     if not rows.any():
-        return "there are no samples"
+        return Remark("no-samples", "there are no samples")
     for name in ("slip", "load"):
         if name in quantities and np.mean(~np.isfinite(quantities[name][rows])) > _MISSING:
             missing = np.mean(~np.isfinite(quantities[name][rows]))
-            return f"{missing:.0%} of the {name} is missing"
-    return "drift" if _drifts(step, quantities, rows, settings) else ""
+            return Remark("missing-samples", f"{missing:.0%} of the {name} is missing", (name,))
+    return _drift(step, quantities, rows, settings)
 
 
-def _drifts(
+def _drift(
     step: float,
     quantities: Mapping[str, Floats],
     rows: NDArray[np.bool_],
     settings: WindowSettings,
-) -> str:
-    """Which quantity changes within a window by more than it may; "" where none does."""
+) -> Remark | None:
+    """Which quantity changes within a window by more than it may; None where none does."""
     for name, relative in (("slip", False), ("torque", True)):
         if name not in quantities or not np.isfinite(quantities[name][rows]).any():
             continue
@@ -252,31 +254,33 @@ def _drifts(
         if relative:
             limit = settings.largest_torque_change * float(np.nanmean(np.abs(values)))
         if change > limit and not change < _SIGNIFICANT * error:
-            return f"{name} changes by {change:.2g} in it"
-    return ""
+            text = f"it is not steady: {name} changes by {change:.2g} in it"
+            return Remark("not-steady", text, (name,), "note")
+    return None
 
 
 def _shortened(
     time: Floats,
     step: float,
     quantities: Mapping[str, Floats],
-    start: float,
-    stop: float,
+    stretch: Stretch,
     settings: WindowSettings,
-) -> tuple[float, float, str]:
-    """The longest end or beginning of a drifting stretch that is steady, else why there is none."""
-    why = "it is not steady: " + _drifts(step, quantities, _inside(time, start, stop), settings)
+) -> Stretch:
+    """The longest end or beginning of a drifting stretch that is steady, else all of it."""
+    start, stop = stretch.start, stretch.stop
     length = stop - start
     for share in (0.8, 0.65, 0.5, 0.35):
         for a, b in ((stop - share * length, stop), (start, start + share * length)):
             long_enough = b - a >= settings.shortest
-            if long_enough and not _drifts(step, quantities, _inside(time, a, b), settings):
-                return a, b, ""
-    return start, stop, why
+            if long_enough and not _drift(step, quantities, _inside(time, a, b), settings):
+                return Stretch(a, b)
+    return stretch
 
 
-def why_at_rest(step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_]) -> str:
-    """By what the wheel is at rest in a window; "" where it turns, or nothing says it.
+def _why_at_rest(
+    step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_]
+) -> Remark | None:
+    """By what the wheel is at rest in a window; None where it turns, or nothing says it.
 
     `quantities` are samples (n,) of a run, `rows` (n,) those of the window.
     """
@@ -284,16 +288,17 @@ def why_at_rest(step: float, quantities: Mapping[str, Floats], rows: NDArray[np.
     if rim is not None and np.isfinite(rim[rows]).any():
         usual = float(np.nanpercentile(np.abs(rim), 90))
         rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
-        return "the wheel is at rest" if rests else ""
+        return Remark("at-rest", "the wheel is at rest", severity="note") if rests else None
     torque = quantities.get("torque")
     if torque is None or not np.isfinite(torque[rows]).any():
-        return ""
+        return None
     near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
     if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
-        return ""
+        return None
     if _slips(step, quantities, rows, near_zero):
-        return ""
-    return "the torque is near zero: the wheel is probably at rest"
+        return None
+    text = "the torque is near zero: the wheel is probably at rest"
+    return Remark("torque-near-zero", text, ("torque",))
 
 
 def _slips(

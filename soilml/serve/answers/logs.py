@@ -13,7 +13,7 @@ from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.log_import.checks.table_remarks import table_remarks
-from soilml.log_import.guesses.map_text import init_map
+from soilml.log_import.guesses.map_text import draft_map
 from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.quantities import COLUMNS
@@ -42,9 +42,8 @@ def look(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 def guess_map(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """The text of the map, and how many of its lines need a look."""
     tell("looking at the log")
-    text = init_map(request["names"])
-    marked = sum("CHANGE" in line or "NEEDED" in line for line in text.splitlines()[3:])
-    return {"map": text, "marked": marked}
+    draft = draft_map(request["names"])
+    return {"map": draft.text, "marked": draft.marked}
 
 
 def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
@@ -73,7 +72,7 @@ def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "kind": "runs",
         **table_summary(found.table),
         "name": RUNS_FILE,
-        "remarks": [*found.implausible, *found.remarks],
+        "remarks": [remark.text for remark in (*found.implausible, *found.remarks)],
         "left_out": left_out,
         "seconds": whole,
         "files": write_files(texts),

@@ -41,7 +41,7 @@ def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
             tared = "the wheel stands on the ground" in text
             assert rows["sinkage_m"][i] == pytest.approx(sinkage, abs=SUNK if tared else 2e-4)
     assert met == set(stages)
-    assert any("lifted" in remark for remark in found.remarks) == (zero > 0.0)
+    assert any(remark.code == "wheel-lifted" for remark in found.remarks) == (zero > 0.0)
 
 
 def test_runs_are_named_by_the_line_above_their_header(tmp_path):
@@ -50,7 +50,7 @@ def test_runs_are_named_by_the_line_above_their_header(tmp_path):
     assert list(dict.fromkeys(recording.texts["block"])) == [
         f"Run with {n} N" for n in (40, 55, 75)
     ]
-    assert any("the header stands 3 times" in note for note in recording.notes)
+    assert any("the header stands 3 times" in note.text for note in recording.notes)
     # lines that stand alone are no header, and a file with one header is one run
     lines = logs[0].read_text(encoding="utf-8-sig").splitlines()[1:900]
     (tmp_path / "one.tsv").write_text("\n".join([*lines[:300], "stopped by hand", *lines[300:]]))

@@ -134,7 +134,7 @@ def rows(**changes):
 def test_hints_of_a_table(changes, hint):
     assert table_hints(rows(), RADIUS) == []
     found = table_hints(rows(**changes), RADIUS)
-    assert any(hint in text for text in found), found
+    assert any(hint in remark.text for remark in found), found
 
 
 def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, capsys):

@@ -11,6 +11,7 @@ from soilml.identification import identify
 from soilml.io.read_table import read_table
 from soilml.io.text_tables import csv_text
 from soilml.log_import import import_log, init_map
+from soilml.remarks import Remark
 
 MAP = {
     "time": {"column": "t"},
@@ -238,3 +239,22 @@ def test_a_clock_of_huge_numbers_is_no_time(tmp_path):
     path.write_text("t,w,v,torque,Fz\n" + "".join(f"{i}e300,1,0.1,2,60\n" for i in range(40)))
     with pytest.raises(InputError, match="run a: no channel has two samples with a time"):
         import_log(path, MAP | SPEEDS)
+
+
+def test_no_decision_depends_on_the_words_of_remarks(tmp_path, monkeypatch):
+    path, _ = log_of(np.random.default_rng(5), tmp_path / "log.csv", slips=(0.1, 0.3, 0.5))
+
+    def outcome():
+        found = import_log(path, MAP | SPEEDS)
+        stretches = [
+            (s.start, s.stop, s.why and s.why.code) for one in found.series for s in one.stretches
+        ]
+        return csv_text(found.table.columns), stretches, [r.code for r in found.remarks]
+
+    usual, initialise = outcome(), Remark.__init__
+
+    def nonsense(remark, code, text, *others, **named):
+        initialise(remark, code, "nonsense", *others, **named)
+
+    monkeypatch.setattr(Remark, "__init__", nonsense)
+    assert outcome() == usual

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from soilml.log_import.readers import read_log
+from soilml.remarks import texts
 
 ROWS = [
     {"t": 0.1 * i, "wheel": {"omega": 0.2 + i, "current": [1.0, float(i)]}, "state": "RUN"}
@@ -41,7 +42,7 @@ def test_lines_that_are_cut_off_are_counted(tmp_path):
     (tmp_path / "a.jsonl").write_text("\n".join([*lines, lines[0][:20]]))
     (found,) = read_log(tmp_path / "a.jsonl")
     assert len(found) == 5
-    assert found.notes == ("1 lines are no JSON objects and are left out",)
+    assert texts(found.notes) == ["1 lines are no JSON objects and are left out"]
 
 
 def test_an_orientation_in_texts_has_no_angles(tmp_path):

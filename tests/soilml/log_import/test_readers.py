@@ -10,6 +10,7 @@ from soilml.log_import.mapping.uncertain_value import parse_uncertain
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.delimited_text import time_of_day
 from soilml.log_import.units import dimension, factor, unit_in_name
+from soilml.remarks import texts
 
 PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
 SEMICOLON = PLAIN.replace(",", ";").replace(".", ",")
@@ -62,7 +63,7 @@ def test_broken_lines_are_left_out_and_counted(tmp_path):
     (tmp_path / "log.csv").write_text(text)
     (recording,) = read_log(tmp_path / "log.csv")
     assert len(recording) == 4
-    assert recording.notes == ("2 lines have a wrong number of cells and are left out",)
+    assert texts(recording.notes) == ["2 lines have a wrong number of cells and are left out"]
 
 
 def test_a_cell_that_is_endless(tmp_path):
@@ -73,7 +74,7 @@ def test_a_cell_that_is_endless(tmp_path):
         read_log(tmp_path / "log.csv")
     (tmp_path / "log.csv").write_text(f"{PLAIN}{endless},1,2\n".replace("1.5", '"1.5"'))
     (recording,) = read_log(tmp_path / "log.csv")
-    assert len(recording) == 5 and "1 lines" in recording.notes[0]
+    assert len(recording) == 5 and "1 lines" in recording.notes[0].text
 
 
 def test_a_log_without_header_numbers_its_columns(tmp_path):

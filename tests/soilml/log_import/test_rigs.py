@@ -15,6 +15,7 @@ from soilml.log_import.guesses.columns import candidates_of
 from soilml.log_import.guesses.roles import assign, axle_of
 from soilml.log_import.readers.message_fields import protobuf_fields
 from soilml.log_import.recording import Recording
+from soilml.remarks import about, texts
 
 SLIPS = (0.1, 0.3, 0.5)
 RADIUS_EDIT = ('# radius = "0.15 m', 'radius = "0.15 m')
@@ -68,7 +69,7 @@ def test_increments_a_force_sensor_upside_down_and_a_laser(tmp_path):
     np.testing.assert_allclose(table["sinkage_m"], (4 + 2 * torque_law(SLIPS)) / 1e3, atol=1e-3)
     # the scale's uncertainty is that of the travel, and so of slip, in all rows
     assert found.bias["slip"].constant > 0.003
-    assert any("the load may be wrong by as much" in text for text in found.remarks)
+    assert about(found.remarks, "load-not-tared") == {"load", "drawbar_pull"}
 
 
 def test_abbreviations_and_times_of_day(tmp_path):
@@ -92,7 +93,7 @@ def test_abbreviations_and_times_of_day(tmp_path):
     np.testing.assert_allclose(found.table["slip"], true, atol=0.04)
     np.testing.assert_allclose(found.table["torque_Nm"], torque_law(true), rtol=0.2)
     # a wheel that has sunk in at rest is no sensor without a tare
-    assert not any("sinkage" in text for text in found.remarks)
+    assert not any("sinkage" in remark.about for remark in found.remarks)
 
 
 def test_runs_that_a_pause_separates_and_forces_in_kg(tmp_path):
@@ -133,7 +134,7 @@ def test_slip_by_other_definitions(definition, of_ours, tmp_path):
             imported(tmp_path, logs, [RADIUS_EDIT])
         columns = {"slip": np.array([0.9, 0.7, 0.5]), "load_N": np.full(3, LOAD),
                    "torque_Nm": torque_law(np.array(SLIPS))}  # fmt: skip
-        assert any("1 less it" in hint for hint in table_hints(columns, RADIUS))
+        assert about(table_hints(columns, RADIUS), "slip-definition") == {"slip", "torque_Nm"}
     stated = ('column = "slip"', f'column = "slip"\ndefinition = "{definition}"')
     found, _ = imported(tmp_path, logs, [RADIUS_EDIT, stated])
     np.testing.assert_allclose(found.table["slip"], SLIPS, atol=1e-6)
@@ -217,7 +218,7 @@ def test_a_run_without_data_is_one_line(tmp_path):
             columns = {name: (0.0 if name != "t" else 1.0) * v for name, v in columns.items()}
         logs.append(write_csv(tmp_path / f"run_{k}.csv", columns))
     found, _ = imported(tmp_path, logs, [RADIUS_EDIT])
-    assert found.remarks == ("run run_2: no sensor says anything: an empty log?",)
+    assert texts(found.remarks) == ["run run_2: no sensor says anything: an empty log?"]
     assert list(found.table["run"]) == ["run_0", "run_1", "run_3"]
 
 

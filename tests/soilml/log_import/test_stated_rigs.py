@@ -13,6 +13,7 @@ from soilml.log_import.readers import read_log
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.text_layout import name_and_unit
 from soilml.log_import.recording import Recording
+from soilml.remarks import about, texts
 
 
 @pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
@@ -103,8 +104,8 @@ def test_huge_numbers_are_missing_in_every_format(tmp_path, column):
     (tmp_path / "a.csv").write_text("\n".join([",".join(rows[0]), *lines]))
     (csv,) = read_log(tmp_path / "a.csv")
     assert np.isnan(csv.columns[column]).all()
-    assert csv.notes == (f"{column}: 40 numbers of 1e+30 or more are no readings",)
-    assert csv.notes[0] in init_map(tmp_path / "a.csv")
+    assert texts(csv.notes) == [f"{column}: 40 numbers of 1e+30 or more are no readings"]
+    assert csv.notes[0].text in init_map(tmp_path / "a.csv")
     (tmp_path / "a.json").write_text(json.dumps([row | {column: 10**400} for row in rows]))
     assert column not in read_log(tmp_path / "a.json")[0].columns
 
@@ -114,12 +115,12 @@ def test_a_map_without_torque_is_remarked_on(tmp_path):
     text = init_map(logs).replace(*edits[0])
     (tmp_path / "map.toml").write_text(text, encoding="utf-8")
     found = import_log(logs, tmp_path / "map.toml")
-    assert any("no row has a torque: give the map a [torque]" in text for text in found.remarks)
+    assert about(found.remarks, "no-torque") == {"torque"}
     for old, new in edits[1:]:
         text = text.replace(old, new)
     (tmp_path / "map.toml").write_text(text, encoding="utf-8")
     found = import_log(logs, tmp_path / "map.toml")
-    assert not any("no row has a torque" in text for text in found.remarks)
+    assert not about(found.remarks, "no-torque")
 
 
 def test_the_zero_of_a_height_is_asked_for(tmp_path):

@@ -11,6 +11,7 @@ from soilml.log_import.guesses.columns import candidates_of
 from soilml.log_import.guesses.constants import stated_constants
 from soilml.log_import.guesses.roles import assign
 from soilml.log_import.recording import Recording
+from soilml.remarks import about
 
 SLIPS = (0.1, 0.3, 0.5)
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
@@ -137,7 +138,7 @@ def test_a_pull_that_falls_with_slip_is_named():
     slip, load = np.array([0.1, 0.25, 0.4, 0.6]), np.full(4, 35.0)
     pull = np.array([5.3, 2.7, 0.7, -1.5])
     columns = {"slip": slip, "load_N": load, "drawbar_pull_N": pull}
-    assert any("sign" in hint for hint in table_hints(columns, RADIUS))
+    assert about(table_hints(columns, RADIUS), "sign") == {"drawbar_pull_N"}
     assert not table_hints(columns | {"drawbar_pull_N": -pull}, RADIUS)
 
 

@@ -130,9 +130,9 @@ def test_what_is_left_out_has_a_reason():
         time, {"rim_speed": rim, "slip": slip, "torque": torque}, WindowSettings()
     )
     why = [stretch.why for stretch in found]
-    assert why[0] == "the wheel is at rest"
-    assert any("too short" in text for text in why)
-    assert any("of the slip is missing" in text for text in why)
+    assert why[0].text == "the wheel is at rest"
+    assert any(w and w.code == "too-short" for w in why)
+    assert any(w and w.code == "missing-samples" and w.about == ("slip",) for w in why)
 
 
 def test_a_window_that_wanders_far_more_than_the_others_is_irregular():
@@ -141,7 +141,7 @@ def test_a_window_that_wanders_far_more_than_the_others_is_irregular():
 
     usual = [row(0.004 + 0.0005 * k) for k in range(5)]
     found = irregular_windows([[*usual, row(0.05)], [row(0.02)]])
-    assert list(found) == [(0, 5)] and "the slip wanders 9.1 times" in found[(0, 5)]
+    assert list(found) == [(0, 5)] and "the slip wanders 9.1 times" in found[(0, 5)].text
     assert irregular_windows([[row(0.004), row(0.05)]]) == {}
 
 
