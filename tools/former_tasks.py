@@ -27,7 +27,7 @@ from soilml import (
     read_table,
     soil,
 )
-from soilml.gap.workflow import gap
+from soilml.gap import gap
 
 ROWS, PART, READINGS = 50_000, 1000, 64
 WHEEL = Wheel(radius=0.15, width=0.12)

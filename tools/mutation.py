@@ -38,6 +38,7 @@ ROOT = Path(__file__).parents[1]
 #: Source folders, the folders of their tests, and what is left out: drawing, and other rooms.
 ROOMS = {
     "physics": ("soilml/physics", "tests/soilml/physics", ""),
+    "fitting": ("soilml/fitting", "tests/soilml/fitting", ""),
     "identification": ("soilml/identification", "tests/soilml/identification", "/plot"),
     "onboard": ("soilml/onboard", "tests/soilml/onboard", ""),
     "gap": ("soilml/gap", "tests/soilml/gap", "/html/|_figure"),

@@ -3,7 +3,7 @@
 import importlib.util
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SPEC = importlib.util.spec_from_file_location("reached", ROOT / "tools" / "reached.py")
 reached = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(reached)

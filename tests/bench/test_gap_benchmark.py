@@ -12,7 +12,7 @@ from datagen.blind_sets import Plan, draw_blind_set
 from soilml.config.case import read_case
 from soilml.io.table import Table
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap_case
 import gap_pages
