@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.wheel_state import ContactArc, WheelState
+from datagen.blind_sets.reference_wheel import ContactArc, Mechanism, WheelState
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from drawn_errors import DrawnErrors
 
-from datagen.blind_sets.catalogue import active_mechanisms
-from datagen.blind_sets.reference_wheel import solve_equilibrium
-from datagen.blind_sets.wheel_state import WheelState
+from datagen.blind_sets.plans import active_mechanisms
+from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -22,8 +22,8 @@ from benchmarks_file import ROOT, TITLES, machine, page_file
 from gap_case import judged
 from gap_records import Judged, from_json
 
-from datagen.blind_sets.factorial_plan import Plan, benchmark_plans, plan_matrix
-from datagen.engines.processes import process_map
+from datagen.blind_sets.plans import Plan, benchmark_plans, plan_matrix
+from datagen.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 

@@ -13,7 +13,7 @@ import numpy as np
 from gap_separation import separation
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
-from datagen.blind_sets.factorial_plan import Plan
+from datagen.blind_sets.plans import Plan
 from soilml.config.case import Case, read_case
 from soilml.fitting.operating_points import operating_points
 from soilml.gap import GapReport, gap

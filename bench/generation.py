@@ -18,13 +18,11 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datagen.engines.dask_cluster import dask_map
-from datagen.engines.processes import process_map
-from datagen.engines.worker_setup import usable_cores
-from datagen.generate import WRITER
-from datagen.partitions import PART
-from datagen.pieces import PIECE, Piece, data_schema, pieces, simulate_batch
+from datagen.dask_cluster import dask_map
+from datagen.generate import PART, WRITER
+from datagen.processes import process_map, usable_cores
 from datagen.recipe import Recipe, read_recipe
+from datagen.simulation import PIECE, Piece, data_schema, pieces, simulate_batch
 
 #: Rows that are simulated for each line, unless an argument says otherwise.
 ROWS = 32 * PIECE

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from datagen.engines.worker_setup import usable_cores
 from datagen.generate import generate
+from datagen.processes import usable_cores
 from datagen.recipe import Block, read_recipe
 from soilml.io.atomic_files import atomic_output
 from training.calibration.recalibration import Metrics, compute_metrics, recalibrate

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from exact_sets import RankedPosterior, exact_set_posterior
 
-from datagen.engines.processes import process_map
+from datagen.processes import process_map
 from datagen.recipe import read_recipe
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel

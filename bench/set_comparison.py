@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from reference_sets import ReferenceSet
 from scipy.stats import chi2, chisquare
 
-from datagen.engines.processes import process_map
+from datagen.processes import process_map
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
 from training.benchmark.bayes_limit_file import BayesLimit

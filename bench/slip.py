@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.generate import generate
-from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, Recipe, packaged_file, read_recipe
+from datagen.simulation import simulate_pieces
 from soilml import Estimator
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.multi_sensor import fuse_estimates

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from datagen.blind_sets.reference_wheel import solve_equilibrium
-from datagen.blind_sets.wheel_state import WheelState
+from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from soilml import Case, Model, Table, Wheel, identify, soil
 from soilml.config.measurement_noise import Noise
 from soilml.identification.bevameter import bevameter

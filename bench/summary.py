@@ -16,8 +16,8 @@ import numpy as np
 import physics
 from conftest import input_box, solved
 
-from datagen.engines.worker_setup import usable_cores
 from datagen.generate import generate
+from datagen.processes import usable_cores
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, identify, read_table, soil
 from soilml.config.case import Case

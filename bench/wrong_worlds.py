@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 from drawn_errors import STD, DrawnErrors
 
-from datagen.blind_sets.catalogue import MECHANISMS
-from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.reference_wheel import solve_equilibrium
-from datagen.blind_sets.wheel_state import WheelState
+from datagen.blind_sets.plans import MECHANISMS
+from datagen.blind_sets.reference_wheel import Mechanism, WheelState, solve_equilibrium
 from datagen.recipe import read_recipe
 from soilml.quantities import SHEAR, column
 

@@ -6,16 +6,30 @@ A new sensor is a class with the members of `GearSensor` and a line in `GEAR_SEN
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Protocol, Self
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.wheel_leg_vibration import StickSlip
 from soilml.config.case import Case
+from soilml.config.prior_settings import take_prior
+from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
+from soilml.numerics.prior import Prior
+from soilml.parameters import check, declared
+from soilml.physics.gears import Midstance
+from soilml.physics.soils import Soil
+from soilml.quantities import QUANTITIES
+from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
+from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
+
+#: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
+LAWS = ("spring", "line")
+#: s^2/m; with a smaller slope of the line, vibration (its inverse) diverges.
+MIN_SLOPE = 0.02
 
 
 class GearSensor(Protocol):
@@ -46,6 +60,126 @@ class GearSensor(Protocol):
         from it does not depend on the pieces in which rows are simulated.
         """
         ...
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """The recipe's [stick_slip]: a law, and for the spring a leg and its unknown parameters.
+
+    `stiffness` is k_S (N/m), `drop` the fraction of the friction angle that soil loses once it
+    slides; both have one value in each run. None with the law `line`, where both follow the soil.
+    """
+
+    sensor: ClassVar[str] = "vibration_m_s2"
+    units: ClassVar[Mapping[str, str]] = {
+        "stick-slip.stiffness": "N/m",
+        "stick-slip.increment": "rad",
+    }
+    run_draws: ClassVar[int] = 2
+    lowest_slip: ClassVar[float] = 0.0
+
+    law: str
+    leg: SpringLeg
+    stiffness: Prior | None
+    drop: Prior | None
+
+    @classmethod
+    def take(cls, settings: Settings, case: Case) -> StickSlip:
+        """Read [stick_slip]; raises `InputError` naming the key, or for a gear without legs."""
+        if not isinstance(case.model.gear, Midstance):
+            settings.fail(
+                "the table is for wheel-legs only; needed is [gear] type = 'midstance', not "
+                f"{case.model.gear.name!r}"
+            )
+        return _take_stick_slip(settings)
+
+    def simulate(
+        self, case: Case, slip: Floats, load: Floats, lowest_load: float, u: Floats
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """Vibration (m/s^2) and the columns of the parameters that it depends on, (n,)."""
+        width = case.parameters()["gear.width"][1]
+        leg = self.leg_parameters(case.soil, width, u)
+        vibration = self.vibration(case.soil, slip, load, leg, lowest_load)
+        stiffness = np.broadcast_to(normal_stiffness(case.soil, width), slip.shape)
+        columns = {QUANTITIES["normal_stiffness"].column: stiffness}
+        return vibration, columns | {f"stick-slip.{name}": v for name, v in leg.items()}
+
+    def leg_parameters(self, soil: Soil, width: Any, u: Floats) -> dict[str, Floats]:
+        """k_S (N/m) and the drop of friction (rad), (n,), for fractions `u` (n, 2) of their ranges.
+
+        Without ranges they follow Comin and Saaj 2017, eq. 28.
+        """
+        if self.stiffness is None or self.drop is None:
+            stiffness = normal_stiffness(soil, width)
+            found = np.broadcast_arrays(
+                *soil_spring(np.asarray(soil.friction_angle), stiffness), u[:, 0]
+            )
+            return {"stiffness": found[1], "increment": found[0]}
+        increment = self.drop.at(u[:, 1]) * np.asarray(soil.friction_angle)
+        return {"stiffness": self.stiffness.at(u[:, 0]), "increment": increment}
+
+    def vibration(
+        self, soil: Soil, slip: Floats, load: Floats, leg: dict[str, Floats], lowest_load: float
+    ) -> Floats:
+        r"""Largest amplitude of the hub's acceleration (m/s^2) in a stride, (n,), without noise.
+
+        The spring carries the row's load; no load is below `lowest_load` (N). The line is Comin and
+        Saaj 2017, eq. 24, with the linear parameters of their table V: \Delta a = (i - a) / b.
+        Raises `InputError` for a soil on which that line has no slope.
+        """
+        if self.law == "line":
+            a, b = VIBRATION_SLIP["linear"].line(leg["increment"], leg["stiffness"])
+            if b.min() < MIN_SLOPE:
+                drop = np.rad2deg(leg["increment"][int(np.argmin(b))])
+                raise InputError(
+                    f"[stick_slip] law is 'line': friction drops by {drop:.1f} degrees, and slip "
+                    "no longer follows vibration; lower friction_angle or kphi in [soil.prior]"
+                )
+            return np.asarray(np.maximum((slip - a) / b, 0.0))
+        # an additional row, the stiffest leg with the lightest hub, sets the same time step in
+        # all pieces
+        stiffest = self.stiffness.upper if self.stiffness else 0.0
+        spring = replace(
+            self.leg,
+            stiffness=np.append(leg["stiffness"], stiffest),
+            hub_mass=np.append(load, lowest_load) / GRAVITY,
+        )
+        angle = np.append(np.broadcast_to(soil.friction_angle, slip.shape), 0.5)
+        increment = np.append(leg["increment"], 0.0)
+        return vibration_amplitude(spring, np.append(slip, 0.0), angle, increment)[:-1]
+
+
+def normal_stiffness(soil: Soil, width: Any) -> Floats:
+    r"""sigma_1 (Pa), the pressure 1 cm deep under a plate as wide as the gear.
+
+    .. math:: \sigma_1 = (k_c / b + k_\varphi) (1 cm)^n
+
+    References: Comin and Saaj 2017, who write sigma_0 + alpha_z 1 cm for a linear soil.
+    """
+    return np.asarray((soil.kc / width + soil.kphi) * 0.01**soil.n)
+
+
+def _take_stick_slip(settings: Settings) -> StickSlip:
+    """Read the table; raises `InputError` naming the key."""
+    law = settings.text("law", LAWS[0])
+    if law not in LAWS:
+        settings.fail(f"law is {law!r}; needed is one of: {', '.join(LAWS)}")
+    if law == "line":
+        settings.finish()
+        return StickSlip(law, SpringLeg(stiffness=1000.0), None, None)
+    stiffness, drop = take_prior(settings, "stiffness"), take_prior(settings, "drop")
+    if not 0.0 <= drop.lower < drop.upper <= 1.0:
+        settings.fail(
+            f"drop is [{drop.lower:g}, {drop.upper:g}]; needed are fractions of the friction "
+            "angle, between 0 and 1"
+        )
+    own = [key for key in declared(SpringLeg) if key not in ("stiffness", "hub_mass")]
+    sizes = {key: settings.number(key) for key in own if key in settings}
+    for end in (stiffness.lower, stiffness.upper):
+        check(SpringLeg(stiffness=end, **sizes), f"{settings.where}: ")
+    settings.permit(own)
+    settings.finish()
+    return StickSlip(law, SpringLeg(stiffness=stiffness.lower, **sizes), stiffness, drop)
 
 
 #: Table of a recipe -> the sensor that it adds. Random streams follow this order: append only.

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, read_recipe
+from datagen.simulation import simulate_pieces
 from soilml import Estimator
 from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import column

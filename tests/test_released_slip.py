@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.pieces import simulate_pieces
 from datagen.recipe import Block, read_recipe
+from datagen.simulation import simulate_pieces
 from soilml import Estimator
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.quantities import column

@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.blind_sets.catalogue import active_mechanisms
-from datagen.blind_sets.factorial_plan import Plan
-from datagen.blind_sets.mechanism import ActiveMechanisms, Mechanism
-from datagen.blind_sets.noise_processes import (
+from datagen.blind_sets.plans import Plan, active_mechanisms
+from datagen.blind_sets.reading_errors import (
     AUTOCORRELATION,
     CHANNELS,
     DECLARED_OVER_TRUE,
     Sensor,
+    draw_discrepancies,
     draw_missing,
     sensors,
     simulate_readings,
 )
-from datagen.blind_sets.reference_wheel import solve_equilibrium
+from datagen.blind_sets.reference_wheel import (
+    ActiveMechanisms,
+    Floats,
+    Mechanism,
+    SoilReaction,
+    WheelState,
+    solve_equilibrium,
+)
 from datagen.blind_sets.run_schedules import (
     COVARIATE_COLUMNS,
     RunSchedule,
@@ -31,7 +37,6 @@ from datagen.blind_sets.run_schedules import (
     slip_range,
     with_both_gears,
 )
-from datagen.blind_sets.smooth_discrepancy import draw_discrepancies
 from datagen.blind_sets.soil_families import (
     FAMILIES,
     FREE_PARAMETERS,
@@ -42,7 +47,6 @@ from datagen.blind_sets.soil_families import (
     draw_wheels,
     nominal_soil,
 )
-from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
 
 #: Run-to-run scatter, one standard deviation: rad of phi, fraction of the modulus.
 SCATTER_PHI, SCATTER_K = np.deg2rad(0.5), 0.05
@@ -115,8 +119,8 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         soil = FAMILIES[plan.soil_family].soil(generator)
         wheels: Wheels = ((RADIUS, WIDTH),)
         if plan.design == "two-gears":
-            alike = any(m.name in MECHANISMS_OF_ONE_GEAR for m, _ in active)
-            wheels, region = draw_wheels(alike, extras), with_both_gears(region)
+            same_size = any(m.name in MECHANISMS_OF_ONE_GEAR for m, _ in active)
+            wheels, region = draw_wheels(same_size, extras), with_both_gears(region)
         simulated = [
             _simulate(d, soil, wheels, plan.scatter, active, generator) for d in (runs, region)
         ]

@@ -1,16 +1,18 @@
-"""Mechanisms of soil and wheel, in the forms of textbooks."""
+"""Mechanisms that an effect of the analyst describes: soil and wheel, rig, sensors."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.wheel_state import (
+from datagen.blind_sets.reference_wheel import (
     ContactArc,
     ContactPoints,
     Floats,
+    Mechanism,
     SoilReaction,
     WheelState,
 )
@@ -124,38 +126,78 @@ def _lateral_slip(points: ContactPoints, arc: ContactArc, rows: WheelState, shar
 
 
 TEXTBOOK_FORMS = (
-    Mechanism(name="slip-sinkage", size="n1", reference=0.4, unit="1", soil=_slip_sinkage),
-    Mechanism(name="grousers", size="height", reference=0.01, unit="m", arc=_grousers),
-    Mechanism(name="bulldozing", size="share", reference=1.0, unit="1", force=_bulldozing),
-    Mechanism(name="exit-angle", size="kappa", reference=0.15, unit="1", arc=_exit_angle),
-    Mechanism(name="stress-shift", size="shift", reference=0.2, unit="1", arc=_stress_shift),
+    Mechanism("slip-sinkage", "n1", 0.4, "1", soil=_slip_sinkage),
+    Mechanism("grousers", "height", 0.01, "m", arc=_grousers),
+    Mechanism("bulldozing", "share", 1.0, "1", force=_bulldozing),
+    Mechanism("exit-angle", "kappa", 0.15, "1", arc=_exit_angle),
+    Mechanism("stress-shift", "shift", 0.2, "1", arc=_stress_shift),
+    Mechanism("wheel-flexibility", "compliance", 2e-5, "m/N", arc=_wheel_flexibility),
+    Mechanism("shear-softening", "share", 0.5, "1", shear=_shear_softening),
+    Mechanism("sidewall-shear", "share", 1.0, "1", force=_sidewall_shear),
+    Mechanism("depth-cohesion", "c1", 2e4, "Pa/m", shear=_depth_cohesion),
+    Mechanism("rate", "a", 0.05, "1", shear=_rate, needs="speed"),
+    Mechanism("multipass", "growth", 0.5, "1", soil=_multipass, needs="pass_number"),
+    Mechanism("lateral-slip", "share", 1.0, "1", shear=_lateral_slip, needs="slip_angle"),
+)
+
+
+def _slope_driven(rows: WheelState, angle: float) -> WheelState:
+    return replace(rows, load=rows.load * math.cos(angle))
+
+
+def _slope_reading(reaction: SoilReaction, rows: WheelState, angle: float) -> SoilReaction:
+    """The load of `rows` is the component of the weight normal to the slope."""
+    return replace(reaction, pull=reaction.pull - rows.load * math.tan(angle))
+
+
+def _load_transfer(
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, ratio: float
+) -> SoilReaction:
+    """The soil carries W + ratio DP where W is reported."""
+    return replace(reaction, load=reaction.load - ratio * reaction.pull)
+
+
+def _bearing_friction(reaction: SoilReaction, rows: WheelState, coefficient: float) -> SoilReaction:
+    return replace(reaction, torque=reaction.torque + coefficient * rows.load * rows.radius)
+
+
+def _scaled(channel: str, reaction: SoilReaction, rows: WheelState, gain: float) -> SoilReaction:
+    """A sensor whose readings are too large by a share."""
+    return replace(reaction, **{channel: getattr(reaction, channel) * (1.0 + gain)})
+
+
+def _shifted(channel: str, reaction: SoilReaction, rows: WheelState, offset: float) -> SoilReaction:
+    """A sensor whose readings are too large by an offset."""
+    return replace(reaction, **{channel: getattr(reaction, channel) + offset})
+
+
+def _load_gain(rows: WheelState, gain: float) -> WheelState:
+    return replace(rows, load=rows.load / (1.0 + gain))
+
+
+def _slip_scale(rows: WheelState, scale: float) -> WheelState:
+    """u' = u (1 + e), u the true travel ratio v / (r omega) and u' the reported one."""
+    travel = rows.travel_ratio / (1.0 + scale)
+    return replace(rows, slip=np.where(travel > 1.0, 1.0 / travel - 1.0, 1.0 - travel))
+
+
+#: The rig: an unmeasured slope, load carried by the pull, friction in the wheel's bearing.
+RIG_MECHANISMS = (
     Mechanism(
-        name="wheel-flexibility",
-        size="compliance",
-        reference=2e-5,
-        unit="m/N",
-        arc=_wheel_flexibility,
+        "slope", "angle", math.radians(1.0), "rad", driven=_slope_driven, reading=_slope_reading
     ),
-    Mechanism(
-        name="shear-softening", size="share", reference=0.5, unit="1", shear=_shear_softening
-    ),
-    Mechanism(name="sidewall-shear", size="share", reference=1.0, unit="1", force=_sidewall_shear),
-    Mechanism(name="depth-cohesion", size="c1", reference=2e4, unit="Pa/m", shear=_depth_cohesion),
-    Mechanism(name="rate", size="a", reference=0.05, unit="1", shear=_rate, needs="speed"),
-    Mechanism(
-        name="multipass",
-        size="growth",
-        reference=0.5,
-        unit="1",
-        soil=_multipass,
-        needs="pass_number",
-    ),
-    Mechanism(
-        name="lateral-slip",
-        size="share",
-        reference=1.0,
-        unit="1",
-        shear=_lateral_slip,
-        needs="slip_angle",
-    ),
+    Mechanism("load-transfer", "ratio", 0.1, "1", force=_load_transfer),
+    Mechanism("bearing-friction", "coefficient", 0.01, "1", reading=_bearing_friction),
+)
+
+#: Sensors alone.
+SENSOR_MECHANISMS = (
+    Mechanism("torque-gain", "gain", 0.03, "1", reading=partial(_scaled, "torque")),
+    Mechanism("torque-offset", "offset", 0.1, "N m", reading=partial(_shifted, "torque")),
+    Mechanism("drawbar-gain", "gain", 0.03, "1", reading=partial(_scaled, "pull")),
+    Mechanism("drawbar-offset", "offset", 0.5, "N", reading=partial(_shifted, "pull")),
+    Mechanism("sinkage-gain", "gain", 0.03, "1", reading=partial(_scaled, "sinkage")),
+    Mechanism("sinkage-offset", "offset", 0.001, "m", reading=partial(_shifted, "sinkage")),
+    Mechanism("load-gain", "gain", 0.03, "1", driven=_load_gain),
+    Mechanism("slip-scale", "scale", 0.015, "1", driven=_slip_scale),
 )

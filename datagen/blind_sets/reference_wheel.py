@@ -2,22 +2,129 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from datagen.blind_sets.mechanism import ActiveMechanisms
-from datagen.blind_sets.wheel_state import (
-    ContactArc,
-    ContactPoints,
-    Floats,
-    SoilReaction,
-    WheelState,
-)
+Floats = NDArray[np.float64]
 
 NODES = 40
 #: Depths among which the first that carries the load is searched, and bisections between two.
 SEARCH_DEPTHS, HALVINGS = 40, 46
+
+
+@dataclass(frozen=True, kw_only=True)
+class WheelState:
+    """Wheel, soil and operating point of a batch; every field is an array (n,), in SI."""
+
+    slip: Floats
+    load: Floats  # N
+    radius: Floats  # m
+    width: Floats  # m
+    cohesion: Floats  # Pa
+    friction_angle: Floats  # rad
+    shear_modulus: Floats  # m
+    kc: Floats  # N/m^(n+1)
+    kphi: Floats  # N/m^(n+2)
+    n: Floats
+    a0: Floats
+    a1: Floats
+    unit_weight: Floats  # N/m^3
+    speed: Floats  # m/s
+    pass_number: Floats
+    slip_angle: Floats  # rad
+
+    @property
+    def travel_ratio(self) -> Floats:
+        """Distance travelled over distance rolled, v / (r omega), (n,).
+
+        Slip is s = 1 - v / (r omega) when driving and s = r omega / v - 1 when braking.
+        """
+        with np.errstate(divide="ignore"):
+            return np.where(self.slip < 0.0, 1.0 / (1.0 + self.slip), 1.0 - self.slip)
+
+
+@dataclass(frozen=True)
+class ContactArc:
+    """The part of the rim that touches the soil; arrays (n,), angles from straight down, rad."""
+
+    entry: Floats
+    exit: Floats
+    peak: Floats
+    sinkage: Floats  # m
+    radius: Floats  # m, of the circle in contact with the soil
+    shear_radius: Floats  # m
+    lever: Floats  # m
+
+
+@dataclass(frozen=True)
+class ContactPoints:
+    """Stresses (Pa) at points of the arc; arrays (points, n)."""
+
+    theta: Floats  # rad
+    angle_from_entry: Floats  # rad, entry angle less theta
+    depth: Floats  # m, that sets the pressure
+    shear_displacement: Floats  # m, shear displacement
+    normal: Floats
+    strength: Floats  # c + sigma tan(phi)
+    shear: Floats
+
+
+@dataclass(frozen=True)
+class SoilReaction:
+    """Load carried (N), drawbar pull (N), torque (N m) and sinkage (m); arrays (n,).
+
+    NaN where the soil does not carry the load at any sinkage down to the hub.
+    """
+
+    load: Floats
+    pull: Floats
+    torque: Floats
+    sinkage: Floats
+
+
+@final
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism: its name, the form of its law, its size and the stages at which it acts.
+
+    Each function takes the value of its stage, the states that the value belongs to, and last the
+    size of the mechanism in `unit`; None at stages where it does not act. `form` names a law that
+    differs from that of the analyst's effect of the same name; it is empty where they agree.
+    """
+
+    name: str
+    size: str
+    reference: float
+    unit: str
+    _: KW_ONLY
+    form: str = ""
+    #: from reported to true slip and load
+    driven: Callable[[WheelState, float], WheelState] | None = None
+    #: the soil under this wheel
+    soil: Callable[[WheelState, float], WheelState] | None = None
+    arc: Callable[[ContactArc, WheelState, float], ContactArc] | None = None
+    #: normal stress and its depth, (points, n)
+    pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
+    shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
+    #: within the search for equilibrium
+    force: Callable[[SoilReaction, ContactArc, WheelState, float], SoilReaction] | None = None
+    #: from the forces at equilibrium to the readings, for the true slip and load
+    reading: Callable[[SoilReaction, WheelState, float], SoilReaction] | None = None
+    #: the covariate, a field of `WheelState`, that must vary for the mechanism to have an effect
+    needs: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name and form: slip-sinkage, slip-sinkage/lyasko."""
+        return f"{self.name}/{self.form}" if self.form else self.name
+
+
+#: Mechanisms that act together, each with its size.
+ActiveMechanisms = tuple[tuple[Mechanism, float], ...]
 
 
 def _quadrature() -> tuple[Floats, Floats]:

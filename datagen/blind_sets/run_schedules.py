@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.blind_sets.wheel_state import Floats
+from datagen.blind_sets.reference_wheel import Floats
 
 #: Number of rows in all runs; number of runs and of rows per run in the held-out region.
 POINTS, REGION_RUNS, REGION_POINTS = 64, 3, 8

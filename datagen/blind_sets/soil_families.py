@@ -73,9 +73,9 @@ def nominal_soil(
     return result
 
 
-def draw_wheels(alike: bool, generator: np.random.Generator) -> Wheels:
+def draw_wheels(same_size: bool, generator: np.random.Generator) -> Wheels:
     """Two wheels: of the same size, or the second smaller and narrower."""
     radius = round(RADIUS * generator.uniform(*SECOND_RADIUS), 3)
     width = round(WIDTH * generator.uniform(*SECOND_WIDTH), 3)
     first = (RADIUS, WIDTH)
-    return (first, first if alike else (radius, width))
+    return (first, first if same_size else (radius, width))

@@ -1,4 +1,4 @@
-"""Mechanisms that are in no catalogue of the analyst."""
+"""Mechanisms that no effect of the analyst describes: other forms of known laws, other causes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,132 @@ from dataclasses import replace
 
 import numpy as np
 
-from datagen.blind_sets.mechanism import Mechanism
-from datagen.blind_sets.wheel_state import Floats, SoilReaction, WheelState
+from datagen.blind_sets.catalogued import substitute_circle
+from datagen.blind_sets.reference_wheel import (
+    ContactArc,
+    ContactPoints,
+    Floats,
+    Mechanism,
+    SoilReaction,
+    WheelState,
+    ground_reaction,
+    solve_equilibrium,
+)
+
+
+def _lyasko(rows: WheelState, share: float) -> WheelState:
+    """z = z0 (1 + s) / (1 - s / 2), by softening the soil until the sinkage has this value.
+
+    At a fixed sinkage the load is linear in the modulus, so two evaluations give the factor.
+    """
+    ratio = (1.0 + rows.slip) / (1.0 - 0.5 * rows.slip)
+    z = solve_equilibrium(rows).sinkage * (1.0 + share * (ratio - 1.0))
+    with np.errstate(invalid="ignore"):
+        x = 2.0 * np.arcsin(np.sqrt(z / (2.0 * rows.radius)))
+    full_load = ground_reaction(x, rows).load
+    none = np.zeros_like(rows.kc)
+    cohesive_load = ground_reaction(x, replace(rows, kc=none, kphi=none)).load
+    factor = (rows.load - cohesive_load) / (full_load - cohesive_load)
+    factor = np.where(factor > 0.0, factor, np.nan)
+    return replace(rows, kc=rows.kc * factor, kphi=rows.kphi * factor)
+
+
+def _square(rows: WheelState, n2: float) -> WheelState:
+    return replace(rows, n=rows.n + n2 * rows.slip**2)
+
+
+def _root_load(
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> SoilReaction:
+    return replace(reaction, pull=reaction.pull - coefficient * np.sqrt(rows.load))
+
+
+def _depth_power(
+    reaction: SoilReaction, arc: ContactArc, rows: WheelState, coefficient: float
+) -> SoilReaction:
+    return replace(reaction, pull=reaction.pull - coefficient * reaction.sinkage**1.5)
+
+
+def _saturating_wheel(arc: ContactArc, rows: WheelState, most: float) -> ContactArc:
+    return substitute_circle(arc, rows, most * -np.expm1(-rows.load / 60.0))
+
+
+def _constant_exit(arc: ContactArc, rows: WheelState, angle: float) -> ContactArc:
+    return replace(arc, exit=np.full_like(arc.exit, -angle))
+
+
+def _proportional_exit(arc: ContactArc, rows: WheelState, share: float) -> ContactArc:
+    return replace(arc, exit=-share * arc.entry)
+
+
+def _saturating_grousers(arc: ContactArc, rows: WheelState, height: float) -> ContactArc:
+    out = 0.75 * height * -np.expm1(-rows.slip / 0.15)
+    return replace(arc, shear_radius=arc.shear_radius + out, lever=arc.lever + out)
+
+
+def _growing_shift(arc: ContactArc, rows: WheelState, growth: float) -> ContactArc:
+    shift = np.minimum(growth * rows.slip, 0.9)
+    return replace(
+        arc,
+        peak=arc.peak + shift * (arc.entry - arc.peak),
+        exit=arc.exit + shift * (arc.entry - arc.exit),
+    )
+
+
+def _rate_power(points: ContactPoints, arc: ContactArc, rows: WheelState, m: float) -> Floats:
+    return np.asarray(points.shear * (rows.speed / 0.05) ** m)
+
+
+def _along_velocity(
+    points: ContactPoints, arc: ContactArc, rows: WheelState, share: float
+) -> Floats:
+    """Shear has the direction of the slip velocity at each point, not of the displacement."""
+    aside = rows.travel_ratio * np.tan(rows.slip_angle) * share
+    j = np.hypot(points.shear_displacement, arc.shear_radius * points.angle_from_entry * aside)
+    along = 1.0 - rows.travel_ratio * np.cos(points.theta)
+    tau = points.strength * -np.expm1(-j / rows.shear_modulus)
+    return np.asarray(tau * along / np.hypot(along, aside))
+
+
+def _saturating_passes(rows: WheelState, growth: float) -> WheelState:
+    stiffer = 1.0 - growth * np.expm1(-(rows.pass_number - 1.0) / 1.5)
+    return replace(rows, kc=rows.kc * stiffer, kphi=rows.kphi * stiffer)
+
+
+ALTERNATIVE_FORMS = (
+    Mechanism("slip-sinkage", "share", 1.0, "1", form="lyasko", soil=_lyasko),
+    Mechanism("slip-sinkage", "n2", 0.8, "1", form="square", soil=_square),
+    Mechanism("bulldozing", "coefficient", 0.8, "N^0.5", form="root-load", force=_root_load),
+    Mechanism(
+        "bulldozing", "coefficient", 3000.0, "N/m^1.5", form="depth-power", force=_depth_power
+    ),
+    Mechanism(
+        "wheel-flexibility", "delta_max", 0.003, "m", form="saturating", arc=_saturating_wheel
+    ),
+    Mechanism("exit-angle", "b", 0.15, "rad", form="constant", arc=_constant_exit),
+    Mechanism("exit-angle", "b0", 0.3, "1", form="proportional", arc=_proportional_exit),
+    Mechanism("grousers", "height", 0.012, "m", form="saturating", arc=_saturating_grousers),
+    Mechanism("stress-shift", "growth", 0.5, "1", form="with-slip", arc=_growing_shift),
+    Mechanism("rate", "m", 0.06, "1", form="power", shear=_rate_power, needs="speed"),
+    Mechanism(
+        "multipass",
+        "growth",
+        0.8,
+        "1",
+        form="saturating",
+        soil=_saturating_passes,
+        needs="pass_number",
+    ),
+    Mechanism(
+        "lateral-slip",
+        "share",
+        1.0,
+        "1",
+        form="velocity",
+        shear=_along_velocity,
+        needs="slip_angle",
+    ),
+)
 
 
 def _stick_slip(reaction: SoilReaction, rows: WheelState, depth: float) -> SoilReaction:
@@ -48,10 +172,10 @@ def _crust(normal: Floats, depth: Floats, rows: WheelState, strength: float) -> 
 
 
 UNCATALOGUED_MECHANISMS = (
-    Mechanism(name="stick-slip", size="depth", reference=0.1, unit="1", reading=_stick_slip),
-    Mechanism(name="ripple", size="height", reference=0.08, unit="1", reading=_ripple),
-    Mechanism(name="cable-drag", size="drag", reference=4.0, unit="N", reading=_cable_drag),
-    Mechanism(name="stiff-layer", size="ratio", reference=1.5, unit="1", pressure=_stiff_layer),
-    Mechanism(name="vibration", size="loss", reference=0.12, unit="1", soil=_vibration),
-    Mechanism(name="crust", size="strength", reference=4000.0, unit="Pa", pressure=_crust),
+    Mechanism("stick-slip", "depth", 0.1, "1", reading=_stick_slip),
+    Mechanism("ripple", "height", 0.08, "1", reading=_ripple),
+    Mechanism("cable-drag", "drag", 4.0, "N", reading=_cable_drag),
+    Mechanism("stiff-layer", "ratio", 1.5, "1", pressure=_stiff_layer),
+    Mechanism("vibration", "loss", 0.12, "1", soil=_vibration),
+    Mechanism("crust", "strength", 4000.0, "Pa", pressure=_crust),
 )

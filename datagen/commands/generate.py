@@ -124,8 +124,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("datagen.generate", "generate")
-    from datagen.generate import generate
-    from datagen.partitions import generate_folder
+    from datagen.generate import generate, generate_folder
     from datagen.recipe import read_recipe
     from soilml.cli.options import available_effects
     from soilml.cli.progress import progress_bar
@@ -160,8 +159,8 @@ def _engine(args: argparse.Namespace) -> Engine:
     """The engine of the options."""
     from functools import partial
 
-    from datagen.engines.dask_cluster import dask_map
-    from datagen.engines.processes import FORKS, process_map
+    from datagen.dask_cluster import dask_map
+    from datagen.processes import FORKS, process_map
 
     if args.engine == "dask":
         return partial(dask_map, workers=args.workers, scheduler=args.scheduler)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
-from datagen.blind_sets.factorial_plan import Plan
+from datagen.blind_sets.plans import Plan
 from soilml.cli import main
 from soilml.io.text_tables import csv_text, format_table
 

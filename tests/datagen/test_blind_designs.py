@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import Plan, benchmark_plans, draw_blind_set, write_blind_set
-from datagen.blind_sets.catalogue import active_mechanisms
-from datagen.blind_sets.factorial_plan import DISCREPANCIES
-from datagen.blind_sets.noise_processes import CHANNELS, sensors
-from datagen.blind_sets.reference_wheel import solve_equilibrium
+from datagen.blind_sets.plans import DISCREPANCIES, active_mechanisms
+from datagen.blind_sets.reading_errors import CHANNELS, sensors
+from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from datagen.blind_sets.run_schedules import DESIGNS, LOAD_JITTER
 from datagen.blind_sets.soil_families import FAMILIES, RADIUS, WIDTH
-from datagen.blind_sets.wheel_state import WheelState
 from soilml import read_table
 from soilml.config.case import read_case
 

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import MECHANISMS, Plan, draw_blind_set, plan_matrix, write_blind_set
-from datagen.blind_sets.catalogue import active_mechanisms, mechanism_keys
-from datagen.blind_sets.noise_processes import CHANNELS, sensors
-from datagen.blind_sets.reference_wheel import solve_equilibrium
+from datagen.blind_sets.plans import active_mechanisms, mechanism_keys
+from datagen.blind_sets.reading_errors import CHANNELS, sensors
+from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from datagen.blind_sets.run_schedules import COVARIATE_COLUMNS
 from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, WIDTH
-from datagen.blind_sets.wheel_state import WheelState
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
 from soilml.config.case import read_case
 from soilml.physics.operating_point import COVARIATES

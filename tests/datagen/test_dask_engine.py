@@ -9,12 +9,11 @@ import socket
 import pytest
 from conftest import RECIPE
 
-from datagen.engines import dask_cluster
-from datagen.engines.dask_cluster import dask_map, run_task
-from datagen.generate import generate
-from datagen.partitions import generate_folder
-from datagen.pieces import pieces
+from datagen import dask_cluster
+from datagen.dask_cluster import dask_map, run_task
+from datagen.generate import generate, generate_folder
 from datagen.recipe import read_recipe
+from datagen.simulation import pieces
 from soilml.errors import InputError
 
 dask = pytest.importorskip("dask")

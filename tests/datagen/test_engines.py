@@ -16,11 +16,10 @@ import pytest
 from conftest import RECIPE
 from scipy.stats import qmc
 
-from datagen.draws import _skip
-from datagen.engines.processes import process_map
 from datagen.generate import generate
-from datagen.pieces import pieces
+from datagen.processes import process_map
 from datagen.recipe import read_recipe
+from datagen.simulation import _skip, pieces
 from soilml.errors import InputError
 
 
@@ -103,7 +102,7 @@ def is_alive(process):
 def test_workers_end_when_the_process_is_killed():
     code = (
         "import os, time\n"
-        "from datagen.engines.processes import process_map\n"
+        "from datagen.processes import process_map\n"
         "def f(i):\n    time.sleep(0.2 * (i > 1)); return os.getpid()\n"
         "with process_map(f, range(1000), 2) as found:\n"
         "    print(next(found), next(found), flush=True); list(found)\n"

@@ -14,8 +14,8 @@ import pytest
 from conftest import RECIPE
 
 from datagen.generate import generate
-from datagen.pieces import block_sizes, simulate_pieces, simulate_rows
 from datagen.recipe import read_recipe
+from datagen.simulation import block_sizes, simulate_pieces, simulate_rows
 from soilml import Model, Operating, Wheel, read_table, soil
 from soilml.errors import InputError
 

@@ -10,11 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
-from datagen.engines.processes import process_map
-from datagen.generate import WRITER, generate
-from datagen.partitions import generate_folder
-from datagen.pieces import pieces
+from datagen.generate import WRITER, generate, generate_folder
+from datagen.processes import process_map
 from datagen.recipe import read_recipe
+from datagen.simulation import pieces
 from soilml.cli import main
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from datagen.engines.processes import process_map
+from datagen.processes import process_map
 from datagen.recipe import Recipe
 from soilml.config.case import Case
 from soilml.errors import FitError

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.pieces import block_sizes, simulate_rows
 from datagen.recipe import Block, Recipe
+from datagen.simulation import block_sizes, simulate_rows
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.io.table import Table

@@ -11,7 +11,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.engines.processes import FORKS, process_map
+from datagen.processes import FORKS, process_map
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify

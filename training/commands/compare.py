@@ -112,7 +112,7 @@ def _has_test_data(args: argparse.Namespace) -> bool:
 def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
     need("training.benchmark.suite", "compare")
-    from datagen.engines.worker_setup import limited_workers
+    from datagen.processes import limited_workers
 
     with limited_workers(args.workers):
         if args.limit is not None:

@@ -74,7 +74,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
     need("training.train", "train")
-    from datagen.engines.worker_setup import limited_workers
+    from datagen.processes import limited_workers
     from training.spec import is_any_wheel_spec
 
     with limited_workers(args.workers):

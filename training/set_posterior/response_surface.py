@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-from datagen.engines.processes import process_map
+from datagen.processes import process_map
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from datagen.engines.processes import process_map
+from datagen.processes import process_map
 from soilml.onboard.set_contract import (
     ABSENT_STD,
     COMMON_ERROR_INPUTS,

@@ -5,8 +5,7 @@ from contextvars import copy_context
 import numpy as np
 import pytest
 
-from datagen.engines.processes import FORKS, process_map
-from datagen.engines.worker_setup import limited_workers, prepare_worker, usable_cores
+from datagen.processes import FORKS, limited_workers, prepare_worker, process_map, usable_cores
 from datagen.recipe import read_recipe
 from soilml.quantities import SHEAR
 from training.benchmark.bayes_limit import benchmark_sets

@@ -6,11 +6,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from datagen.draws import sample_rows
+from datagen.gear_sensors import normal_stiffness
 from datagen.generate import generate
-from datagen.pieces import simulate_rows
 from datagen.recipe import read_recipe
-from datagen.wheel_leg_vibration import normal_stiffness
+from datagen.simulation import sample_rows, simulate_rows
 from soilml import read_table, soil
 from soilml.errors import InputError
 from soilml.systems.wheel_legs.sensing.slip_models import spring_soil

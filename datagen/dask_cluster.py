@@ -20,7 +20,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from datagen.engines.worker_setup import prepare_worker, usable_cores
+from datagen.processes import prepare_worker, usable_cores
 from soilml.errors import InputError, MissingLibraryError
 
 Item = TypeVar("Item")
@@ -77,7 +77,7 @@ def dask_map(
             "--engine dask needs dask, which is not installed: pip install 'soilml[cluster]'"
         ) from None
     for name in list(logging.root.manager.loggerDict):
-        if name.split(".")[0] == "distributed":  # errors are told in one line
+        if name.split(".")[0] == "distributed":  # errors are reported in one line
             logging.getLogger(name).setLevel(logging.CRITICAL)
     count = usable_cores() if workers is None else workers
     with ExitStack() as stack:
