@@ -23,10 +23,10 @@ ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"
 
 
 def one_step_graph(model: Any, name: str, rows: int) -> Any:
-    """A graph that adds `rows` rows to a memory that is always as large as it can be.
+    """A graph that adds `rows` rows to a state that is always as large as it can be.
 
-    All shapes are numbers, there is no branch, and the memory has as many rows as columns: it
-    begins as zeros, and after each step the caller replaces the outgoing memory by its triangular
+    All shapes are numbers, there is no branch, and the state has as many rows as columns: it
+    begins as zeros, and after each step the caller replaces the outgoing state by its triangular
     factor.
 
     Parameters
@@ -41,7 +41,7 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     Raises
     ------
     InputError
-        For a file without a set posterior, or one whose shapes depend on more than rows and memory.
+        For a file without a set posterior, or one whose shapes depend on more than rows and state.
     """
     import onnx
 

@@ -26,9 +26,9 @@ from training.export_c.tensor import Shape, Size, Tensor
 ARRAYS = {"double": "doubles", "float": "floats", "int": "ints", "bool": "bools"}
 #: Element types of the constants that stand for inputs.
 DTYPES = {"double": np.float64, "float": np.float32, "int": np.int32, "bool": np.bool_}
-#: Counts that a function may be given: rows of readings, and rows of the memory.
+#: Counts that a function may be given: rows of readings, and rows of the state.
 ROWS, KEPT = "rows", "kept"
-#: Outputs that a step needs: the memory, the counts, and which rows are in range.
+#: Outputs that a step needs: the state, the counts, and which rows are in range.
 STEP_OUTPUTS = (*MEMORY_OUTPUTS, ROW_IN_RANGE)
 #: Width of lines of C.
 WIDTH = 100
@@ -70,7 +70,7 @@ def single_function(model: Any, interface: Interface, shared: SharedParts) -> Gr
 def step_function(
     model: Any, interface: Interface, shared: SharedParts, rows: int
 ) -> GraphFunction:
-    """The rows that readings add to the memory of a set, and the counts; no answer."""
+    """The rows that readings add to the state of a set, and the counts; no answer."""
     inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size(0)}, switch=True)
     return graph_function("step_graph", model, Program(shared, {ROWS: rows}), inputs, STEP_OUTPUTS)
 
@@ -78,7 +78,7 @@ def step_function(
 def update_function(
     model: Any, interface: Interface, shared: SharedParts, rows: int
 ) -> GraphFunction:
-    """The memory with the rows that readings add, the counts, and the answer."""
+    """The state with the rows that readings add, the counts, and the answer."""
     inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size.of(KEPT)}, switch=True)
     program = Program(shared, {ROWS: rows, KEPT: interface.columns})
     names = [*STEP_OUTPUTS, *_answers(model)]
@@ -86,7 +86,7 @@ def update_function(
 
 
 def answer_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
-    """The estimate from the memory of a set."""
+    """The estimate from the state of a set."""
     inputs = _inputs(model, {ROWS: Size(0), KEPT: Size.of(KEPT)}, switch=True)
     program = Program(shared, {KEPT: interface.columns})
     return graph_function("answer_graph", model, program, inputs, _answers(model))
@@ -145,8 +145,14 @@ def graph_function(
     sizes = {k: (t.kind, t.count.constant if t.count.fixed else -1) for k, t in found.items()}
     code = " ".join(s.code for s in program.statements)
     names = {*re.findall(r"\bw\d+\b", code), *(tensor.owner for tensor in found.values())}
-    text = "\n".join([*lines, "}"])
-    return GraphFunction(name, text, tuple(read), sizes, plan.lengths, frozenset(names))
+    return GraphFunction(
+        name=name,
+        text="\n".join([*lines, "}"]),
+        inputs=tuple(read),
+        outputs=sizes,
+        lengths=plan.lengths,
+        constants=frozenset(names),
+    )
 
 
 def _statements(program: Program, plan: MemoryPlan) -> list[str]:

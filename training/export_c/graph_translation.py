@@ -59,28 +59,28 @@ def translate_graph(
 
 
 def rows_are_apart(model: Any) -> bool:
-    """Whether the rows that readings add to the memory of a set do not depend on that memory.
+    """Whether the rows that readings add to the state of a set do not depend on that state.
 
     They can then be computed without it, and without the answer.
 
     Raises
     ------
     ModelFileError
-        Unless the memory is passed on with further rows below it: packed rows are added to a
+        Unless the state is passed on with further rows below it: packed rows are added to a
         factor in double precision, and earlier ones cannot be changed.
     """
     switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
-    memory, grown = MEMORY_INPUTS[0], MEMORY_OUTPUTS[0]
+    state, grown = MEMORY_INPUTS[0], MEMORY_OUTPUTS[0]
     nodes = _without_branches(model.graph, switch)
     makers = {name: node for node in nodes for name in node.output}
     joined = _source(makers, grown, "Concat")
-    if joined is None or _source(makers, joined.input[0], "", memory) is None:
+    if joined is None or _source(makers, joined.input[0], "", state) is None:
         raise ModelFileError(
-            f"export-c needs a graph whose {grown} is {memory} with the rows of new readings "
+            f"export-c needs a graph whose {grown} is {state} with the rows of new readings "
             "below it; this graph changes earlier rows"
         )
     wanted = {*joined.input[1:], ROW_IN_RANGE}
-    return not any(memory in node.input for node in _needed(nodes, wanted))
+    return not any(state in node.input for node in _needed(nodes, wanted))
 
 
 def _source(makers: dict[str, Any], name: str, kind: str, wanted: str = "") -> Any:

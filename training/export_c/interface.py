@@ -65,7 +65,7 @@ class RowField:
 
 @dataclass(frozen=True)
 class ContextField:
-    """A number that holds for a whole set, its range, and what stands for it where it is NaN."""
+    """A number of a whole set, its range, and what stands for it where it is NaN."""
 
     name: str
     lower: float
@@ -82,11 +82,11 @@ class Interface:
     rows : tuple of RowField
         Inputs of one row, those that must be measured first.
     context : tuple of ContextField
-        Inputs that hold for a whole set.
+        Inputs of a whole set.
     single, sets : bool
         Whether the file estimates from single rows, and from sets.
     columns : int
-        Columns of the memory of a set.
+        Columns of the state of a set.
     """
 
     rows: tuple[RowField, ...]

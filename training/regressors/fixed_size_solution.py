@@ -78,7 +78,7 @@ class FixedSizeSolution:
         mean = z.mean(axis=0)
         ridge, moment = features.ridge(x, z - mean, origin, steps.part(0))
         rows = (x[sample], z[sample])
-        errors = _errors(features, ridge, moment, mean, gammas, rows, validation)
+        errors = _errors(features, ridge, moment, mean, gammas, sample=rows, validation=validation)
         gamma = gammas[int(np.argmin(errors))]
         search[-1] = (features.width, np.asarray(gammas), errors)
         weights = ridge.solve(moment, gamma)
@@ -91,7 +91,7 @@ class FixedSizeSolution:
         log_mean = logs.mean(axis=0)
         log_moment = features.moment(x, logs - log_mean, ridge, steps.part(2))
         rows = (x[sample], logs[sample])
-        errors = _errors(features, ridge, log_moment, log_mean, GAMMAS, rows, None)
+        errors = _errors(features, ridge, log_moment, log_mean, GAMMAS, sample=rows)
         log_weights = ridge.solve(log_moment, GAMMAS[int(np.argmin(errors))])
         along = features.projection @ ridge.vectors
         shift = ridge.mean @ ridge.vectors
@@ -142,7 +142,9 @@ class FixedSizeSolution:
             values = features.at(rows[0])
             ridge, mean = RidgeEigensystem.of(values), rows[1].mean(axis=0)
             moment = (values - ridge.mean).T @ (rows[1] - mean)
-            errors = _errors(features, ridge, moment, mean, gammas, rows, validation)
+            errors = _errors(
+                features, ridge, moment, mean, gammas, sample=rows, validation=validation
+            )
             search.append((width, np.asarray(gammas), errors))
             candidates[width] = features, ridge.mean
         search = by_error(search)
@@ -155,8 +157,9 @@ def _errors(
     moment: Floats,
     mean: Floats,
     gammas: tuple[float, ...],
+    *,
     sample: Rows,
-    validation: Rows | None,
+    validation: Rows | None = None,
 ) -> Floats:
     """Mean squared error of each gamma on validation rows, else of leaving out rows of a sample."""
     x, y = sample if validation is None else validation

@@ -1,4 +1,4 @@
-"""The whole set posterior as part of a graph: readings and memory in, estimates and memory out."""
+"""The whole set posterior as part of a graph: readings and state in, estimates and state out."""
 
 from __future__ import annotations
 
@@ -77,26 +77,26 @@ class SetPosteriorGraph:
             "at_edge": (BOOL, [q]),
             "misfit": (FLOAT, [1]),
         }
-        memory: tuple[Output, ...] = ((FLOAT, ["kept_out", self.columns]), (FLOAT, [3]))
+        state: tuple[Output, ...] = ((FLOAT, ["kept_out", self.columns]), (FLOAT, [3]))
         return {
             **{SET_PREFIX + name: output for name, output in of_set.items()},
-            **dict(zip(MEMORY_OUTPUTS, memory, strict=True)),
+            **dict(zip(MEMORY_OUTPUTS, state, strict=True)),
             ROW_IN_RANGE: (BOOL, ["rows"]),
         }
 
     def defaults(self) -> dict[str, Any]:
-        """Values of inputs that need not be fed: not measured, the file's noise, usual errors.
+        """Values of inputs that need not be fed: not measured, the file's noise, typical errors.
 
-        Context inputs have none, and the memory is empty.
+        Context inputs have none, and the state is empty.
         """
-        errors = self.family.usual_errors()
+        errors = self.family.typical_errors()
         values = default_values() | {k: np.full(1, v, np.float32) for k, v in errors.items()}
         return values | dict(zip(MEMORY_INPUTS, empty_memory(self.columns), strict=True))
 
     def add_to(self, graph: Graph, prefix: str = "") -> None:
         """Add all nodes to a graph; outputs are named `<prefix><output>`.
 
-        The memory is the residual system of earlier rows of the set and three counts. Its
+        The state is the residual system of earlier rows of the set and three counts. Its
         triangular factor, which has as many rows as columns, is equivalent to it.
         """
         of_set = (*self.family.inputs(), *COMMON_ERROR_INPUTS)
@@ -104,7 +104,7 @@ class SetPosteriorGraph:
         inputs = {name: Value(graph, name) for name in names}
         inputs = complete_inputs(inputs, of_set, self.noise)
         context, rows = add_residual_rows(self.family, self.response, inputs)
-        memory, counts = (inputs[name] for name in MEMORY_INPUTS)
+        state, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
@@ -114,10 +114,10 @@ class SetPosteriorGraph:
 
         def system_at(basis: Value | None) -> Value:
             if basis is None:  # the first round is but a start: it takes the model as right
-                earlier, _ = memory.split([terms + of_sensors, of_model], axis=1)
+                earlier, _ = state.split([terms + of_sensors, of_model], axis=1)
                 system = concat([earlier, rows.system_at(basis)], axis=0)
                 return integrate_out_sensor_errors(system, terms)
-            system = concat([memory, rows.system_at(basis)], axis=0).named(outputs[0])
+            system = concat([state, rows.system_at(basis)], axis=0).named(outputs[0])
             system = integrate_out_if_any(system, terms + of_sensors, of_model)
             return integrate_out_sensor_errors(system, terms)
 

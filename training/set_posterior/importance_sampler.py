@@ -244,5 +244,7 @@ def _adapted_round(
     others = concat([ones, bounded], axis=0)
     for _ in range(ADAPTED_STEPS):
         mode, precision = residuals.step(concat([others, within_box(mode)], axis=0), mode)
-    solved = (mode, precision)
-    return unbounded, sample_round(residuals, family.axes, others, solved, draws, log_jacobian)
+    current = sample_round(
+        residuals, family.axes, others, (mode, precision), draws, log_jacobian=log_jacobian
+    )
+    return unbounded, current

@@ -30,7 +30,7 @@ class MisfitLimits:
 
 @dataclass(frozen=True)
 class Consistency:
-    """Limits of a set's misfit, and what must hold of its rows, each (1,)."""
+    """Limits of a set's misfit, and what its rows must satisfy, each (1,)."""
 
     limit: Value  # largest misfit of sound sets
     degrees: Value  # degrees of freedom of the misfit

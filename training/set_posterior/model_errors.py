@@ -18,7 +18,7 @@ from training.onnx_graph.value import (
     shortcut,
     stack_rows,
 )
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import SoilCoordinate
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response
@@ -36,7 +36,7 @@ class ModelErrors:
     Parameters
     ----------
     family, response : WheelFamily, Response
-        Usual errors of the model, and surfaces of the channels and of their changes.
+        Typical errors of the model, and surfaces of the channels and of their changes.
     context : ContextValues
         Features, and how the scale of torque depends on load.
     readings : mapping
@@ -101,7 +101,7 @@ class ModelErrors:
         """The columns of a model that has errors."""
         stds, channels = self.family.model_errors(), len(RESPONSE_CHANNELS)
         slip, load, torque = readings
-        log_load = log(maximum(load, SMALLEST)) - self.context.usual_log_load
+        log_load = log(maximum(load, SMALLEST)) - self.context.reference_log_load
         bearing = [
             slip * 0.0 + stds["bearing"],
             slip * stds["bearing_by_slip"],
@@ -136,7 +136,7 @@ class ModelErrors:
         return slip * growing + constant
 
 
-def _by_log_value(basis: Value, terms: Terms, number: int, axis: Coordinate) -> Value:
+def _by_log_value(basis: Value, terms: Terms, number: int, axis: SoilCoordinate) -> Value:
     r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
 
     .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}

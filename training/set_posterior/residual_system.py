@@ -31,7 +31,7 @@ from training.set_posterior.families.wheel_family import (
 from training.set_posterior.model_errors import ModelErrors
 from training.set_posterior.response_surface import Response, ResponseValues
 from training.set_posterior.sensor_errors import (
-    Operating,
+    OperatingReadings,
     SensorErrors,
     add_offsets,
     add_sensor_errors,
@@ -128,22 +128,22 @@ def add_residual_rows(
         _all_below(response, outside_noise).sum().reshape(1),
     ]
     return context, ResidualRows(
-        concat([values.coefficients, add_offsets(readings, slope)], axis=0),
-        weight.reshape(1, -1),
-        used.reshape(-1).astype(np.bool_),
-        values,
-        add_sensor_errors(context, readings, operating, y),
-        ModelErrors(family, response, context, readings, slope),
-        in_range,
-        concat(counts, axis=0),
+        fixed=concat([values.coefficients, add_offsets(readings, slope)], axis=0),
+        weight=weight.reshape(1, -1),
+        used=used.reshape(-1).astype(np.bool_),
+        values=values,
+        sensor_errors=add_sensor_errors(context, readings, operating, y),
+        model_errors=ModelErrors(family, response, context, readings, slope),
+        in_range=in_range,
+        counts=concat(counts, axis=0),
     )
 
 
-def _operating(readings: dict[str, Value]) -> Operating:
+def _operating(readings: dict[str, Value]) -> OperatingReadings:
     """Slip and load, and their noise."""
     values = maximum(stack_rows([readings[name] for name in OPERATING_NOISE]), SMALLEST)
     stds = stack_rows([readings[name] for name in OPERATING_STD_INPUTS])
-    return Operating(values, stds, stds / values)
+    return OperatingReadings(values, stds, stds / values)
 
 
 def _outside(response: Response, features: Value) -> Value:

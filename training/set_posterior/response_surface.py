@@ -217,7 +217,9 @@ def _fit(
     features = family.features(designs[feasible])
     # the error of a coefficient counts by the rms of its monomial
     error_weights = np.sqrt(np.mean(basis**2, axis=0))[:, None] * CHANNEL_WEIGHTS
-    response = _train_network(terms, features, coefficients, error_weights, settings, progress)
+    response = _train_network(
+        terms, features, coefficients, error_weights, settings=settings, progress=progress
+    )
     held_out = slice(0, int(HELD_OUT * len(features)))
     network_error = basis @ (response.coefficients(features[held_out]) - coefficients[held_out])
     # residuals of a least-squares fit are too small by the degrees of freedom of the fit

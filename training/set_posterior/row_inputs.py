@@ -41,7 +41,7 @@ ROWS = (*READING_INPUTS, *ROW_STDS)
 FileNoise = Mapping[str, Sequence[float]]
 
 #: Sums of inputs by row up to this are finite in float32; one with NaN or an infinity is not below
-#: it. Sums of context inputs, and of squares of a memory, are far smaller than this, so that their
+#: it. Sums of context inputs, and of squares of a state, are far smaller than this, so that their
 #: products are finite too.
 LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
 #: Readings of channels are limited to this: they are as impossible, and their squares are finite.
@@ -71,9 +71,9 @@ def complete_inputs(
 ) -> dict[str, Value]:
     r"""Inputs by row (1, rows), without markers, and everything finite.
 
-    - An input of one element holds for all rows.
+    - An input of one element is that of all rows.
     - A row of which any input is not finite gets a slip that is out of range, and harmless values.
-    - A context input that is not finite, or senseless, puts all rows out of range; memory that is
+    - A context input that is not finite, or senseless, puts all rows out of range; a state that is
       not finite is replaced by counts that no set can outweigh (`DAMAGED_COUNTS`), so that the set
       stays refused.
     - A negative standard deviation, and one of zero unless it may be zero, becomes that of the
@@ -89,7 +89,7 @@ def complete_inputs(
     inputs : mapping of str to Value
         All inputs of the graph.
     context : sequence of str
-        Names of those that hold for a whole set.
+        Names of those of a whole set.
     noise : FileNoise
         Noise of the file.
     """
@@ -106,12 +106,12 @@ def complete_inputs(
     finite = absolute(total) <= LARGEST_SUM
     stacked = concat([value.node("Expand", rows) for value in by_row], axis=0)
     stacked = where(finite, stacked.reshape(len(ROWS), -1), constant(stacked.graph, HARMLESS))
-    memory, counts = (inputs[name] for name in MEMORY_INPUTS)
-    squares = memory.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
+    state, counts = (inputs[name] for name in MEMORY_INPUTS)
+    squares = state.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
     intact = squares <= LARGEST_MEMORY
     damaged = np.asarray(DAMAGED_COUNTS)
     complete |= zip(
-        MEMORY_INPUTS, (where(intact, memory, 0.0), where(intact, counts, damaged)), strict=True
+        MEMORY_INPUTS, (where(intact, state, 0.0), where(intact, counts, damaged)), strict=True
     )
     return complete | _without_markers(stacked, noise)
 

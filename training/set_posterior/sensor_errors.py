@@ -27,7 +27,7 @@ CHANNELS = len(RESPONSE_CHANNELS)
 
 
 @dataclass(frozen=True)
-class Operating:
+class OperatingReadings:
     """Slip and load of rows, (2, rows) each."""
 
     values: Value  # at least as large as the smallest number whose logarithm is taken
@@ -64,7 +64,7 @@ class SensorErrors:
 def add_sensor_errors(
     context: ContextValues,
     readings: dict[str, Value],
-    operating: Operating,
+    operating: OperatingReadings,
     y: Value,
 ) -> SensorErrors:
     r"""How residuals change with errors of slip and load.
@@ -81,7 +81,7 @@ def add_sensor_errors(
         How the torque scale depends on load.
     readings : dict
         Standard deviations by input name.
-    operating : Operating
+    operating : OperatingReadings
         Slip and load of the rows.
     y : Value
         Readings on the scales of the channels, (channels, rows).

@@ -176,7 +176,7 @@ def graph_outputs(
     index: int,
     errors: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """All outputs of the session for one simulated set without memory, by name.
+    """All outputs of the session for one simulated set without an earlier state, by name.
 
     Slip and load are taken as exact, and `COMMON_ERROR_INPUTS` as 0 where `errors` lacks them.
     """
@@ -205,7 +205,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
         "terms": len(posterior.response.terms),
         "noise": {name: list(parts) for name, parts in posterior.noise.items()},
         "context": posterior.family.limits(),
-        "errors": posterior.family.usual_errors(),
+        "errors": posterior.family.typical_errors(),
         "model_errors": posterior.family.model_errors(),
         "alone": sets_only,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),

@@ -23,7 +23,7 @@ from training.onnx_graph.value import Value, constant
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import (
     USUAL_MODEL_ERRORS,
-    usual_model_errors,
+    typical_model_errors,
 )
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.monomials import monomials
@@ -164,10 +164,10 @@ def test_channels_have_errors_of_their_own(kind, request):
 
 def test_what_the_model_has_is_none_of_its_errors(any_posterior):
     wheel = Model(Wheel(radius=0.1, width=0.1))
-    assert usual_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS
+    assert typical_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS
 
     def nil(unknown, model=wheel):
-        return {name for name, std in usual_model_errors(unknown, model).items() if std == 0.0}
+        return {name for name, std in typical_model_errors(unknown, model).items() if std == 0.0}
 
     assert nil([*SHEAR, "kphi", "n"]) == {"bearing", "bearing_by_load"}
     digging = wheel + SlipSinkage(n1=0.2)

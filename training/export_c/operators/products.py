@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from training.export_c.c_text import element, indices_of, leaves_of, nest, number, offset
 from training.export_c.operators.rearrangement import transposed
 from training.export_c.program import Node, Program, Translation
@@ -24,7 +26,8 @@ def translate_gemm(program: Program, node: Node) -> list[Tensor]:
     n = b.shape[0] if transpose_b else b.shape[1]
     out = _started(program, a.kind, (m, n), c, beta)
     steps = (Size(1), m) if transpose_a else (k, Size(1))
-    _emit(program, (m, k, n), alpha, (a, *steps), b, bool(transpose_b), out)
+    at = _Places((a, *steps), b, out)
+    _emit(program, (m, k, n), at, alpha=alpha, transpose_b=bool(transpose_b))
     return [out]
 
 
@@ -36,11 +39,11 @@ def translate_matmul(program: Program, node: Node) -> list[Tensor]:
     batch = broadcast([left.shape[:-2], right.shape[:-2]])
     m, k, n = left.shape[-2], left.shape[-1], right.shape[-1]
     out = _started(program, a.kind, (*batch, m, n), None, 1.0)
-    indices = indices_of(batch)
-    _emit(
-        program, (m, k, n), 1.0, (left, k, Size(1)), right, False, out,
-        batch, indices, [_offset(left, batch, indices), _offset(right, batch, indices)],
-    )  # fmt: skip
+    i = indices_of(batch)
+    inner = offset(strides(out.shape)[: len(batch)], i)
+    offsets = (_offset(left, batch, i), _offset(right, batch, i), inner)
+    at = _Places((left, k, Size(1)), right, out, offsets)
+    _emit(program, (m, k, n), at, batch=batch)
     shape = (*batch, *([] if a.rank == 1 else [m]), *([] if b.rank == 1 else [n]))
     return [out.seen_as(shape)]
 
@@ -65,32 +68,39 @@ def _started(program: Program, kind: str, shape: Shape, c: Tensor | None, beta: 
     return program.stored(start)
 
 
+@dataclass(frozen=True)
+class _Places:
+    """Left matrix with its steps along rows and columns, right matrix, product; their offsets."""
+
+    left: tuple[Tensor, Size, Size]
+    right: Tensor
+    out: Tensor
+    offsets: tuple[str, str, str] = ("0", "0", "0")
+
+
 def _emit(
     program: Program,
     sizes: tuple[Size, Size, Size],
-    alpha: float,
-    left: tuple[Tensor, Size, Size],
-    b: Tensor,
-    transpose_b: bool,
-    out: Tensor,
+    at: _Places,
+    *,
     batch: Shape = (),
-    indices: list[str] | None = None,
-    offsets: list[str] | None = None,
+    alpha: float = 1.0,
+    transpose_b: bool = False,
 ) -> None:
-    a, row, step = left
-    m, k, n = sizes
-    at_a, at_b = (f" + {o}" if o != "0" else "" for o in offsets or ["0", "0"])
-    inner = offset(strides((*batch, m, n))[: len(batch)], indices or [])
-    at_out = "" if inner == "0" else f" + {inner}"
+    (a, row, step), (m, k, n) = at.left, sizes
+    names = [
+        tensor.name + (f" + {place}" if place != "0" else "")
+        for tensor, place in zip((a, at.right, at.out), at.offsets, strict=True)
+    ]
     if transpose_b:
         kernel, steps = program.shared.kernel("add_product_transposed", a.kind), row.c
     else:
         kernel, steps = program.shared.kernel("add_product", a.kind), f"{row.c}, {step.c}"
     call = (
-        f"{kernel}({m.c}, {k.c}, {n.c}, {number(alpha, a.kind)}, {a.name}{at_a}, {steps}, "
-        f"{b.name}{at_b}, {out.name}{at_out});"
+        f"{kernel}({m.c}, {k.c}, {n.c}, {number(alpha, a.kind)}, {names[0]}, {steps}, {names[1]}, "
+        f"{names[2]});"
     )
-    program.emit(nest(list(batch), indices or [], call), out, a, b)
+    program.emit(nest(list(batch), indices_of(batch), call), at.out, a, at.right)
 
 
 def _emit_by_rows(program: Program, a: Tensor, b: Tensor, alpha: float, out: Tensor) -> None:

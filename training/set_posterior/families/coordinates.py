@@ -26,7 +26,7 @@ NORMAL_TRUNCATION = 2.5
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class SoilCoordinate:
     r"""A parameter's value along its coordinate x, and the density of its prior there.
 
     .. math:: \theta = \alpha + \beta e^{\gamma x} + \delta x, \qquad \log p(x) = \lambda x + const
@@ -45,14 +45,14 @@ class Coordinate:
     """
 
     name: str
-    shift: float
-    factor: float
-    rate: float
-    slope: float
-    tilt: float
+    shift: float = 0.0
+    factor: float = 0.0
+    rate: float = 0.0
+    slope: float = 0.0
+    tilt: float = 0.0
 
     @staticmethod
-    def of(name: str, prior: Prior) -> Coordinate:
+    def of(name: str, prior: Prior) -> SoilCoordinate:
         """The coordinate for a prior, uniform in the value or in its logarithm."""
         if prior.normal_std is not None:
             raise InputError(
@@ -63,12 +63,13 @@ class Coordinate:
             lower > 0.0 and upper / lower > LOGARITHMIC_RATIO and lower > ZERO_SHARE * upper
         ):
             rate = 0.5 * math.log(upper / lower)
-            middle = math.sqrt(lower * upper)
-            return Coordinate(name, 0.0, middle, rate, 0.0, 0.0 if prior.log else rate)
+            tilt = 0.0 if prior.log else rate
+            return SoilCoordinate(name, factor=math.sqrt(lower * upper), rate=rate, tilt=tilt)
         if 0.0 <= lower <= ZERO_SHARE * upper:
             rate, size = 0.5 * math.log(OFFSET_RATIO), (upper - lower) / (OFFSET_RATIO - 1.0)
-            return Coordinate(name, lower - size, size * math.sqrt(OFFSET_RATIO), rate, 0.0, rate)
-        return Coordinate(name, 0.5 * (lower + upper), 0.0, 0.0, 0.5 * (upper - lower), 0.0)
+            factor = size * math.sqrt(OFFSET_RATIO)
+            return SoilCoordinate(name, shift=lower - size, factor=factor, rate=rate, tilt=rate)
+        return SoilCoordinate(name, shift=0.5 * (lower + upper), slope=0.5 * (upper - lower))
 
     def value(self, x: Floats) -> Floats:
         """The parameter at coordinates x, of any shape."""

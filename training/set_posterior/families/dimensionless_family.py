@@ -19,7 +19,7 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, stack_rows
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import SoilCoordinate
 from training.set_posterior.families.dimensionless_sets import (
     BEARING_RANGE,
     COHESION_SHARE,
@@ -35,12 +35,12 @@ from training.set_posterior.families.dimensionless_sets import (
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
-    USUAL_ERRORS,
+    TYPICAL_ERRORS,
     ContextValues,
     SimulatedSets,
     add_log_torque,
-    usual_contact,
-    usual_model_errors,
+    typical_contact,
+    typical_model_errors,
 )
 
 Floats = NDArray[np.float64]
@@ -64,7 +64,7 @@ class DimensionlessFamily:
     ranges: dict[str, Prior]
     sinkage: tuple[float, float]  # range of sinkage over radius of the designs
     pressure: tuple[float, float]  # range of load / (radius width) of the designs, Pa
-    axes: tuple[Coordinate, ...]
+    axes: tuple[SoilCoordinate, ...]
     targets: int = 3
     free: int = 3
     degree: tuple[int, int] = (3, 4)
@@ -94,11 +94,11 @@ class DimensionlessFamily:
             (sinkage.lower, sinkage.upper),
             (pressure.lower, pressure.upper),
             (
-                Coordinate.of("cohesion", COHESION_SHARE),
-                Coordinate.of("friction_angle", angle),
-                Coordinate.of("shear_modulus", SHEAR_MODULUS_SHARE),
-                Coordinate.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
-                Coordinate.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
+                SoilCoordinate.of("cohesion", COHESION_SHARE),
+                SoilCoordinate.of("friction_angle", angle),
+                SoilCoordinate.of("shear_modulus", SHEAR_MODULUS_SHARE),
+                SoilCoordinate.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
+                SoilCoordinate.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
             ),
         )
 
@@ -206,17 +206,17 @@ class DimensionlessFamily:
             "shear_modulus_max": list(shear),
         }
 
-    def usual_errors(self) -> dict[str, float]:
+    def typical_errors(self) -> dict[str, float]:
         """See `WheelFamily`; none of drawbar pull, as loads differ by a factor of a thousand."""
-        return USUAL_ERRORS
+        return TYPICAL_ERRORS
 
     def model_errors(self) -> dict[str, float]:
         """See `WheelFamily`; `bearing_std` is the error of the bearing curve."""
-        return usual_model_errors(["cohesion", "kphi", "n"], Model(Wheel(radius=1.0, width=1.0)))
+        return typical_model_errors(["cohesion", "kphi", "n"], Model(Wheel(radius=1.0, width=1.0)))
 
     def contact_changes(self, designs: Floats, x: Floats) -> Floats:
         """See `WheelFamily`."""
-        return self._responses(designs, x, usual_contact()) - self._responses(designs, x)
+        return self._responses(designs, x, typical_contact()) - self._responses(designs, x)
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`; features are linear in the logarithms of the inputs."""
@@ -247,7 +247,7 @@ class DimensionlessFamily:
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=1.0,
-            usual_log_load=0.0,
+            reference_log_load=0.0,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
             target_scale=target_scale.reshape(-1, 1),

@@ -25,18 +25,18 @@ from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, log, maximum, sqrt, stack_rows
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import SoilCoordinate
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
-    USUAL_ERRORS,
+    TYPICAL_ERRORS,
     ContextValues,
     Origin,
     SimulatedSets,
     add_log_torque,
     run_patterns,
-    usual_contact,
-    usual_model_errors,
+    typical_contact,
+    typical_model_errors,
 )
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ class RecipeFamily:
     """Gear and effects of a recipe on soils of its prior; a design is (slip, load)."""
 
     recipe: Recipe
-    axes: tuple[Coordinate, ...]
+    axes: tuple[SoilCoordinate, ...]
     targets: int
     free: int
     degree: tuple[int, int]
@@ -93,7 +93,7 @@ class RecipeFamily:
                 "are slip above 0 and torque that depends on slip, load and soil alone; remove "
                 "[set_posterior] from the spec"
             )
-        axes = tuple(Coordinate.of(name, prior[name]) for name in names)
+        axes = tuple(SoilCoordinate.of(name, prior[name]) for name in names)
         degree = (4, 4) if len(axes) <= FEW_UNKNOWNS else (3, 4)
         family = RecipeFamily(recipe, axes, len(targets), len(axes), degree)
         noise = recipe.case.noise.get(column("torque"), Noise(share=1.0))
@@ -152,18 +152,18 @@ class RecipeFamily:
         """None, as there are no context inputs."""
         return {}
 
-    def usual_errors(self) -> dict[str, float]:
+    def typical_errors(self) -> dict[str, float]:
         """See `WheelFamily`."""
         load = float(self.recipe.load.at(np.asarray(0.5)))
-        return USUAL_ERRORS | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
+        return TYPICAL_ERRORS | {"drawbar_pull_bias": PULL_OFFSET_SHARE * load}
 
     def model_errors(self) -> dict[str, float]:
         """See `WheelFamily`."""
-        return usual_model_errors([axis.name for axis in self.axes], self.recipe.case.model)
+        return typical_model_errors([axis.name for axis in self.axes], self.recipe.case.model)
 
     def contact_changes(self, designs: Floats, x: Floats) -> Floats:
         """See `WheelFamily`."""
-        return self._responses(designs, x, usual_contact()) - self._responses(designs, x)
+        return self._responses(designs, x, typical_contact()) - self._responses(designs, x)
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
@@ -175,7 +175,7 @@ class RecipeFamily:
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=0.0 if self.linear_torque else 1.0,
-            usual_log_load=math.log(float(self.recipe.load.at(np.asarray(0.5)))),
+            reference_log_load=math.log(float(self.recipe.load.at(np.asarray(0.5)))),
             most_torque_noise=ANY_NOISE if self.linear_torque else MOST_RELATIVE_NOISE,
             length=1.0,
             target_scale=None,

@@ -18,7 +18,7 @@ from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import SoilCoordinate
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +29,10 @@ SMALLEST = LEAST_STD
 #: taken: the logarithm of a normal variable that may be negative is not normal (zero is 3 sigma
 #: away here).
 MOST_RELATIVE_NOISE = 1.0 / 3.0
-#: Standard deviations of errors that the readings of a drive usually have in common.
-USUAL_ERRORS = USUAL_SENSOR_ERRORS | {"drawbar_pull_bias": 0.0, "model_error": 0.0}
-#: Largest correction of the logarithm's bias, that of 20 % noise: its series in the noise holds
-#: there.
+#: Standard deviations of errors that the readings of a drive typically have in common.
+TYPICAL_ERRORS = USUAL_SENSOR_ERRORS | {"drawbar_pull_bias": 0.0, "model_error": 0.0}
+#: Largest correction of the logarithm's bias, that of 20 % noise: its series in the noise is
+#: accurate there.
 MOST_LOG_CORRECTION = 0.02
 
 
@@ -45,7 +45,7 @@ class ContextValues:
     torque: Value  # (1, rows) the torque reading on the scale of the response
     torque_slope: Value  # (1, rows) derivative of that scale by torque, 1 / (N m)
     torque_by_load: float  # derivative of the torque scale by log load, with its sign changed
-    usual_log_load: float  # from which changes with the logarithm of load are counted
+    reference_log_load: float  # from which changes with the logarithm of load are counted
     most_torque_noise: float  # readings with more noise on that scale are left out
     length: Value | float  # unit of sinkage, and of torque over load, m
     target_scale: Value | None  # (q, 1) factors of the values of the estimated axes; None: 1
@@ -72,7 +72,7 @@ class SimulatedSets:
     """Simulated sets of one size.
 
     `readings` are sensor readings and their standard deviations by input name, (sets, rows);
-    `context` are the inputs that hold for a whole set, (sets,); `truth` are the estimated
+    `context` are the inputs of a whole set, (sets,); `truth` are the estimated
     parameters (sets, q).
     """
 
@@ -132,7 +132,7 @@ class WheelFamily(Protocol):
     """
 
     @property
-    def axes(self) -> tuple[Coordinate, ...]:
+    def axes(self) -> tuple[SoilCoordinate, ...]:
         """All unknowns."""
         ...
 
@@ -168,19 +168,19 @@ class WheelFamily(Protocol):
         ...
 
     def inputs(self) -> dict[str, str]:
-        """Context inputs of the graph, which hold for all rows of a set: name -> unit."""
+        """Context inputs of the graph, of all rows of a set: name -> unit."""
         ...
 
     def limits(self) -> dict[str, list[float]]:
         """Least and largest value of each context input."""
         ...
 
-    def usual_errors(self) -> dict[str, float]:
-        """Usual standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
+    def typical_errors(self) -> dict[str, float]:
+        """Typical standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`."""
         ...
 
     def model_errors(self) -> dict[str, float]:
-        """Usual standard deviations of errors of the model, by `MODEL_ERROR_COLUMNS`.
+        """Typical standard deviations of errors of the model, by `MODEL_ERROR_COLUMNS`.
 
         Nil for what is an unknown of the family, or an effect of its model.
         """
@@ -189,8 +189,8 @@ class WheelFamily(Protocol):
     def contact_changes(self, designs: Floats, x: Floats) -> Floats:
         """Changes of the channels (n, m, 3) where the rim touches the soil behind the axle too.
 
-        That is with the effect `exit-angle` at its usual size. It is called only if this is one of
-        the errors of the model.
+        That is with the effect `exit-angle` at its typical size. It is called only if this is
+        one of the errors of the model.
         """
         ...
 
@@ -220,13 +220,13 @@ def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
     return np.where(pattern < 2, independent, np.where(pattern == 2, levels, constant))
 
 
-def usual_contact() -> ExitAngle:
-    """The effect `exit-angle` at its usual size."""
+def typical_contact() -> ExitAngle:
+    """The effect `exit-angle` at its typical size."""
     return ExitAngle(**ExitAngle.about.reference)
 
 
-def usual_model_errors(unknown: Sequence[str], model: Model) -> dict[str, float]:
-    """The usual errors, without those that the model has as unknowns or as effects.
+def typical_model_errors(unknown: Sequence[str], model: Model) -> dict[str, float]:
+    """The typical errors, without those that the model has as unknowns or as effects.
 
     Parameters
     ----------
