@@ -25,6 +25,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import column
+from soilml.remarks import Remark
 from training.benchmark.methods import Method, analytic_method, model_file_method, prior_method
 from training.benchmark.paired_results import MethodResult
 
@@ -32,9 +33,16 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 
+#: Most sets of one size that are scored, and how many of these the slower analytic methods get.
+MAX_SETS = 4000
+ANALYTIC_SETS = 120
+#: Fewest sets of a size that are scored: the standard error of 90 % coverage is then 7 %.
+MIN_SETS = 20
+
+
 def check_same_provenance(
     case: Case, table: Table, estimators: Mapping[str, Estimator], names: Sequence[str]
-) -> list[str]:
+) -> list[Remark]:
     """Compare the recipes of test data and estimators with a case.
 
     Test data and estimators without a recipe are not checked.
@@ -52,9 +60,9 @@ def check_same_provenance(
 
     Returns
     -------
-    list of str
-        One note for each difference between the case and the training data of an estimator in
-        soil, effects or prior: such an estimator is compared nevertheless.
+    list of Remark
+        A note `trained-otherwise` for each difference in soil, effects or prior between the case
+        and the training data of an estimator: such an estimator is compared nevertheless.
 
     Raises
     ------
@@ -71,7 +79,7 @@ def check_same_provenance(
             f"{table.source} has {difference}: use the model file that the data were made with"
         )
     return [
-        f"{label} was trained with {difference}"
+        Remark("trained-otherwise", f"{label} was trained with {difference}", (label,), "note")
         for label, other in trained.items()
         for difference in (_differences(case, other, names) if other else ())
     ]
@@ -81,13 +89,6 @@ def _differences(case: Case, other: Case, names: Sequence[str]) -> Iterator[str]
     yield from effect_differences(case, other)
     yield from value_differences(case, other)
     yield from prior_differences(case, other, names)
-
-
-#: Most sets of one size that are scored, and how many of these the slower analytic methods get.
-MAX_SETS = 4000
-ANALYTIC_SETS = 120
-#: Fewest sets of a size that are scored: the standard error of 90 % coverage is then 7 %.
-MIN_SETS = 20
 
 
 class MethodScores(list[MethodResult]):

@@ -140,7 +140,7 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     estimators = {file.stem: for_simulated_case(Estimator.load(file), case) for file in files}
     _check_labels(estimators, files)
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
-        tell(note)
+        tell(note.text)
     with create_folder(args.out or FOLDER) as folder, stage_progress() as progress:
         results = benchmark(estimators, None, args.sets, args.against, progress)
         progress("drawing the report", 0, 1)
@@ -243,7 +243,7 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
     _check_labels(estimators, files)
     names = next(iter(estimators.values())).names
     for note in check_same_provenance(case, table, estimators, names):
-        tell(note)
+        tell(note.text)
     with create_folder(args.out) as folder, stage_progress() as progress:
         scores = compare(case, table, estimators, progress, args.analytic_sets)
         progress("drawing the report", 0, 1)

@@ -66,7 +66,10 @@ def test_without_a_recipe_of_the_data_the_training_differences_are_noted(tmp_pat
             check_same_provenance(case, table, estimators, NAMES)
     else:
         (note, *_) = check_same_provenance(case, table, estimators, NAMES)
-        assert note.startswith("small was trained with") and fragment in note
+        assert (note.code, note.about) == (
+            "trained-otherwise",
+            ("small",),
+        ) and fragment in note.text
 
 
 def test_a_damaged_recipe_is_one_line(tmp_path, parts):
