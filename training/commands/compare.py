@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from soilml.cli.options import InputFile, add_workers_option, positive_number
 from soilml.errors import InputError
 from soilml.io.atomic_files import create_folder, output_files
-from soilml.optional_imports import need
 
 if TYPE_CHECKING:
     from soilml.report.page import Report
@@ -111,6 +110,8 @@ def _has_test_data(args: argparse.Namespace) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Compare and write the results."""
+    from soilml.optional_imports import need
+
     need("training.benchmark.suite", "compare")
     from datagen.processes import limited_workers
 

@@ -13,7 +13,6 @@ from soilml.cli.options import (
 )
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
-from soilml.optional_imports import need
 
 HELP = "write a model file as C99 code"
 DESCRIPTION = """\
@@ -57,6 +56,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Translate a model file."""
+    from soilml.optional_imports import need
+
     need("onnx", "export-c")
     import onnx
 

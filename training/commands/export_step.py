@@ -9,7 +9,6 @@ from pathlib import Path
 from soilml.cli.options import InputFile, whole_number
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
-from soilml.optional_imports import need
 
 HELP = "write one step of a stream as an ONNX file of fixed shapes"
 DESCRIPTION = """\
@@ -46,6 +45,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Write the graph."""
+    from soilml.optional_imports import need
+
     need("onnx", "export-step")
     import onnx
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
-from soilml.optional_imports import need
 
 HELP = "train regressors on data and export one ONNX model file"
 DESCRIPTION = """\
@@ -73,6 +72,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Train and export."""
+    from soilml.optional_imports import need
+
     need("training.train", "train")
     from datagen.processes import limited_workers
     from training.spec import is_any_wheel_spec

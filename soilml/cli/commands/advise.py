@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,6 +84,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def _with_noise_of_rows(case: Case, data: Observations) -> Case:
     """The case with the noise of the rows' columns where it declares none: their median."""
+    from dataclasses import replace
+
     import numpy as np
 
     from soilml.config.measurement_noise import Noise

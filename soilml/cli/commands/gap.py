@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,6 +90,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
+    from dataclasses import replace
+
     from soilml.cli.options import available_effects, check_seed, parse_costs, parse_names
     from soilml.cli.output import origin_of, show, tell
     from soilml.cli.progress import progress_bar

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,6 +78,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Identify and write the result."""
+    from dataclasses import replace
+
     from soilml.cli.options import available_effects, parse_names
     from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
     from soilml.cli.tables import print_table_hints, read_rows, result_by_group, tell_failures

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -138,6 +137,8 @@ def _counted(number: int, name: str) -> str:
 
 
 def _init(args: argparse.Namespace) -> int:
+    import shlex
+
     from soilml.cli.output import tell, write_stdout
     from soilml.log_import.guesses.map_text import draft_map
 

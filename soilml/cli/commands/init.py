@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from pathlib import Path
 
 from soilml.errors import InputError, did_you_mean
@@ -97,6 +96,8 @@ def _size(key: str, text: str) -> float:
 
 def _check(text: str) -> None:
     """Raise the error of a value that no model file may have, before anything is written."""
+    import tempfile
+
     from soilml.config.case import read_case
 
     with tempfile.TemporaryDirectory() as folder:

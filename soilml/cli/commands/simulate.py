@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -135,6 +134,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _forces(case: Case, slip: Floats, load: Floats, covariates: dict[str, float | None]) -> Force:
     """Forces (n,) at slips and loads (n,), in blocks, which bounds the memory."""
+    from dataclasses import fields
+
     import numpy as np
 
     from soilml.cli.progress import progress_bar
