@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.options import input_files
+from soilml.cli.options import declared_outputs, input_files
 from soilml.cli.process import (
     StopSignals,
     Terminated,
@@ -132,7 +132,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
         if command == name:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog
-        sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", _no_outputs))
+        sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", declared_outputs))
     return root
 
 
@@ -142,10 +142,6 @@ def _other_commands() -> dict[str, str]:
 
     others = {entry.name: entry.value for entry in entry_points(group="soilml.commands")}
     return {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
-
-
-def _no_outputs(args: argparse.Namespace) -> list[Any]:
-    return []
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

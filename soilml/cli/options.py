@@ -7,11 +7,12 @@ of usage answer at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.errors import InputError
+from soilml.io.atomic_files import output_files
 from soilml.io.cell_text import read_number, read_whole_number
 
 if TYPE_CHECKING:
@@ -36,6 +37,35 @@ class InputFile(str):
     """
 
     __slots__ = ()
+
+
+class OutputFile(str):
+    """Value of an argument that names a file to be written; see `add_output`."""
+
+    __slots__ = ()
+
+
+def add_output(parser: argparse.ArgumentParser, name: str, file: str, text: str) -> None:
+    """Declare an option or argument for an output, whose ending is that of `file`."""
+    suffix = Path(file).suffix
+
+    def checked(path: str) -> OutputFile:
+        try:
+            output_files(path, suffix)
+        except InputError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return OutputFile(path)
+
+    parser.add_argument(name, type=checked, metavar=file, help=text)
+
+
+def declared_outputs(args: argparse.Namespace) -> list[Path]:
+    """The arguments that are declared by `add_output`, and the files of `--report`.
+
+    A command whose outputs are others has a function `outputs` in the place of this one.
+    """
+    declared = [Path(value) for value in vars(args).values() if isinstance(value, OutputFile)]
+    return declared + folder_outputs("--report", getattr(args, "report", None), REPORT_FILES)
 
 
 def add_model_and_runs(parser: argparse.ArgumentParser, *, need_runs: bool = True) -> None:
@@ -70,7 +100,7 @@ def add_effects_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_report_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--report`, whose files `report_outputs` names."""
+    """Declare `--report`, whose files are `REPORT_FILES`."""
     parser.add_argument(
         "--report",
         metavar="FOLDER",
@@ -85,11 +115,6 @@ def need_for_report(args: argparse.Namespace, command: str) -> None:
 
         need("jinja2", f"{command} --report")
         need("matplotlib", f"{command} --report")
-
-
-def report_outputs(args: argparse.Namespace) -> list[Path]:
-    """The files of `--report`, where the folder exists already."""
-    return folder_outputs("--report", args.report, REPORT_FILES)
 
 
 def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[Path]:
@@ -131,9 +156,12 @@ def add_row_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_seed_option(parser: argparse.ArgumentParser) -> None:
-    """Declare `--seed`, which `check_seed` checks."""
+    """Declare `--seed`."""
     parser.add_argument(
-        "--seed", type=whole_number, default=0, help="seed of the random numbers (default: 0)"
+        "--seed",
+        type=whole_number_from(0),
+        default=0,
+        help="seed of the random numbers (default: 0)",
     )
 
 
@@ -152,7 +180,7 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--workers`."""
     parser.add_argument(
         "--workers",
-        type=positive_number,
+        type=whole_number_from(1),
         metavar="N",
         help="number of processes (default: one for each core)",
     )
@@ -166,6 +194,14 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
 
 
+def slip_limit(text: str) -> float:
+    """A slip between 0 and 1; raises `ArgumentTypeError` for anything else."""
+    value = number(text)
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a slip between 0 and 1")
+    return value
+
+
 def whole_number(text: str) -> int:
     """A whole number; raises `ArgumentTypeError` for anything else."""
     try:
@@ -174,11 +210,17 @@ def whole_number(text: str) -> int:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number") from None
 
 
-def positive_number(text: str) -> int:
-    """A whole number above zero; raises `ArgumentTypeError` for anything else."""
-    if not text.isascii() or not text.isdecimal() or not 1 <= len(text) <= 9 or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number, 1 or more")
-    return int(text)
+def whole_number_from(lower: int, upper: int | None = None) -> Callable[[str], int]:
+    """A function from a text to a whole number in these bounds, as `whole_number` is."""
+    ends = f", {lower} or more" if upper is None else f" from {lower} to {upper}"
+
+    def bounded(text: str) -> int:
+        value = whole_number(text)
+        if not lower <= value <= (10**9 if upper is None else upper):
+            raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number{ends}")
+        return value
+
+    return bounded
 
 
 def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
@@ -190,12 +232,6 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
     from soilml.physics.user_effects import load_effects
 
     return {**EFFECTS, **load_effects(args.effects)}
-
-
-def check_seed(args: argparse.Namespace) -> None:
-    """Raise `InputError` for a negative `--seed`."""
-    if args.seed < 0:
-        raise InputError(f"--seed is {args.seed}; needed is a whole number, 0 or more")
 
 
 def parse_costs(args: argparse.Namespace) -> dict[str, float]:

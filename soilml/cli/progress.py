@@ -15,6 +15,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from soilml.onboard.estimator import Estimator
     from soilml.onboard.model_file import Session
 
@@ -28,18 +30,7 @@ def progress_bar(text: str, total: int | None) -> Iterator[Callable[[int], None]
     if not sys.stderr.isatty():
         yield _lines(text, total)
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        *([] if total is None else [TextColumn("{task.completed}/{task.total}")]),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    with progress:
+    with _bars(counted=total is not None, transient=True) as progress:
         task = progress.add_task(text, total=total)
         yield lambda done: progress.update(task, completed=done)
 
@@ -74,22 +65,13 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
 
         yield announce
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-    )
-    tasks: dict[str, object] = {}
-    with progress:
+    tasks: dict[str, Any] = {}
+    with _bars(counted=False, transient=False) as progress:
 
         def update(text: str, done: int, total: int) -> None:
             if text not in tasks:
                 tasks[text] = progress.add_task(text, total=total)
-            progress.update(tasks[text], completed=done, total=total)  # type: ignore[arg-type]
+            progress.update(tasks[text], completed=done, total=total)
 
         yield update
 
@@ -114,6 +96,21 @@ class _CountedRows:
         self._rows += len(next(iter(feed.values())))
         self._done(self._rows)
         return found
+
+
+def _bars(*, counted: bool, transient: bool) -> Progress:
+    """Bars on a terminal, with or without the numbers of items."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        *([TextColumn("{task.completed}/{task.total}")] if counted else []),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=transient,
+    )
 
 
 def _lines(text: str, total: int | None, first: float | None = None) -> Callable[[int], None]:

@@ -254,13 +254,19 @@ def test_too_few_slopes_are_refused_with_the_number_needed(folder, tables, capsy
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--slip-limit", "0.95"], "there is no prediction outside"),
-        (["--slip-limit", "30"], "needed is a slip from 0 to 1"),
+        (["--slip-limit", "30"], "needed is a slip between 0 and 1"),
         (["--seed", "-1"], "needed is a whole number"),
     ],
 )
-def test_invalid_options_are_refused_in_one_line(folder, capsys, options, message):
-    refused(folder, capsys, message, [*COMMAND, *options])
+def test_invalid_options_are_errors_of_usage(folder, capsys, options, message):
+    with pytest.raises(SystemExit, match="2"):
+        main([*COMMAND, *options])
+    assert message in capsys.readouterr().err
+
+
+def test_a_slip_limit_beyond_the_curve_is_refused_in_one_line(folder, capsys):
+    options = ["--slip-limit", "0.95"]
+    refused(folder, capsys, "there is no prediction outside", [*COMMAND, *options])
 
 
 def test_a_table_is_not_overwritten(folder, capsys):

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_workers_option, positive_number
+from soilml.cli.options import InputFile, add_workers_option, whole_number_from
 from soilml.errors import InputError
 from soilml.io.atomic_files import create_folder, output_files
 
@@ -71,7 +71,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
-        "--sets", type=positive_number, metavar="N", help="use only the first N sets of each size"
+        "--sets",
+        type=whole_number_from(1),
+        metavar="N",
+        help="use only the first N sets of each size",
     )
     parser.add_argument(
         "--limit",
@@ -86,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--analytic-sets",
-        type=positive_number,
+        type=whole_number_from(1),
         metavar="N",
         default=120,
         help="own data: number of sets of each size for the analytic methods (default: 120)",

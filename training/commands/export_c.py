@@ -9,7 +9,7 @@ from pathlib import Path
 
 from soilml.cli.options import (
     InputFile,
-    whole_number,
+    whole_number_from,
 )
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
     parser.add_argument(
         "--rows",
-        type=whole_number,
+        type=whole_number_from(1, MOST_ROWS),
         default=32,
         metavar="N",
         help="rows that one step of a set takes at most; working memory grows with it (default 32)",
@@ -71,8 +71,6 @@ def run(args: argparse.Namespace) -> int:
             f"{args.out}: {out.stem!r} begins the names of the C functions; needed are lower-case "
             "letters, digits and underscores, and a letter first, as in wheel.c"
         )
-    if not 1 <= args.rows <= MOST_ROWS:
-        raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
     written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows)

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from soilml.cli.options import InputFile, whole_number
-from soilml.errors import InputError
-from soilml.io.atomic_files import output_files
+from soilml.cli.options import InputFile, add_output, whole_number_from
 
 HELP = "write one step of a stream as an ONNX file of fixed shapes"
 DESCRIPTION = """\
@@ -28,19 +25,14 @@ MOST_ROWS = 4096
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
-    parser.add_argument("out", metavar="OUT.onnx", help="file to write")
+    add_output(parser, "out", "OUT.onnx", "file to write")
     parser.add_argument(
         "--rows",
-        type=whole_number,
+        type=whole_number_from(1, MOST_ROWS),
         default=1,
         metavar="N",
         help="rows that each step takes (default 1)",
     )
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return output_files(args.out, ".onnx")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -55,8 +47,6 @@ def run(args: argparse.Namespace) -> int:
     from training.export.model_file import write_model
     from training.export.one_step import one_step_graph
 
-    if not 1 <= args.rows <= MOST_ROWS:
-        raise InputError(f"--rows is {args.rows}; needed is a whole number from 1 to {MOST_ROWS}")
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
     graph = one_step_graph(onnx.load(str(file)), str(file), args.rows)

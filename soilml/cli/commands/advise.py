@@ -5,18 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     add_effects_option,
     add_gear_option,
     add_model_and_runs,
+    add_output,
     add_row_options,
-    whole_number,
+    whole_number_from,
 )
 from soilml.errors import InputError
-from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
@@ -60,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--loads", metavar="A,B,...", help="candidate loads in N")
     parser.add_argument(
         "--count",
-        type=whole_number,
+        type=whole_number_from(1, MAX_COUNT),
         default=3,
         help="number of rows in the planned sequence, 1 to 5 (default: 3)",
     )
@@ -71,15 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_effects_option(parser)
     add_gear_option(parser)
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
-    parser.add_argument(
-        "--picture", metavar="FILE.png", help="draw maps of the expected width over slip and load"
+    add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_output(
+        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
     )
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return [*output_files(args.out, ".csv"), *output_files(args.picture, ".png")]
 
 
 def _with_noise_of_rows(case: Case, data: Observations) -> Case:
@@ -119,8 +113,6 @@ def run(args: argparse.Namespace) -> int:
 
     if args.picture is not None:
         need("matplotlib", "advise --picture")
-    if not 1 <= args.count <= MAX_COUNT:
-        raise InputError(f"--count is {args.count}; needed is a whole number from 1 to {MAX_COUNT}")
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
@@ -11,8 +10,9 @@ from soilml.cli.options import (
     add_cost_option,
     add_effects_option,
     add_ignore_extra_option,
+    add_output,
 )
-from soilml.io.atomic_files import output_files, save_text
+from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
     pass
@@ -48,15 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"
     )
-    parser.add_argument("--out", metavar="FILE.json", help="write the audit to this file")
+    add_output(parser, "--out", "FILE.json", "write the audit to this file")
     add_cost_option(parser)
     add_ignore_extra_option(parser)
     add_effects_option(parser)
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return output_files(args.out, ".json")
 
 
 def run(args: argparse.Namespace) -> int:

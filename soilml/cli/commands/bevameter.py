@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option
+from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
 from soilml.errors import InputError, MissingLibraryError, TableError
-from soilml.io.atomic_files import output_files, save_text
+from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
     from soilml.identification.bevameter import BevameterResult
@@ -68,20 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL.toml",
         help="whose gear, noise and other soil values to take",
     )
-    parser.add_argument("--out", metavar="SOIL.toml", help="write a model file with this soil")
-    parser.add_argument("--json", metavar="FILE.json", help="write estimates and remarks")
-    parser.add_argument("--picture", metavar="FILE.png", help="draw the tests and the fitted laws")
+    add_output(parser, "--out", "SOIL.toml", "write a model file with this soil")
+    add_output(parser, "--json", "FILE.json", "write estimates and remarks")
+    add_output(parser, "--picture", "FILE.png", "draw the tests and the fitted laws")
     add_ignore_extra_option(parser)
     add_effects_option(parser)
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return [
-        *output_files(args.out, ".toml"),
-        *output_files(args.json, ".json"),
-        *output_files(args.picture, ".png"),
-    ]
 
 
 def run(args: argparse.Namespace) -> int:

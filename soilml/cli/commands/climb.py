@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, number
+from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, slip_limit
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files, save_text, write_files
 
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--slip-limit",
-        type=number,
+        type=slip_limit,
         metavar="S",
         help="give the steepest slope at slips up to S as well",
     )
@@ -85,7 +85,6 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Identify, predict and deliver."""
-    from soilml.cli.options import check_seed
     from soilml.cli.output import is_terminal, origin_of, show, write_stdout
     from soilml.cli.progress import working
     from soilml.io.text_tables import csv_text
@@ -96,9 +95,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.systems.climbing.files.report import climbing_report
     from soilml.systems.climbing.files.rover_file import read_rover
 
-    check_seed(args)
-    if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
-        raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip from 0 to 1")
     folder = args.out is not None and not args.out.lower().endswith(".json")
     if folder:
         for library in ("jinja2", "matplotlib"):

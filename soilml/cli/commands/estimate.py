@@ -5,18 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    add_output,
     add_report_option,
     add_row_options,
     need_for_report,
-    report_outputs,
 )
 from soilml.errors import InputError, TableError
-from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -112,13 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.csv", help="write the estimates to this file")
+    add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
     add_report_option(parser)
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return [*output_files(args.out, ".csv"), *report_outputs(args)]
 
 
 def run(args: argparse.Namespace) -> int:
@@ -134,21 +127,15 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case_of_one_gear
     from soilml.identification.wheel_check import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
+    from soilml.onboard import presentation, table_estimates
     from soilml.onboard.estimator import Estimator
-    from soilml.onboard.presentation import (
-        check_size,
-        description,
-        estimate_report,
-        trained_radius,
-    )
-    from soilml.onboard.table_estimates import complete_rows, excluded_rows, unused_std_remarks
     from soilml.quantities import column
     from soilml.remarks import texts
 
     estimators = [Estimator.load(file) for file in (args.model, *args.others)]
     _check_options(args, estimators)
     if args.runs is None and args.case is None:
-        show("\n".join(description(estimator).text for estimator in estimators))
+        show("\n".join(presentation.description(estimator).text for estimator in estimators))
         return 0
     case = None
     if args.case is not None:
@@ -156,7 +143,7 @@ def run(args: argparse.Namespace) -> int:
     estimators, remarks = estimators_for_case(
         estimators, case, args.case, pooled=args.by is not None
     )
-    remarks = [*map(description, estimators), *remarks]
+    remarks = [*map(presentation.description, estimators), *remarks]
     if args.runs is None:
         show("\n".join(texts(remarks)))
         return 0
@@ -166,8 +153,8 @@ def run(args: argparse.Namespace) -> int:
     table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
         check_table_wheel(estimator, table)
-    print_table_hints(table, case, trained_radius(estimators[0]))
-    complete = [complete_rows(estimator, table) for estimator in estimators]
+    print_table_hints(table, case, presentation.trained_radius(estimators[0]))
+    complete = [table_estimates.complete_rows(estimator, table) for estimator in estimators]
     usable = [rows & table.answered for rows in complete]
     if not np.any(usable):
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
@@ -178,18 +165,20 @@ def run(args: argparse.Namespace) -> int:
         columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
     remarks += own
     if args.by is None or estimators[0].sets is None:
-        remarks += unused_std_remarks(estimators[0], table)
+        remarks += table_estimates.unused_std_remarks(estimators[0], table)
     some = np.any(complete, axis=0)
-    remarks += excluded_rows(table, ~some, "missing-reading", "lack a reading")
+    remarks += table_estimates.excluded_rows(table, ~some, "missing-reading", "lack a reading")
     unanswered = some & ~table.answered
-    remarks += excluded_rows(table, unanswered, "status-not-ok", "have a status that is not ok")
+    remarks += table_estimates.excluded_rows(
+        table, unanswered, "status-not-ok", "have a status that is not ok"
+    )
     if args.report is not None:
-        check_size(len(columns["in_range"]))
+        presentation.check_size(len(columns["in_range"]))
 
     def build() -> tuple[Report, dict[str, Any]]:
         content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
         files = args.model, args.runs
-        page = estimate_report(columns, remarks, estimators[0], args.by, files)
+        page = presentation.estimate_report(columns, remarks, estimators[0], args.by, files)
         return page, {**content, "notes": [remark.as_json() for remark in remarks]}
 
     write_with_report(
@@ -205,26 +194,26 @@ def _tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
     import numpy as np
 
     from soilml.cli.output import is_terminal, show, tell_columns
-    from soilml.onboard.presentation import TYPICAL, is_typical_column
+    from soilml.onboard import presentation
 
-    second = [name for name in columns if is_typical_column(name)]
+    second = [name for name in columns if presentation.is_typical_column(name)]
     if not second or out is not None or not is_terminal():
         tell_columns(columns, out)
         return
     tell_columns({name: columns[name] for name in columns if name not in second}, None)
-    show(f"\nwith typical errors of the model: columns with _{TYPICAL} in a file\n")
+    show(f"\nwith typical errors of the model: columns with _{presentation.TYPICAL} in a file\n")
     group = next(iter(columns))
-    typical = {name.replace(f"_{TYPICAL}", ""): columns[name] for name in second}
+    typical = {name.replace(f"_{presentation.TYPICAL}", ""): columns[name] for name in second}
     typical["in_range"] = np.asarray(typical["in_range"], dtype=bool)
     tell_columns({group: columns[group]} | typical, None)
 
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
+    from soilml.onboard import table_estimates
     from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
     from soilml.onboard.joint_errors import are_comparable
     from soilml.onboard.multi_sensor import CORRELATED
-    from soilml.onboard.table_estimates import check_independent
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
@@ -234,7 +223,7 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         raise InputError("--with fuses single rows; omit --by")
     known = are_comparable([e.pooling.held_out for e in estimators])
     if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
-        check_independent(estimators)
+        table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
             f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
@@ -253,9 +242,8 @@ def _row_estimates(
     import numpy as np
 
     from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
-    from soilml.onboard.presentation import estimate_columns, median_row, width_remarks
-    from soilml.onboard.table_estimates import row_readings
     from soilml.quantities import column
     from soilml.remarks import Remark
 
@@ -268,7 +256,7 @@ def _row_estimates(
     if len(estimators) > 1:
         combined = fuse_estimates(estimates, rule)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
-    for key, values in estimate_columns(estimate).items():
+    for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
     columns["in_range"] = answered & estimate.in_range
     if files is not None:
@@ -276,12 +264,12 @@ def _row_estimates(
     hint = "pool rows with --by run"
     if estimators[0].per_row:
         hint = "measure with other sensors too, or train for a narrower prior of the soil,"
-    remarks = width_remarks(estimate, "a single row", "does", hint)
+    remarks = presentation.width_remarks(estimate, "a single row", "does", hint)
     if len(estimators) > 1:
         remarks.append(Remark("fused", f"fused by the rule {combined.rule}", severity="note"))
     elif estimate.in_range.any():
-        row = median_row(estimate)
-        readings = row_readings(estimators[0], table.rows(np.asarray([row])))
+        row = presentation.median_row(estimate)
+        readings = table_estimates.row_readings(estimators[0], table.rows(np.asarray([row])))
         advised = advice_after_estimate(
             estimators[0], estimate.mean[row], estimate.covariance[row], readings
         )
@@ -301,16 +289,16 @@ def _all_rows(
     """An estimate for every row; one that is not usable counts as out of range."""
     from soilml.cli.progress import progress_bar
     from soilml.identification.wheel_check import readings_with_discrepancy
-    from soilml.onboard.table_estimates import estimates_of_rows, joint_readings, row_readings
+    from soilml.onboard import table_estimates
 
     rows = table.rows(usable)
-    readings = row_readings(estimator, rows)
+    readings = table_estimates.row_readings(estimator, rows)
     if estimator.sets is not None and estimator.sets.sets_only:
         readings = readings_with_discrepancy(
-            estimator, joint_readings(estimator, rows), case, together=False
+            estimator, table_estimates.joint_readings(estimator, rows), case, together=False
         )
     with progress_bar(f"estimating {len(rows)} rows", len(rows)) as done:
-        return estimates_of_rows(estimator, readings, usable, done)
+        return table_estimates.estimates_of_rows(estimator, readings, usable, done)
 
 
 def _estimates_of_runs(
@@ -323,12 +311,12 @@ def _estimates_of_runs(
 ) -> tuple[NDArray[np.int64], Estimate]:
     """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
     from soilml.cli.progress import row_progress
-    from soilml.onboard.table_estimates import estimates_of_runs
+    from soilml.onboard import table_estimates
 
     rows = sum(len(next(iter(one.values()))) for one in readings)
     text = f"estimating by {by}{' with typical model errors' if typical else ''}"
     with row_progress(text, estimator, rows if typical else 2 * rows) as counted:
-        return estimates_of_runs(counted, readings, box, count=not typical)
+        return table_estimates.estimates_of_runs(counted, readings, box, count=not typical)
 
 
 def _group_estimates(
@@ -341,22 +329,16 @@ def _group_estimates(
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.identification.wheel_check import readings_with_discrepancy
     from soilml.io.table import ALL
-    from soilml.onboard.presentation import (
-        estimate_columns,
-        refusal_remarks,
-        typical_columns,
-        typical_remarks,
-        widest_row,
-        width_remarks,
-    )
+    from soilml.onboard import presentation, table_estimates
     from soilml.onboard.set_contract import MODEL_ERROR_INPUT
-    from soilml.onboard.table_estimates import channel_remarks, joint_readings, row_readings
 
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
     names = [name for name, _ in groups]
     readings = [
-        readings_with_discrepancy(estimator, joint_readings(estimator, rows), case, together=True)
+        readings_with_discrepancy(
+            estimator, table_estimates.joint_readings(estimator, rows), case, together=True
+        )
         for _, rows in groups
     ]
     box = {} if case is None else narrower_priors(estimator, case)
@@ -370,31 +352,36 @@ def _group_estimates(
         "rows": np.where(answered, counts[index], 0),
         "rows_in_range": np.where(answered, in_range[index], 0),
     }
-    for key, values in estimate_columns(estimate).items():
+    for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values[index], np.nan)
     columns["in_range"] = answered & estimate.in_range[index]
-    remarks = channel_remarks(estimator, joint_readings(estimator, table.rows(usable)))
+    remarks = table_estimates.channel_remarks(
+        estimator, table_estimates.joint_readings(estimator, table.rows(usable))
+    )
     whose = "all rows" if by == ALL else f"all rows of a {by}"
     better = "measure other loads and slips"
     if by != ALL and len(groups) > 1:
         better += f", or take those of one soil together, such as --by {ALL},"
-    remarks += width_remarks(estimate, whose, "do", better)
+    remarks += presentation.width_remarks(estimate, whose, "do", better)
     if estimate.in_range.any():
-        name, rows = groups[i := widest_row(estimate)]
+        name, rows = groups[i := presentation.widest_row(estimate)]
         head = "" if by == ALL else f"{by} {name}: "
         remarks += [
             one.under(head)
             for one in advice_after_estimate(
-                estimator, estimate.mean[i], estimate.covariance[i], row_readings(estimator, rows)
+                estimator,
+                estimate.mean[i],
+                estimate.covariance[i],
+                table_estimates.row_readings(estimator, rows),
             )
         ]
-    remarks += refusal_remarks(by, names, counts - in_range, counts, estimate)
+    remarks += presentation.refusal_remarks(by, names, counts - in_range, counts, estimate)
     # a file that takes its model as exact, of which no case states the error
     errors = {} if estimator.sets is None else estimator.sets.common_errors
     if errors.get(MODEL_ERROR_INPUT) == 0.0 and not (case is not None and case.discrepancy):
         with_error = estimator.on(model_error=1.0)
         _, typical = _estimates_of_runs(with_error, readings, by, box, typical=True)
-        for key, values in typical_columns(typical).items():
+        for key, values in presentation.typical_columns(typical).items():
             columns[key] = np.where(answered, values[index], np.nan)
-        remarks += typical_remarks(by, names, estimate, typical)
+        remarks += presentation.typical_remarks(by, names, estimate, typical)
     return columns, remarks

@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
     from dataclasses import replace
 
-    from soilml.cli.options import available_effects, check_seed, parse_costs, parse_names
+    from soilml.cli.options import available_effects, parse_costs, parse_names
     from soilml.cli.output import origin_of, show, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_long_table
@@ -106,7 +106,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import gap
     from soilml.gap.presentation import gap_files, gap_text
 
-    check_seed(args)
     effects = available_effects(args)
     case = read_case(args.model, effects, with_bias=True)
     checked = checked_sensors(case.bias) | _calibration(args.checked, effects)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     add_by_option,
     add_effects_option,
     add_model_and_runs,
+    add_output,
     add_report_option,
     add_row_options,
     need_for_report,
-    report_outputs,
 )
-from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     from soilml.identification.presentation import Identification
@@ -67,13 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_effects_option(parser)
     add_by_option(parser)
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FILE.json", help="write the result to this file")
+    add_output(parser, "--out", "FILE.json", "write the result to this file")
     add_report_option(parser)
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return [*output_files(args.out, ".json"), *report_outputs(args)]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,10 +6,9 @@ import argparse
 import math
 import textwrap
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.io.atomic_files import output_files
+from soilml.cli.options import add_output
 from soilml.papers.catalogue import PAPERS
 
 if TYPE_CHECKING:
@@ -43,12 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("paper", nargs="?", help=f"paper to compute: {', '.join(PAPERS)}")
     parser.add_argument("--all", action="store_true", help="list every number")
-    parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return output_files(args.out, ".csv")
+    add_output(parser, "--out", "FILE.csv", "write the table to this file")
 
 
 def run(args: argparse.Namespace) -> int:

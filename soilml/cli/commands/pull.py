@@ -13,14 +13,13 @@ from soilml.cli.options import (
     add_effects_option,
     add_gear_option,
     add_model_and_runs,
+    add_output,
     add_report_option,
     add_row_options,
     need_for_report,
-    number,
-    report_outputs,
+    slip_limit,
 )
 from soilml.errors import InputError
-from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
@@ -77,7 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gravity", metavar="G", help="gravity of a rover: earth, moon, mars, or in m/s^2"
     )
-    parser.add_argument("--slip-limit", type=number, metavar="S", help="largest slip considered")
+    parser.add_argument(
+        "--slip-limit", type=slip_limit, metavar="S", help="largest slip considered"
+    )
     parser.add_argument(
         "--free", metavar="A,B,...", help="unknown parameters (default: those with a prior)"
     )
@@ -97,18 +98,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="allow for typical errors of sensors and model, as in identify",
     )
-    parser.add_argument("--out", metavar="FILE.csv", help="write the curves to this file")
-    parser.add_argument("--picture", metavar="FILE.png", help="draw the curves and bands")
+    add_output(parser, "--out", "FILE.csv", "write the curves to this file")
+    add_output(parser, "--picture", "FILE.png", "draw the curves and bands")
     add_report_option(parser)
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return [
-        *output_files(args.out, ".csv"),
-        *output_files(args.picture, ".png"),
-        *report_outputs(args),
-    ]
 
 
 def run(args: argparse.Namespace) -> int:
@@ -187,8 +179,6 @@ def _estimator(args: argparse.Namespace) -> Estimator | None:
 def _check(args: argparse.Namespace) -> None:
     from soilml.optional_imports import need
 
-    if args.slip_limit is not None and not 0.0 < args.slip_limit < 1.0:
-        raise InputError(f"--slip-limit is {args.slip_limit:g}; needed is a slip between 0 and 1")
     need_for_report(args, "pull")
     if args.picture is not None:
         need("matplotlib", "pull --picture")

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_gear_option, number
+from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output, number
 from soilml.errors import InputError
-from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,12 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--run", dest="label", metavar="NAME", help="add a first column `run` with this name"
     )
-    parser.add_argument("--out", metavar="FILE.csv", help="write the table to this file")
-
-
-def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files that the command writes."""
-    return output_files(args.out, ".csv")
+    add_output(parser, "--out", "FILE.csv", "write the table to this file")
 
 
 def run(args: argparse.Namespace) -> int:
