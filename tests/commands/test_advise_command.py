@@ -75,7 +75,10 @@ def test_every_candidate_can_be_had_the_best_first(folder, capsys):
     ("command", "said"),
     [
         (["model.toml"], "give --loads 30,60,120"),
-        (["model.toml", "runs.csv", "--count", "9"], "--count: '9' given; needed is a whole number"),
+        (
+            ["model.toml", "runs.csv", "--count", "9"],
+            "--count: '9' given; needed is a whole number",
+        ),
         (["model.toml", "runs.csv", "--slips", "x"], "--slips is 'x'; needed is start:stop:count"),
         (["model.toml", "runs.csv", "--slips", "1.5"], "slip 1.5 cannot be driven"),
         (["model.toml", "--loads", "0"], "load 0 N cannot be driven"),

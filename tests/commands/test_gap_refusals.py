@@ -93,7 +93,10 @@ def test_faults_in_measured_rows(folder, capsys, fault):
 
 
 OPTIONS = {
-    "seed below zero": (["--seed", "-1"], "--seed: '-1' given; needed is a whole number, 0 or more"),
+    "seed below zero": (
+        ["--seed", "-1"],
+        "--seed: '-1' given; needed is a whole number, 0 or more",
+    ),
     "seed that is no number": (["--seed", "luck"], "--seed"),
     "unknown holdout column": (["--holdout", "pass=2"], "column pass is missing"),
     "holdout without value": (["--holdout", "load_N"], "needed is run, or COLUMN=VALUE"),
