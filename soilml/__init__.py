@@ -19,6 +19,7 @@ _HOME = {
     "Case": "soilml.config.case",
     "read_case": "soilml.config.case",
     "SoilmlError": "soilml.errors",
+    "gap": "soilml.gap",
     "METHODS": "soilml.identification",
     "identify": "soilml.identification",
     "read_table": "soilml.io.read_table",

@@ -3,6 +3,7 @@
 from soilml.config.case import Case as Case
 from soilml.config.case import read_case as read_case
 from soilml.errors import SoilmlError as SoilmlError
+from soilml.gap import gap as gap
 from soilml.identification import METHODS as METHODS
 from soilml.identification import identify as identify
 from soilml.io.read_table import read_table as read_table

@@ -13,6 +13,7 @@ from soilml.config.case import read_case
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.physics.user_effects import load_effects
+from soilml.remarks import Remark
 
 pytestmark = pytest.mark.slow
 
@@ -260,3 +261,26 @@ def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, cap
     with_own = {**EFFECTS, **load_effects(own)}
     (effect,) = read_case(tmp_path / "found.toml", with_own).model.effects
     assert effect.drag == pytest.approx(40.0, rel=0.1)
+
+
+def without_texts(found):
+    """The content of gap.json without its sentences: codes, names and figures."""
+    if isinstance(found, dict):
+        left_out = ("text", "sentence", "description", "report")
+        return {k: without_texts(v) for k, v in found.items() if k not in left_out}
+    return [without_texts(v) for v in found] if isinstance(found, list) else found
+
+
+@pytest.mark.parametrize("runs", ["runs.csv", "one.csv", "two.csv"])
+def test_no_decision_is_made_from_the_words_of_a_remark(inputs, tmp_path, monkeypatch, runs):
+    def analysed_into(folder):
+        names = [str(inputs / "model.toml"), str(inputs / runs)]
+        status = main(["gap", *names, "--out", str(tmp_path / folder)])
+        files = sorted(p.name for p in (tmp_path / folder).iterdir())
+        return status, files, without_texts(content(tmp_path / folder))
+
+    plain = analysed_into("plain")
+    nonsense = property(lambda self: "load Next runs is not identified", lambda self, text: None)
+    monkeypatch.setattr(Remark, "text", nonsense, raising=False)
+    assert analysed_into("nonsense") == plain
+    assert "Next runs is not" in (tmp_path / "nonsense" / "gap.json").read_text()

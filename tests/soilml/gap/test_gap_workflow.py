@@ -1,5 +1,7 @@
 """The whole workflow on runs driven with the package's own wheel."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -191,3 +193,18 @@ def test_the_updated_model_makes_a_recipe(model, capsys):
 def test_with_its_effect_in_the_model_nothing_is_missing_any_more(dug):
     grown = case_of(MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n')
     assert gap(grown, dug[1], effects=FEW).status == "no-gap"
+
+
+@pytest.mark.parametrize("before", ["", "import soilml.gap\n", "from soilml.gap import audit\n"])
+def test_the_package_and_its_function_are_called_alike(before):
+    """`from soilml import gap` gives the module where that was imported first."""
+    code = f"{before}from soilml import gap\nfrom soilml.gap import gap as function\n"
+    code += "import soilml, soilml.gap as module\n"
+    code += "assert soilml.gap is module and module.gap is function\n"
+    code += "for called in (gap, soilml.gap, function):\n"
+    code += "    try:\n        called(None, {}, effects={}, costs={'flight': 1.0})\n"
+    code += "    except (soilml.SoilmlError, AttributeError) as error:\n        print(error)\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, second, third = done.stdout.splitlines()
+    assert first == second == third
