@@ -25,7 +25,7 @@ from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.evidence.held_out import covariance_at
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import NextRun
-from soilml.gap.search.explanation import CandidateFit
+from soilml.gap.search.explanation import Explanation
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
@@ -48,7 +48,7 @@ LEAST_SQUARES_TOLERANCE = 1e-10
 Difference = tuple[Floats, Floats]
 
 
-def next_runs(problem: FitProblem, explanations: Sequence[CandidateFit]) -> list[NextRun]:
+def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[NextRun]:
     """Runs and checks ranked by how well they discriminate the first explanation from the others.
 
     The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all

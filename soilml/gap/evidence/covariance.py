@@ -59,6 +59,18 @@ class VarianceComponents:
     autocorrelation: float  # correlation of neighbouring samples of a run
     degrees_of_freedom: float = 1.0  # from which the noise was estimated, if it was
 
+    @staticmethod
+    def usual(
+        readings: Readings, *, units: float = 1.0, autocorrelation: float = 0.0
+    ) -> VarianceComponents:
+        """The declared noise, and so many units of run-to-run variation."""
+        return VarianceComponents(
+            noise_scale=np.ones(len(readings.channels)),
+            friction_angle_std=units * RUN_EFFECT_UNITS["friction_angle"],
+            bearing_std=units * RUN_EFFECT_UNITS["bearing"],
+            autocorrelation=autocorrelation,
+        )
+
 
 @dataclass(frozen=True)
 class Covariance:

@@ -1,4 +1,4 @@
-"""Repeated rows: whether rows that are driven alike agree within noise and usual scatter."""
+"""Replicate rows: whether they agree within noise and usual scatter."""
 
 from __future__ import annotations
 
@@ -7,21 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.config.case import Case
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import (
-    RUN_EFFECT_UNITS,
-    VarianceComponents,
-    assemble_covariance,
-    run_effect_columns,
-)
 from soilml.quantities import QUANTITIES, column
 from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-#: Probability by chance below which repeats disagree, or scatter less than declared.
+#: Probability by chance below which repeats scatter less than declared.
 SIGNIFICANCE = 0.01
 #: Ratio of the scatter of repeats to the declared noise below which the noise is overstated: the
 #: declared variance is then more than four times as large as the measured one.
@@ -33,7 +26,7 @@ MIN_FRACTION_FOR_PERCENT = 0.1
 
 @dataclass(frozen=True)
 class RepeatComparison:
-    """How the readings of one channel differ between rows that are driven alike.
+    """How the readings of one channel differ between replicate rows.
 
     Attributes
     ----------
@@ -43,26 +36,15 @@ class RepeatComparison:
         Squared differences in units of their covariance, and their number.
     p_value
         Probability of a chi-square as large by chance.
-    worst_pair
-        The readings that differ most in standard deviations: two indices of the stacked readings.
-    worst_sigma
-        Their difference in standard deviations.
     sentence
-        The worst pair in words and units.
+        The pair that differs most in standard deviations, in words and units.
     """
 
     channel: str
     chi_square: float
     degrees_of_freedom: int
     p_value: float
-    worst_pair: tuple[int, int]
-    worst_sigma: float
     sentence: str
-
-    @property
-    def disagree(self) -> bool:
-        """Whether the repeats differ by more than their covariance explains."""
-        return self.p_value < SIGNIFICANCE
 
     @property
     def scatter_ratio(self) -> float:
@@ -73,7 +55,7 @@ class RepeatComparison:
 def repeat_disagreement(
     readings: Readings, covariance: Floats | None = None, expected: Floats | None = None
 ) -> list[RepeatComparison]:
-    r"""Compare the readings of rows that are driven alike, channel by channel.
+    r"""Compare the readings of replicate rows, channel by channel.
 
     .. math:: \chi^2 = d^T (C V C^T)^{-1} d, \quad d = C (y - \hat y)
 
@@ -84,9 +66,8 @@ def repeat_disagreement(
     readings : Readings
         m readings.
     covariance : array (m, m), optional
-        V, of the readings: declared noise and usual scatter from run to run, as from
-        `usual_covariance`. The declared noise alone by default. Noise that was scaled up to fit
-        the residuals would hide a disagreement.
+        V, of the readings: declared noise and usual scatter from run to run. The declared noise
+        alone by default. Noise that was scaled up to fit the residuals would hide a disagreement.
     expected : array (m,), optional
         Predictions, whose small differences within the tolerance of a repeat are subtracted.
 
@@ -113,30 +94,17 @@ def repeat_disagreement(
         chi_square = float(
             difference @ np.linalg.solve(rows[:, other] - rows[:, first], difference)
         )
-        pair, sigma = _worst_pair(alike, readings.channel == channel, value, matrix)
+        pair = _worst_pair(alike, readings.channel == channel, value, matrix)
         found.append(
             RepeatComparison(
-                readings.channels[channel],
-                chi_square,
-                len(contrasts),
-                _chi_square_tail(chi_square, len(contrasts)),
-                pair,
-                sigma,
-                _pair_sentence(readings, *pair),
+                channel=readings.channels[channel],
+                chi_square=chi_square,
+                degrees_of_freedom=len(contrasts),
+                p_value=_chi_square_tail(chi_square, len(contrasts)),
+                sentence=_pair_sentence(readings, *pair),
             )
         )
     return sorted(found, key=lambda found: (found.p_value, -found.scatter_ratio))
-
-
-def usual_covariance(case: Case, readings: Readings) -> Floats:
-    """Covariance (m, m) of the declared noise and the usual scatter of the soil between runs."""
-    usual = VarianceComponents(
-        np.ones(len(readings.channels)),
-        RUN_EFFECT_UNITS["friction_angle"],
-        RUN_EFFECT_UNITS["bearing"],
-        0.0,
-    )
-    return assemble_covariance(readings, run_effect_columns(case, readings), usual).matrix
 
 
 def overstated_noise(readings: Readings) -> dict[str, float]:
@@ -177,8 +145,8 @@ def _contrasts(alike: Integers, in_channel: NDArray[np.bool_]) -> Integers:
 
 def _worst_pair(
     alike: Integers, in_channel: NDArray[np.bool_], value: Floats, matrix: Floats
-) -> tuple[tuple[int, int], float]:
-    """The two repeats that differ most in standard deviations, and by how many."""
+) -> tuple[int, int]:
+    """The two repeats that differ most in standard deviations."""
     own = np.flatnonzero(in_channel)
     first, second = np.triu_indices(len(own), 1)
     same = alike[own[first]] == alike[own[second]]
@@ -187,7 +155,7 @@ def _worst_pair(
     squares = variance[i] + variance[j] - 2.0 * matrix[i, j]
     sigma = np.abs(value[i] - value[j]) / np.sqrt(np.where(squares > 0.0, squares, np.inf))
     worst = int(np.argmax(sigma))
-    return (int(i[worst]), int(j[worst])), float(sigma[worst])
+    return int(i[worst]), int(j[worst])
 
 
 def _pair_sentence(readings: Readings, i: int, j: int) -> str:

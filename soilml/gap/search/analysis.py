@@ -114,7 +114,7 @@ def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float]
 
 def _declared_covariance(readings: Readings) -> Covariance:
     """The declared noise alone."""
-    components = VarianceComponents(np.ones(len(readings.channels)), 0.0, 0.0, 0.0)
+    components = VarianceComponents.usual(readings, units=0.0)
     return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
 
 
@@ -156,12 +156,7 @@ def _reestimate_covariance(
     columns = run_effect_columns(case, readings)
 
     # noise that is a fraction of the reading is evaluated at a smoothed prediction
-    typical = VarianceComponents(
-        np.ones(len(readings.channels)),
-        RUN_EFFECT_UNITS["friction_angle"],
-        RUN_EFFECT_UNITS["bearing"],
-        0.0,
-    )
+    typical = VarianceComponents.usual(readings)
     several_runs = len(readings.runs) > 1
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
     readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))

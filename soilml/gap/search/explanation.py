@@ -1,4 +1,4 @@
-"""Candidate fits: effects by their catalogue law, and with the shape of that law estimated."""
+"""Explanations: sets of effects fitted by their catalogue law, and with its shape estimated."""
 
 from __future__ import annotations
 
@@ -20,27 +20,29 @@ EFFECT_PENALTY = 2.0 * float(np.log(20.0))
 
 
 @dataclass(frozen=True)
-class CandidateFit:
-    """A set of effects with two fits: by their catalogue laws, and with shape coefficients free.
+class Explanation:
+    """A set of effects with its fits; the empty set is the soil alone.
 
-    Both fits are the same one where no shape was estimated. The empty set is the soil alone.
+    It is what a search fits, what is accepted or suspected, and what a verdict claims.
     """
 
     names: tuple[str, ...]
     catalogue_law: MarginalFit
-    free_law: MarginalFit
+    #: with the shapes of the laws free, where they were estimated
+    free_law: MarginalFit | None = None
     #: where the catalogue's law explains most under noise alone, as another start of the free law
     noise_only: Solution | None = None
 
     @property
     def shape_supported(self) -> bool:
         """Whether the data support another law than the catalogue's."""
-        return self.free_law.evidence.value < self.catalogue_law.evidence.value
+        free = self.free_law
+        return free is not None and free.evidence.value < self.catalogue_law.evidence.value
 
     @property
     def best(self) -> MarginalFit:
         """The fit of larger evidence."""
-        return self.free_law if self.shape_supported else self.catalogue_law
+        return (self.shape_supported and self.free_law) or self.catalogue_law
 
     @property
     def fit(self) -> Solution:
@@ -83,7 +85,7 @@ class CandidateRequest:
     noise_start: Mapping[str, float] | None = None
 
 
-def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[CandidateFit]:
+def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[Explanation]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
     With `noise_start`, a set is also fitted under noise alone, and from there beside a discrepancy:
@@ -105,7 +107,7 @@ def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) ->
         best = _better(first, second)
         if best is not None:
             noise_only = second.first if second else None
-            candidates.append(CandidateFit(request.names, best, best, noise_only))
+            candidates.append(Explanation(request.names, best, noise_only=noise_only))
     return candidates
 
 
@@ -121,7 +123,7 @@ def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFi
     return first if first.evidence.value <= second.evidence.value else second
 
 
-def fit_shapes(problem: FitProblem, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
+def fit_shapes(problem: FitProblem, candidates: Sequence[Explanation]) -> list[Explanation]:
     """The candidates with the shape coefficients of their effects estimated as well."""
     started, index = [], []
     none = np.zeros(len(problem.readings.channels))
@@ -166,7 +168,7 @@ def shape_directions(problem: FitProblem, fit: Solution) -> list[Floats]:
     return [columns * term[:, None] for term in (s * s, s * w, w * w)]
 
 
-def predicted_shape_gain(problem: FitProblem, candidate: CandidateFit) -> float:
+def predicted_shape_gain(problem: FitProblem, candidate: Explanation) -> float:
     """Upper bound of the improvement by free shapes: linearised and without a prior."""
     fit = candidate.catalogue_law.fit
     whiten = problem.discrepancy.whiten(candidate.catalogue_law.evidence.amplitude)

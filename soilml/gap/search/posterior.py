@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from soilml.gap.evidence.marginal_likelihood import TEMPERING
-from soilml.gap.search.explanation import CandidateFit
+from soilml.gap.search.explanation import Explanation
 
 #: Decrease of the objective by the best explanation from which another one is rejected: tempered
 #: odds of 1 to 33.
@@ -88,7 +88,7 @@ class Posterior:
         return sorted(names, key=lambda name: (-self.probability(name), name))
 
 
-def explanations(candidates: Sequence[CandidateFit], found: Posterior) -> tuple[CandidateFit, ...]:
+def explanations(candidates: Sequence[Explanation], found: Posterior) -> tuple[Explanation, ...]:
     """The smallest sets of effects that are not rejected, the best first.
 
     A set is left out if a part of it is not rejected either: the evidence for the rest of it is
@@ -100,21 +100,21 @@ def explanations(candidates: Sequence[CandidateFit], found: Posterior) -> tuple[
     return _smallest([*kept, *alone])
 
 
-def not_rejected(candidates: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
+def not_rejected(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """The smallest sets of effects that are not rejected against the best one, the best first."""
     lowest = min((c.objective for c in candidates if c.names), default=np.inf)
     limit = lowest + REJECTION_THRESHOLD
     return _smallest([c for c in candidates if c.names and c.objective <= limit])
 
 
-def _smallest(candidates: Sequence[CandidateFit]) -> tuple[CandidateFit, ...]:
+def _smallest(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
     """The sets of which no part is among the candidates, in order of their objective."""
     kept = [c for c in candidates if not any(set(o.names) < set(c.names) for o in candidates)]
     return tuple(sorted(kept, key=lambda c: c.objective))
 
 
 def posterior(
-    candidates: Sequence[CandidateFit], predicted: Mapping[str, float], none: CandidateFit
+    candidates: Sequence[Explanation], predicted: Mapping[str, float], none: Explanation
 ) -> Posterior:
     """Posterior probabilities of the candidates and of effects that were not fitted in full.
 
@@ -122,7 +122,7 @@ def posterior(
     ----------
     predicted : mapping
         Predicted decrease of the objective by each single effect.
-    none : CandidateFit
+    none : Explanation
         The soil alone.
     """
     objectives = {c.names: c.objective for c in candidates}

@@ -9,12 +9,12 @@ import numpy as np
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.numerics.subspaces import ROUNDING, project_out
 
 
 def predicted_with_and_without(
-    problem: FitProblem, none: CandidateFit, soil: Solution, signatures: Sequence[Signature]
+    problem: FitProblem, none: Explanation, soil: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
 
@@ -22,7 +22,7 @@ def predicted_with_and_without(
     """
     plain = MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
     with_discrepancy, without = (
-        predicted_gains(problem, CandidateFit((), fit, fit), none.objective, signatures)
+        predicted_gains(problem, Explanation((), fit), none.objective, signatures)
         for fit in (none.best, plain)
     )
     return {name: max(gain, without[name]) for name, gain in with_discrepancy.items()}
@@ -30,7 +30,7 @@ def predicted_with_and_without(
 
 def predicted_gains(
     problem: FitProblem,
-    candidate: CandidateFit,
+    candidate: Explanation,
     objective: float,
     signatures: Sequence[Signature],
 ) -> dict[str, float]:
@@ -50,7 +50,7 @@ def predicted_gains(
 
 
 def free_law_gains(
-    problem: FitProblem, candidate: CandidateFit, fit: Solution, signatures: Sequence[Signature]
+    problem: FitProblem, candidate: Explanation, fit: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """Decrease of a fit's sum of squares by each effect with free shapes, linearised.
 
@@ -101,12 +101,12 @@ LARGE_DISCREPANCY = 2.5
 WITHIN_REACH = 15.0
 
 #: Candidates of an earlier search, by effect names, whose optima are starts of this one.
-Starts = Mapping[tuple[str, ...], CandidateFit]
+Starts = Mapping[tuple[str, ...], Explanation]
 
 
 def effects_to_fit(
     problem: FitProblem,
-    none: CandidateFit,
+    none: Explanation,
     soil: Solution,
     signatures: Sequence[Signature],
     gains: Mapping[str, float],
@@ -120,7 +120,7 @@ def effects_to_fit(
 
     Parameters
     ----------
-    none, soil : CandidateFit, Solution
+    none, soil : Explanation, Solution
         The soil alone, beside a discrepancy and under noise alone.
     gains : mapping
         Predicted decrease of the objective by each effect.

@@ -13,8 +13,8 @@ from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (
-    CandidateFit,
     CandidateRequest,
+    Explanation,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
@@ -65,9 +65,9 @@ class SearchResult:
     soil: Solution  # the soil alone, under noise and scatter
     soil_test: ResidualTest
     #: explanations that are not rejected against the best one, in order of their objective
-    accepted: tuple[CandidateFit, ...]
+    accepted: tuple[Explanation, ...]
     #: all candidates that were fitted, the empty set among them
-    candidates: tuple[CandidateFit, ...]
+    candidates: tuple[Explanation, ...]
     final_test: ResidualTest
     predicted_gain: dict[str, float]
     posterior: Posterior
@@ -85,12 +85,12 @@ class SearchResult:
         return self.final_test.p_value >= LACK_OF_FIT_LEVEL
 
     @property
-    def none(self) -> CandidateFit | None:
+    def none(self) -> Explanation | None:
         """The soil alone beside a smooth discrepancy; None where no gap was searched."""
         return next((c for c in self.candidates if not c.names), None)
 
     @property
-    def likeliest(self) -> CandidateFit | None:
+    def likeliest(self) -> Explanation | None:
         """The candidate with effects of the largest evidence; None where no gap was searched."""
         return next((c for c in self.candidates if c.names), None)
 
@@ -141,7 +141,7 @@ def search(
     progress(1 / STEPS)
     none = _soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, none, soil, signatures)
-    fitted: dict[tuple[str, ...], CandidateFit] = {(): none}
+    fitted: dict[tuple[str, ...], Explanation] = {(): none}
     selected = effects_to_fit(problem, none, soil, signatures, gains, starts)
     level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
@@ -171,7 +171,7 @@ def search(
     )
 
 
-def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> CandidateFit:
+def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Explanation:
     """The empty set of effects: the soil alone with a smooth discrepancy."""
     start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
     if () in starts:
@@ -180,16 +180,16 @@ def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Candidat
     marginal = fit_marginal(problem, [(started, amplitude)])[0]
     if marginal is None:  # it is feasible under noise alone
         marginal = MarginalFit(soil, problem.discrepancy.evidence(soil))
-    return CandidateFit((), marginal, marginal)
+    return Explanation((), marginal)
 
 
 def _fit_level(
     problem: FitProblem,
     soil: Solution,
-    none: CandidateFit,
-    sets: Mapping[tuple[str, ...], CandidateFit],
+    none: Explanation,
+    sets: Mapping[tuple[str, ...], Explanation],
     starts: Starts,
-) -> list[CandidateFit]:
+) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
     Beside a large discrepancy, single effects are fitted under noise alone first.
@@ -230,14 +230,14 @@ def _off_bounds(soil: Solution) -> dict[str, float]:
     return {path: 0.5 + INWARD * (x - 0.5) for path, x in soil.start_values().items()}
 
 
-def _is_complete(problem: FitProblem, best: CandidateFit, seed: int) -> bool:
+def _is_complete(problem: FitProblem, best: Explanation, seed: int) -> bool:
     """Whether a candidate leaves neither a discrepancy nor anything that the catalogue explains."""
     if float(best.amplitude.max()) > 0.0:
         return False
     return _test_residuals(problem, best, seed).p_value > COMPLETE_LEVEL
 
 
-def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> ResidualTest:
+def _test_residuals(problem: FitProblem, candidate: Explanation, seed: int) -> ResidualTest:
     fit = candidate.fit
     signatures, _ = effect_signatures(fit.fitted(), problem.readings, problem.effects_not_in(fit))
     return residual_test(problem, fit, signatures, seed)
@@ -245,12 +245,12 @@ def _test_residuals(problem: FitProblem, candidate: CandidateFit, seed: int) -> 
 
 def _extensions(
     problem: FitProblem,
-    level: Sequence[CandidateFit],
-    fitted: Mapping[tuple[str, ...], CandidateFit],
+    level: Sequence[Explanation],
+    fitted: Mapping[tuple[str, ...], Explanation],
     lowest: float,
-) -> dict[tuple[str, ...], CandidateFit]:
+) -> dict[tuple[str, ...], Explanation]:
     """Sets with one more effect that should increase the evidence, and what they extend."""
-    extended: dict[tuple[str, ...], CandidateFit] = {}
+    extended: dict[tuple[str, ...], Explanation] = {}
     in_reach = [c for c in level if c.objective < lowest + WITHIN_REACH]
     for candidate in sorted(in_reach, key=lambda c: c.objective)[:EXTENDED_SETS]:
         fit = candidate.fit

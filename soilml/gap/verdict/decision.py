@@ -11,7 +11,7 @@ from soilml.fitting.coordinates import EffectCoordinate
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.sentences import NOT_DECISIVE
-from soilml.gap.search.explanation import CandidateFit
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import not_rejected
 from soilml.gap.search.stepwise import SearchResult
 from soilml.quantities import column
@@ -55,8 +55,8 @@ class Decision:
     """
 
     status: str
-    claimed: tuple[CandidateFit, ...]
-    shown: CandidateFit | None
+    claimed: tuple[Explanation, ...]
+    shown: Explanation | None
     reason: Remark | None = None
 
 
@@ -113,7 +113,7 @@ def decide(
     return Decision("named", accepted, best)
 
 
-def _large_remainder(problem: FitProblem, result: SearchResult, best: CandidateFit) -> str:
+def _large_remainder(problem: FitProblem, result: SearchResult, best: Explanation) -> str:
     """The channel with a large remainder beside an explanation of little evidence, or empty."""
     none, worst = result.none, int(np.argmax(best.amplitude))
     if none is None or none.objective >= best.objective + DECISIVE_GAIN:
@@ -128,7 +128,7 @@ def _likelier_than_none(result: SearchResult, margin: float = 0.0) -> bool:
     return bool(likeliest and none and likeliest.objective < none.objective + margin)
 
 
-def _first_suspect(result: SearchResult) -> CandidateFit | None:
+def _first_suspect(result: SearchResult) -> Explanation | None:
     """The candidate that is listed first: the likeliest, sets that contain it counted towards it.
 
     An effect that was not fitted in full is passed over.
@@ -163,12 +163,12 @@ def with_refused_outside(result: SearchResult) -> SearchResult:
     return replace(result, posterior=replace(result.posterior, refused=refused))
 
 
-def _is_refused(candidate: CandidateFit) -> bool:
+def _is_refused(candidate: Explanation) -> bool:
     """Whether an explanation needs an implausible size, or another law than the catalogue's."""
     return _implausible(candidate.fit) or _far_from_catalogue(candidate)
 
 
-def _far_from_catalogue(best: CandidateFit) -> bool:
+def _far_from_catalogue(best: Explanation) -> bool:
     """Whether an explanation needs another law than the catalogue's."""
     most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
     return best.shape_deviation > most
@@ -223,7 +223,7 @@ def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ..
 NEGLIGIBLE_FRACTION = 0.02
 
 
-def law_matters(problem: FitProblem, candidate: CandidateFit) -> bool:
+def law_matters(problem: FitProblem, candidate: Explanation) -> bool:
     """Whether the two laws differ inside the measured range by more than matters.
 
     They differ if, in some channel, the root mean square difference of their predictions exceeds
@@ -231,7 +231,8 @@ def law_matters(problem: FitProblem, candidate: CandidateFit) -> bool:
     times `NEGLIGIBLE_FRACTION`.
     """
     readings = problem.readings
-    difference = candidate.free_law.fit.prediction - candidate.catalogue_law.fit.prediction
+    free = candidate.free_law or candidate.catalogue_law
+    difference = free.fit.prediction - candidate.catalogue_law.fit.prediction
     for i in range(len(readings.channels)):
         in_channel = readings.channel == i
         values = readings.reading[in_channel]

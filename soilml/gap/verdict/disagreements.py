@@ -28,7 +28,7 @@ NOISE_SCALED_UP = 1.3
 UNUSUAL_RUN_EFFECT = 3.0
 #: Significance level of the test of the region that a fit to the rest predicts.
 REGION_LEVEL = 0.001
-#: Significance level of the test of rows driven alike.
+#: Significance level of the test of replicate rows.
 REPEAT_LEVEL = 0.001
 
 
@@ -61,7 +61,7 @@ def disagreements(problem: FitProblem, soil: Solution) -> list[Remark]:
 
 
 def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[Remark]:
-    """Rows driven alike that differ by more than declared noise and usual scatter explain.
+    """Replicate rows that differ by more than declared noise and usual scatter explain.
 
     The predictions of `fit` account for their small differences in slip and load.
     """
@@ -73,11 +73,8 @@ def repeats_that_disagree(problem: FitProblem, fit: Solution) -> list[Remark]:
     # an estimated correlation of neighbouring samples can hide or make a disagreement: rows
     # disagree only if they do with it and without it
     for autocorrelation in sorted({0.0, found.autocorrelation}):
-        usual = VarianceComponents(
-            np.ones(len(readings.channels)),
-            RUN_EFFECT_UNITS["friction_angle"] * several,
-            RUN_EFFECT_UNITS["bearing"] * several,
-            autocorrelation,
+        usual = VarianceComponents.usual(
+            readings, units=float(several), autocorrelation=autocorrelation
         )
         covariance = assemble_covariance(readings, columns, usual).matrix
         for comparison in repeat_disagreement(readings, covariance, fit.prediction):

@@ -32,7 +32,7 @@ from soilml.gap.report.results import (
     Suspect,
 )
 from soilml.gap.search.analysis import Analysis
-from soilml.gap.search.explanation import CandidateFit
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.numerics.subspaces import project_out
@@ -150,7 +150,7 @@ def conditions_of_suspects(
     return tuple(conditions)
 
 
-def competing_explanations(analysis: Analysis) -> list[CandidateFit]:
+def competing_explanations(analysis: Analysis) -> list[Explanation]:
     """The explanations to distinguish: those not rejected, or the best one and its runner-up."""
     accepted = [c for c in analysis.result.accepted if c.names]
     others = [c for c in analysis.result.candidates if c.names and c not in accepted]
@@ -280,7 +280,7 @@ Floats = NDArray[np.float64]
 
 
 def named_effects(
-    accepted: Sequence[CandidateFit],
+    accepted: Sequence[Explanation],
     fit: Solution,
     similarity: SignatureSimilarity,
     posterior: Posterior,

@@ -16,7 +16,7 @@ from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, SMALLEST_SIZE, TEMPERING
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import EstimatedValue
-from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION, Prior
 from soilml.numerics.rounding import significant
@@ -44,7 +44,7 @@ class EstimateSpread:
 
 
 def among_candidates(
-    fit: Solution, candidates: Sequence[CandidateFit], posterior: Posterior
+    fit: Solution, candidates: Sequence[Explanation], posterior: Posterior
 ) -> EstimateSpread:
     """The soil by all candidates about that of one fit, by their probabilities.
 

@@ -16,7 +16,7 @@ from soilml.gap.report.page import conditions_text
 from soilml.gap.report.results import EstimatedValue, soil_test_agreement
 from soilml.gap.search.explanation import (
     EFFECT_PENALTY,
-    CandidateFit,
+    Explanation,
 )
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.verdict import entries
@@ -40,7 +40,7 @@ def made(*names, objective=0.0, amplitude=(0.0, 0.0)):
     known = np.asarray(amplitude, dtype=float)
     evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
     marginal = MarginalFit(SimpleNamespace(objective=objective, x=np.zeros(2)), evidence)
-    return CandidateFit(names, marginal, marginal)
+    return Explanation(names, marginal, marginal)
 
 
 def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(), **components):

@@ -9,7 +9,7 @@ from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, VarianceComponents
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit, _changed
 from soilml.gap.search import analysis
-from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.posterior import Posterior, explanations, not_rejected, posterior
 
 
@@ -18,7 +18,7 @@ def made(*names, objective=0.0):
     none = np.zeros(2)
     evidence = Evidence(objective - EFFECT_PENALTY * len(names), none, np.zeros(0), none)
     marginal = MarginalFit(SimpleNamespace(objective=objective), evidence)
-    return CandidateFit(names, marginal, marginal)
+    return Explanation(names, marginal, marginal)
 
 
 def test_sets_more_than_14_above_the_best_set_are_rejected():

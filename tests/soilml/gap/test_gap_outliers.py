@@ -87,14 +87,12 @@ def test_the_worst_pair_is_the_one_that_differs_most_in_sigma():
     value = np.asarray([0.0, 3.0, 1.0, 0.0, 50.0])
     matrix = np.diag([1.0, 1.0, 1.0, 400.0, 400.0])
     everything = np.ones(5, dtype=bool)
-    pair, sigma = _worst_pair(alike, everything, value, matrix)
-    assert pair == (0, 1) and sigma == pytest.approx(3.0 / np.sqrt(2.0))
+    assert _worst_pair(alike, everything, value, matrix) == (0, 1)
     correlated = matrix.copy()
     correlated[1, 2] = correlated[2, 1] = 0.9
-    pair, sigma = _worst_pair(alike, everything, value, correlated)
-    assert pair == (1, 2) and sigma == pytest.approx(2.0 / np.sqrt(0.2))
+    assert _worst_pair(alike, everything, value, correlated) == (1, 2)
     first = np.asarray([True, False, True, True, True])
-    assert _worst_pair(alike, first, value, matrix)[0] == (3, 4)
+    assert _worst_pair(alike, first, value, matrix) == (3, 4)
 
 
 def test_the_size_of_an_effect_is_its_first_coordinate_or_nothing():

@@ -7,12 +7,16 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.fitting.readings import stack_readings
+from soilml.gap.evidence.covariance import (
+    VarianceComponents,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.gap.evidence.repeats import (
     _pair_sentence,
     overstated_noise,
     overstated_noise_notes,
     repeat_disagreement,
-    usual_covariance,
 )
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
@@ -43,14 +47,13 @@ def test_runs_whose_torques_differ_are_told_in_words():
     case = case_of()
     table = scaled(driven(case, loads=TWICE, noise=0.0), slice(11, 12), 1.43)
     first = repeat_disagreement(stack_readings(case, table))[0]
-    assert first.channel == "torque" and first.disagree
+    assert first.channel == "torque" and first.p_value < 0.01
     own = table["torque_Nm"]
     slip = table["slip"][3]
     assert first.sentence == (
         f"run run_0 and run run_1 at slip {slip:.2f} under 40 N: torque {own[3]:.3g} and "
         f"{own[11]:.3g} N m, which differ by 43 %"
     )
-    assert first.worst_sigma == pytest.approx(0.43 / np.hypot(0.01, 0.0143), rel=1e-6)
 
 
 def test_usual_scatter_from_run_to_run_is_no_disagreement():
@@ -58,9 +61,11 @@ def test_usual_scatter_from_run_to_run_is_no_disagreement():
     case = case_of()
     readings = stack_readings(case, driven(case, loads=TWICE, soils=soils))
     strict = repeat_disagreement(readings)
-    usual = repeat_disagreement(readings, usual_covariance(case, readings))
-    assert strict[0].disagree
-    assert not any(f.disagree for f in usual)
+    components = VarianceComponents.usual(readings)
+    covariance = assemble_covariance(readings, run_effect_columns(case, readings), components)
+    usual = repeat_disagreement(readings, covariance.matrix)
+    assert strict[0].p_value < 0.01
+    assert all(f.p_value > 0.01 for f in usual)
 
 
 def test_small_differences_of_slip_are_subtracted():
@@ -105,7 +110,6 @@ def test_the_channel_whose_repeats_disagree_most_comes_first():
     expected = 8 * 90.0**2 / 2.0  # eight pairs, each with the variance of two readings
     assert found[0].chi_square == pytest.approx(expected, rel=1e-6)
     assert found[0].scatter_ratio == pytest.approx(np.sqrt(expected / 8))
-    assert found[0].worst_sigma == pytest.approx(90.0 / np.sqrt(2.0))
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search.explanation import (
     EFFECT_PENALTY,
-    CandidateFit,
     CandidateRequest,
+    Explanation,
     fit_candidates,
     fit_shapes,
 )
@@ -144,7 +144,7 @@ def test_the_effect_that_acts_promises_most_and_keeps_it(dug, named):
     problem, soil = dug
     known, _ = effect_signatures(soil.fitted(), problem.readings, problem.effects)
     none = MarginalFit(soil, problem.discrepancy.evidence(soil))
-    alone = CandidateFit((), none, none)
+    alone = Explanation((), none, none)
     gains = predicted_gains(problem, alone, alone.objective, known)
     assert max(gains, key=gains.get) == "slip-sinkage"
     assert alone.objective - named.objective > 0.5 * gains["slip-sinkage"] > 10.0
@@ -174,7 +174,7 @@ def test_a_larger_set_gives_way_to_a_smaller_that_explains_as_much(dug, named):
     pair = fitted(problem, soil, "bulldozing", "slip-sinkage")
     assert pair.objective > named.objective
     none = MarginalFit(soil, problem.discrepancy.evidence(soil))
-    candidates = (pair, named, CandidateFit((), none, none))
+    candidates = (pair, named, Explanation((), none, none))
     found = posterior(candidates, {}, candidates[-1])
     assert [c.names for c in explanations(candidates, found)] == [("slip-sinkage",)]
 

@@ -9,7 +9,7 @@ import pytest
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search import screening, stepwise
-from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 
 
 def fit_of(objective=0.0, x=None):
@@ -25,7 +25,7 @@ def made(*names, objective=0.0, amplitude=(0.0, 0.0), noise_only=None, x=None):
     known = np.asarray(amplitude, dtype=float)
     evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
     marginal = MarginalFit(fit_of(objective, x), evidence)
-    return CandidateFit(names, marginal, marginal, noise_only)
+    return Explanation(names, marginal, marginal, noise_only)
 
 
 @pytest.fixture

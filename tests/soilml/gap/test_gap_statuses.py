@@ -10,7 +10,7 @@ from soilml.fitting.coordinates import EffectCoordinate
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.report.sentences import NOT_DECISIVE
-from soilml.gap.search.explanation import EFFECT_PENALTY, CandidateFit
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.posterior import (
     MAX_CHANCE_CLASS,
     MAX_CHANCE_NAME,
@@ -58,7 +58,7 @@ def candidate(names, objective, amplitude=(0.0, 0.0), **fit):
     """A candidate whose objective, the penalty of its effects included, is that given."""
     names = tuple(names.split("+")) if names else ()
     own = marginal(objective - EFFECT_PENALTY * len(names), amplitude, **fit)
-    return CandidateFit(names, own, own)
+    return Explanation(names, own, own)
 
 
 def searched(*candidates, accepted=1, adequate=True, gap=True, weights=None):
@@ -194,13 +194,13 @@ def test_beside_a_large_remainder_the_first_suspect_is_shown_and_why_not_the_bes
 
 def test_another_law_is_stated_where_it_matters(law):
     one, other = marginal(15.0), marginal(20.0)
-    free = CandidateFit(("dig",), other, one)
+    free = Explanation(("dig",), other, one)
     assert status(searched(NONE, free)) == "form-open"
     assert decide(PROBLEM, searched(NONE, free), (), ()).shown is free
     law.matters = False
     assert status(searched(NONE, free)) == "named"
     law.matters = True
-    assert status(searched(NONE, CandidateFit(("dig",), one, one))) == "named"
+    assert status(searched(NONE, Explanation(("dig",), one, one))) == "named"
     assert status(searched(NONE, free, adequate=False)) == "partly-named"
 
 
