@@ -26,7 +26,9 @@ def stories(tmp_path_factory):
 
 
 def phi_error(story, when):
-    return abs(story.report["soil"][when]["friction_angle"]["value"] - story.soil["friction_angle"])
+    return abs(
+        story.report[f"soil_{when}"]["friction_angle"]["value"] - story.soil["friction_angle"]
+    )
 
 
 def test_slip_sinkage_by_another_law_is_found_and_predicts_heavier_loads(stories):
