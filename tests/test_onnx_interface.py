@@ -121,6 +121,7 @@ def _terms(file):
     return json.loads(Estimator.load(file).metadata["set"])["terms"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 def test_released_files_have_documented_inputs_and_outputs_only(name):
     session = ort.InferenceSession(

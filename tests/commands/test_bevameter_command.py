@@ -29,6 +29,7 @@ def tables(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(tables, capsys):
     words = ["bevameter", "shear.csv", "plates.csv", "--model", "model.toml"]
     assert main([*words, "--out", "soil.toml", "--json", "soil.json", "--picture", "soil.png"]) == 0

@@ -105,6 +105,7 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert json.loads(capsys.readouterr().out) == content
 
 
+@pytest.mark.slow
 def test_identify_warns_of_one_load(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--where", "load_N=40"]
     assert main(command) == 0

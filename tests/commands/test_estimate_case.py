@@ -60,6 +60,7 @@ def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
     assert "radius 0.15 m" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "case", "said"),
     [

@@ -32,6 +32,7 @@ def rows_of(text):
     return list(csv.DictReader(io.StringIO(text)))
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(folder, capsys):
     command = ["identify", "model.toml", "runs.csv", "--by", "run", "--out", "o.json"]
     assert main(command) == 0
@@ -73,6 +74,7 @@ def test_a_blank_cell_is_no_group(folder, capsys, small_model):
         assert "timed.csv line 3, column time_s: the cell is blank" in captured.err
 
 
+@pytest.mark.slow
 def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
     """`--by all` gives what the same rows give as one run."""
     header, *rows = [line for line in RUNS.splitlines() if not line.startswith("b")]

@@ -92,6 +92,7 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
     assert "the noise of torque_Nm is 1e-09 or less" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
     text = THREE_CHANNEL_MODEL.replace('sinkage_m = "2 %"', "")
     (folder / "less.toml").write_text(text)
@@ -105,6 +106,7 @@ def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
     assert "sinkage_m is excluded" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_wheel_that_spins_on_the_spot_has_a_status(folder, capsys):
     table(folder / "spin.csv", rows(slip=0.999999))
     assert main(["gap", "model.toml", "spin.csv", "--out", "found"]) == 0
@@ -149,6 +151,7 @@ def test_a_label_is_a_name(folder, capsys):
         refused([*words, "--run", label], capsys, "--run")
 
 
+@pytest.mark.slow
 def test_the_report_shows_names_as_text(folder):
     lines = [["<script>alert(1)</script>", *line[1:]] for line in rows()[:15]]
     table(folder / "odd.csv", lines + rows()[15:])

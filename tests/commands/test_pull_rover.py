@@ -27,6 +27,7 @@ def files(model_file, tmp_path):
     return [str(model_file), str(runs)]
 
 
+@pytest.mark.slow
 def test_a_rover_is_answered_for_as_a_whole(files, tmp_path, capsys):
     out, picture = tmp_path / "rover.csv", tmp_path / "rover.png"
     outputs = ["--out", str(out), "--picture", str(picture)]

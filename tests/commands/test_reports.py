@@ -72,6 +72,7 @@ COMMANDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", COMMANDS)
 def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kind, capsys):
     command = [*COMMANDS[kind], "--report", "found/deeper"]
@@ -97,6 +98,7 @@ def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kin
         assert " ".join(text.split()).lower() in plain
 
 
+@pytest.mark.slow
 def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     assert main([*COMMANDS["estimate"], "--report", "found", "--out", "all.csv"]) == 0
     rows = list(csv.DictReader((folder / "all.csv").read_text().splitlines()))
@@ -110,6 +112,7 @@ def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     assert found == json.loads((folder / "all.json").read_text())
 
 
+@pytest.mark.slow
 def test_no_file_is_written_where_the_page_fails(folder, monkeypatch, capsys):
     def fails(*args):
         raise KeyboardInterrupt
@@ -130,6 +133,7 @@ def test_bad_folders_are_one_line(folder, capsys):
     assert "RUNS.csv is missing" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_rows_do_not_determine_is_said_and_not_given_as_a_result(folder, capsys):
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.3,80,3.2\n")
     command = ["identify", "model.toml", "runs.csv", "--method", "posterior", "--report", "found"]
@@ -140,6 +144,7 @@ def test_what_rows_do_not_determine_is_said_and_not_given_as_a_result(folder, ca
     assert text.count("not determined (") == 2 and "partly identified" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["pull", "advise"])
 def test_hints_at_wrong_units_come_with_every_command(folder, command, capsys):
     wrong = RUNS.replace("0.75", "75").replace("3.2", "320").replace("1.95", "195")
@@ -149,6 +154,7 @@ def test_hints_at_wrong_units_come_with_every_command(folder, command, capsys):
     assert "! runs.csv: torque is" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ["\u6f22\u5b57\u7802", "x" * 256, "W" * 256, "$\\frac$", "_a"])
 def test_runs_of_any_name_are_drawn_without_a_warning(folder, name, capsys):
@@ -171,6 +177,7 @@ def drawn_apart(folder, settings):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "file"),
     [
@@ -188,6 +195,7 @@ def test_pictures_do_not_depend_on_settings_of_matplotlib(folder, settings, file
     assert not re.search("matplotlib|mkdir|Bad key", done.stderr)
 
 
+@pytest.mark.slow
 def test_a_broken_settings_file_of_matplotlib_is_one_line(folder):
     (folder / "matplotlibrc").write_bytes(b"\xff")
     done = drawn_apart(folder, {})

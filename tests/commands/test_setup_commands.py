@@ -70,6 +70,7 @@ def test_released_files_have_short_names(tmp_path, monkeypatch):
     assert str(find_model("whell.onnx")) == "whell.onnx"
 
 
+@pytest.mark.slow
 def test_models_lists_them(capsys):
     assert main(["models"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -85,6 +86,7 @@ def test_a_short_name_serves_estimate(tmp_path, capsys):
     assert "cohesion" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkeypatch):
     assert main(["doctor"]) == 0
     assert "nothing is wrong" in capsys.readouterr().out

@@ -37,6 +37,7 @@ def commands_among(modules):
     return {name for name in COMMANDS if COMMANDS[name] in modules}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_an_error_of_usage_loads_no_library_and_no_other_command(command):
     loaded, printed = modules_after(command, "--nonsense")
@@ -60,6 +61,7 @@ def test_an_output_of_the_wrong_kind_is_refused_before_any_library_is_loaded():
     assert {name.split(".")[0] for name in loaded} <= set(OWN)
 
 
+@pytest.mark.slow
 def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models(
     model_file, tmp_path
 ):

@@ -79,6 +79,7 @@ def tables(text):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [c for c in WORDS if c != "papers"])
 def test_tables_are_narrow_rounded_and_in_usual_units(command, tmp_path, monkeypatch, capsys):
     (tmp_path / "m.toml").write_text(THREE_CHANNEL_MODEL)

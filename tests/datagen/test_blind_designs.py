@@ -37,6 +37,7 @@ def rows_at(slips, load=80.0):
     return WheelState(slip=slips, **{k: np.full(slips.size, v) for k, v in values.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "readings"), FORMER.items())
 def test_plans_without_discrepancy_give_the_sets_they_gave(key, readings):
     tier, cause, size, seed = key
@@ -46,6 +47,7 @@ def test_plans_without_discrepancy_give_the_sets_they_gave(key, readings):
     assert not np.any(list(drawn.truth["discrepancy"]["runs"].values()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rms", DISCREPANCIES[1:])
 def test_the_discrepancy_has_the_rms_that_is_stated_in_every_channel(rms):
     drawn = draw_blind_set(replace(PLAN, discrepancy=rms))
@@ -95,6 +97,7 @@ def test_noise_strays_about_the_true_readings_with_discrepancy():
     assert np.std(strays) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("design", DESIGNS)
 def test_a_design_is_driven_as_it_says(design):
     runs = {"one-run": 1, "few-runs": 3}.get(design, 8)
@@ -133,6 +136,7 @@ def test_a_design_is_driven_as_it_says(design):
         assert load.max() * 1.29 < drawn.region["load_N"].min()
 
 
+@pytest.mark.slow
 def test_unequal_soils_scatter_three_times_as_much():
     scatter = [
         draw_blind_set(replace(PLAN, design="unequal-soils", runs=16, seed=i)).truth["scatter"]

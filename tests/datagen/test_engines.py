@@ -50,6 +50,7 @@ def die_at_five(number):
     return number
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_results_come_in_order_from_several_processes(method, tmp_path):
     task = functools.partial(wait_for_another, tmp_path)
@@ -128,6 +129,7 @@ def test_skipping_points_is_fast_forward(count):
     assert (fast.random(64) == plain.random(64)).all()
 
 
+@pytest.mark.slow
 def test_a_file_has_the_same_bytes_whatever_the_number_of_processes(tmp_path, monkeypatch):
     monkeypatch.setattr("datagen.generate.pieces", functools.partial(pieces, size=256))
     blocks = "[[runs]]\nrows = 1\nshare = 0.5\n[[runs]]\nrows = 8\nshare = 0.5\n"

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -50,6 +51,7 @@ def growth(kind):
     return float(done.stdout)
 
 
+@pytest.mark.slow
 def test_estimates_do_not_drift():
     result = run_day(steps=4000, per_soil=2000, seed=3)
     columns = Estimator.load(ROOT / "exported" / "wheel.onnx").sets.columns
@@ -60,9 +62,11 @@ def test_estimates_do_not_drift():
     assert np.max(result.drifts) < 0.2
 
 
+@pytest.mark.slow
 def test_resident_memory_is_flat():
     assert growth("sound") < 2e6
 
 
+@pytest.mark.slow
 def test_memories_that_are_kept_would_be_noticed():
     assert growth("leaking") > 6e6

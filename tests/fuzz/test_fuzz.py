@@ -14,6 +14,7 @@ from targets import TARGETS, check
 KEPT = sorted(path for path in CORPUS.rglob("*") if path.is_file())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", KEPT, ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_what_once_failed(path):
     with warnings.catch_warnings():

@@ -121,6 +121,7 @@ def test_an_audit_needs_noise():
         audit(silent, driven(case, loads=(40.0,), slips=3, noise=0.0))
 
 
+@pytest.mark.slow
 def test_the_unknown_parameters_are_those_with_a_prior_else_those_of_shear():
     case, none = case_of(), replace(case_of(), prior={})
     design, few = driven(case), {name: EFFECTS[name] for name in ("torque-gain", "bulldozing")}

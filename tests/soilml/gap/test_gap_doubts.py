@@ -34,6 +34,7 @@ def changed(table, name, values):
     return Table(table.columns | {name: values})
 
 
+@pytest.mark.slow
 def test_noise_far_above_the_scatter_of_repeats_is_noted():
     table = driven(case_of(), loads=TWICE)
     report = gap(case_of(times(MODEL, 5.0)), table)
@@ -58,6 +59,7 @@ def test_understated_noise_is_undecided():
     assert any("as much as their declared noise" in reason for reason in texts(report.reasons))
 
 
+@pytest.mark.slow
 def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
     monkeypatch.setattr("soilml.gap.search.stepwise.GAP_LEVEL", 1.01)
     report = gap(case_of(), driven(case_of()))

@@ -179,6 +179,7 @@ def test_a_larger_set_gives_way_to_a_smaller_that_explains_as_much(dug, named):
     assert [c.names for c in explanations(candidates, found)] == [("slip-sinkage",)]
 
 
+@pytest.mark.slow
 def test_a_set_of_which_each_is_needed_stays():
     case = case_of()
     both = [DIGGING(n1=0.4), EFFECTS["bulldozing"](share=1.0)]

@@ -67,6 +67,7 @@ def test_a_free_law_explains_at_least_what_the_catalogues_does(moved, screened):
     assert max(free.values()) <= soil.residual @ soil.residual
 
 
+@pytest.mark.slow
 def test_an_effect_within_reach_of_an_earlier_search_is_fitted_again(moved, screened):
     problem, soil = moved
     none, signatures, _ = screened

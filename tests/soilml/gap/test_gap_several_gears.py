@@ -132,6 +132,7 @@ def test_two_diameters_make_small_wheel_stiffness_testable():
     assert effect_signatures(two, readings, effects)[0][0].name == "small-wheel-stiffness"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nonlinear", "posterior"])
 def test_one_soil_is_identified_from_two_wheels(method):
     case = case_of(WHEELS.replace("0.12", "0.06", 1) + LUGS + REST)
@@ -211,6 +212,7 @@ tail = { position = [-0.4, 0.0], gear = "lugged" }
 """
 
 
+@pytest.mark.slow
 def test_wheels_of_a_rover_stand_for_their_gears(capsys):
     case = case_of(WHEELS.replace("0.15", "0.05", 1) + REST + ROVER)
     columns = dict(rows(case, loads=(20.0, 30.0), slips=4).columns)

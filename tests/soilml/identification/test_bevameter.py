@@ -74,6 +74,7 @@ def test_a_blank_displacement_is_the_steady_end_of_a_test():
     assert bevameter(shear=Table(columns)).soil["cohesion"] == pytest.approx(C, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(0.05,), (0.05, 0.10)])
 def test_ranges_of_plate_tests_contain_mean_and_next_place(sizes):
     """95 % ranges hold the true mean, and another place, in 88 to 100 % of 120 sets of tests."""
@@ -91,6 +92,7 @@ def test_ranges_of_plate_tests_contain_mean_and_next_place(sizes):
     assert 0.88 < np.mean(place) <= 1.0
 
 
+@pytest.mark.slow
 def test_ranges_of_shear_tests_contain_mean_and_next_place():
     rng, mean, place = np.random.default_rng(8), [], []
     for seed in range(120):

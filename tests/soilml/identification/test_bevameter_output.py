@@ -104,6 +104,7 @@ def saved_figures(monkeypatch):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kinds", "panels"), [("plates", 1), ("shear", 2), ("both", 3)])
 def test_a_picture_shows_tests_curves_and_laws(tmp_path, monkeypatch, kinds, panels):
     drawn = saved_figures(monkeypatch)
@@ -139,6 +140,7 @@ def test_a_picture_shows_tests_curves_and_laws(tmp_path, monkeypatch, kinds, pan
         assert limits.get_xlim()[0] == limits.get_ylim()[0] == 0.0
 
 
+@pytest.mark.slow
 def test_a_legend_of_many_tests_is_left_out(tmp_path, monkeypatch):
     drawn = saved_figures(monkeypatch)
     for repeats in (3, 4):  # six and eight tests

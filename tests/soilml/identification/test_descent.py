@@ -110,6 +110,7 @@ def test_few_rows_for_the_starts_hold_all_channels_and_the_heaviest_load(tmp_pat
     assert len(rows) <= 2 * READINGS + 3
 
 
+@pytest.mark.slow
 def test_the_optimum_is_the_lowest_of_descents_from_all_points(tmp_path):
     case = with_model(tmp_path)
     case = replace(case, prior=case.prior | {"n": Prior(0.5, 1.4)})

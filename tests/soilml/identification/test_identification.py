@@ -277,6 +277,7 @@ offset = { normal = 0.015 }
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nonlinear", "posterior"])
 def test_a_slip_that_is_off_is_integrated_out_by_its_normal_prior(case, tmp_path, method):
     file = tmp_path / "model.toml"

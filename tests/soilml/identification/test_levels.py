@@ -21,6 +21,7 @@ def share(draw, count):
     return np.mean(np.asarray(found) == count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scatter", [0.003, 0.02, 0.08])
 @pytest.mark.parametrize("runs", [2, 4, 16, 64])
 def test_loads_that_scatter_about_one_value_are_one_level(scatter, runs):

@@ -41,6 +41,7 @@ def both(monkeypatch, case, table, **options):
     return condensed, identify(case, table, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plain", "gears", "gaps", "undeclared", "slip noise"])
 def test_least_squares_of_condensed_rows_are_those_of_all(case, condensing, monkeypatch, kind):
     rng, gear = np.random.default_rng(11), None
@@ -64,6 +65,7 @@ def test_least_squares_of_condensed_rows_are_those_of_all(case, condensing, monk
     assert few.rows_used == ROWS
 
 
+@pytest.mark.slow
 def test_rows_of_very_different_weight_are_not_one(case, condensing, monkeypatch):
     # a relative noise is small where the torque changes its sign, at little slip
     table = measured(case, np.random.default_rng(11), ROWS, least_slip=-0.05)
@@ -72,6 +74,7 @@ def test_rows_of_very_different_weight_are_not_one(case, condensing, monkeypatch
     assert np.abs((few.values - all_rows.values) / all_rows.std).max() < 0.3
 
 
+@pytest.mark.slow
 def test_the_posterior_of_condensed_rows_is_that_of_least_squares(case, condensing):
     table = measured(case, np.random.default_rng(12), ROWS)
     sampled, fit = identify(case, table, method="posterior"), identify(case, table)
@@ -141,6 +144,7 @@ def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
     assert len(np.unique(equal)) == 2
 
 
+@pytest.mark.slow
 def test_advice_and_pull_rest_on_condensed_rows(case, condensing, monkeypatch):
     """Samples of soil of the same mean and spread as those of all rows."""
     data = read_observations(case, measured(case, np.random.default_rng(4), ROWS))

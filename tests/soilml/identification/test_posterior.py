@@ -151,6 +151,7 @@ def test_polynomials_in_place_of_the_model_give_the_same_posterior(case, monkeyp
     assert np.all(np.abs(quick.low - fit.low) < 0.15 * fit.std)
 
 
+@pytest.mark.slow
 def test_many_rows_are_sampled_in_the_region_of_a_part_of_them(case, monkeypatch):
     rng = np.random.default_rng(2)
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
@@ -163,6 +164,7 @@ def test_many_rows_are_sampled_in_the_region_of_a_part_of_them(case, monkeypatch
     np.testing.assert_allclose(fit.std, least_squares.std, rtol=0.08)
 
 
+@pytest.mark.slow
 def test_noise_of_slip_is_linearised_where_the_posterior_is(case):
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     case = replace(case, noise=case.noise | {"slip": Noise(constant=0.02)})
@@ -174,6 +176,7 @@ def test_noise_of_slip_is_linearised_where_the_posterior_is(case):
     assert np.all(fit.std > 1.1 * exact.std)
 
 
+@pytest.mark.slow
 def test_dead_corners_of_the_prior_are_passed_over_in_silence(recwarn):
     def cornered(u):
         near = -0.5 * (((u - 0.7) / 1e-4) ** 2).sum(axis=1)

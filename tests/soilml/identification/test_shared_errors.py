@@ -53,6 +53,7 @@ def measured(case, rng, channels=("torque_Nm",), slip_offset=0.0, bearing=1.0, t
     return Table(table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["nonlinear", "posterior"])
 def test_a_bias_gives_what_an_effect_with_a_normal_prior_gives(case, method):
     """An error of the sensor that is left out of the result, and one that is part of it."""
@@ -74,6 +75,7 @@ def test_a_bias_gives_what_an_effect_with_a_normal_prior_gives(case, method):
     assert any("slip 0.015" in text for text in texts(fit.warnings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [posterior, nonlinear])
 @pytest.mark.parametrize("error", [-1.0, 0.9])
 def test_errors_far_from_zero_leave_what_integration_of_the_model_gives(case, method, error):
@@ -150,6 +152,7 @@ def test_gains_offsets_and_errors_that_grow_with_slip_are_columns(case):
     assert sensor_columns(replace(data, shared_errors={"bearing": 0.4}), prediction) is None
 
 
+@pytest.mark.slow
 def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):
     rng, held, before = np.random.default_rng(3), [], []
     truth = np.asarray([TRUTH[f.path] for f in select_free(case, None)])
@@ -180,6 +183,7 @@ def test_the_misfit_counts_the_errors_that_rows_share(case):
     assert fit.misfit == pytest.approx(2.0 * best.cost / (len(SLIPS) - 3), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_misfit_of_soil_and_errors_is_that_of_the_best_fit(case):
     rng = np.random.default_rng(4)
     for _ in range(3):
@@ -231,6 +235,7 @@ def test_the_command_gives_both_intervals_and_says_which_one_to_use(
     assert '"as_usual"' in out.read_text()
 
 
+@pytest.mark.slow
 def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, monkeypatch):
     table = measured(case, rng := np.random.default_rng(3))
     columns = {name: table[name] for name in table.columns}

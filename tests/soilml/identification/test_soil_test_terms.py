@@ -106,6 +106,7 @@ def test_wrong_tests_are_refused(tmp_path, lines, message):
         read_case(path)
 
 
+@pytest.mark.slow
 def test_posterior_with_a_test_is_that_of_a_grid():
     case = a_case(soil_tests=(SHEAR,))
     table = some_rows(case)

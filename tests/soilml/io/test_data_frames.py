@@ -29,6 +29,7 @@ class Frame:
 VIEWS = COLUMNS | {"run": pa.array(COLUMNS["run"], pa.string_view())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", [pa.table(COLUMNS), Frame(COLUMNS), Frame(VIEWS)])
 def test_a_frame_is_read_as_the_file_would_be(frame, model_file):
     table = read_table(frame, need=("run", "slip"))

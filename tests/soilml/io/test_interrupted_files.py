@@ -56,6 +56,7 @@ def contents(folder):
     return {path.name: path.read_text() for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_between_two_renames_waits_until_the_set_is_complete(folder, number):
     done = write(folder, number, 1)

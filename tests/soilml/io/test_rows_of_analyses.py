@@ -38,6 +38,7 @@ class Frame:
         return self.arrow.__arrow_c_stream__(requested_schema)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", [dict, Frame], ids=["mapping", "frame"])
 @pytest.mark.parametrize(
     "answer",

@@ -21,6 +21,7 @@ def imported(folder, logs, edits):
     return import_log(logs, folder / "map.toml"), text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
 def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
     logs, edits, stages = writer(np.random.default_rng(7), tmp_path)

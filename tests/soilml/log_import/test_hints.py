@@ -51,6 +51,7 @@ def test_a_right_map_gets_no_hint(log):
     assert import_log(log, current()).remarks == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "cause"),
     [
@@ -137,6 +138,7 @@ def test_hints_of_a_table(changes, hint):
     assert any(hint in remark.text for remark in found), found
 
 
+@pytest.mark.slow
 def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, capsys):
     lines = [f"a,{s},{LOAD / 9.81:.4f},{t:.4f}" for s, t in zip(*rows_of_torque(), strict=True)]
     runs = tmp_path / "runs.csv"

@@ -42,6 +42,7 @@ def log_of(rng, path, **settings):
     return write_csv(path, columns), d
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [SPEEDS, PLACES], ids=["speeds", "places"])
 def test_stated_standard_errors_are_calibrated(motion, tmp_path):
     """Every stage of 20 logs gives a row; 90 % intervals hold the truth as often as they should."""
@@ -76,6 +77,7 @@ def test_rows_are_a_table_of_runs_that_identify_takes(tmp_path, model_file):
     assert identify(read_case(model_file), table).rows_used == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(vars(FORMATS)))
 def test_every_format_gives_the_same_rows(name, tmp_path):
     """Read by the map that init_map writes, with the radius filled in and nothing else."""

@@ -65,6 +65,7 @@ def in_german(rng, d):
     return columns, (";", ",", "utf-16", ("Radius: 150 mm",), None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", [by_name, by_unit_row, by_values, in_german])
 def test_guesses_give_the_truth(log, tmp_path):
     """With the radius filled in where the log does not state it, and nothing else."""
@@ -132,6 +133,7 @@ def test_slip_and_load_in_the_names_of_files(tmp_path):
     np.testing.assert_allclose(table["torque_Nm"], torque_law(SLIPS), rtol=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [True, False])
 def test_several_runs_in_one_file(named, tmp_path):
     """A column that names them, or a clock that starts again."""
@@ -181,6 +183,7 @@ def rig_logs(tmp_path):
     return logs
 
 
+@pytest.mark.slow
 def test_the_traps_of_real_logs(rig_logs, tmp_path, capsys):
     """By the commands, with one line of the map changed: the gear ratio, which no log tells."""
     logs, chart = [str(path) for path in rig_logs], str(tmp_path / "map.toml")

@@ -48,6 +48,7 @@ def test_dialects_of_text(tmp_path, data):
     np.testing.assert_allclose(columns["M"], [-2, -3, -4, -5, -6])
 
 
+@pytest.mark.slow
 def test_units_stand_in_brackets_or_in_a_row(tmp_path):
     rows = "\n".join(f"{i};{i};{i};{i}" for i in range(5))
     for header in ("Time [ms];Fz (N);omega, deg/s;n\n", "Time;Fz;omega;n\nms;N;deg/s;-\n"):

@@ -193,6 +193,7 @@ def test_a_force_that_comes_and_goes_is_no_angle_that_starts_again():
     assert all("torque" in own for own in found.wheels.values())
 
 
+@pytest.mark.slow
 def test_the_table_of_an_earlier_import_is_no_log(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     d = drive(np.random.default_rng(92), slips=(0.3,), seconds=8)

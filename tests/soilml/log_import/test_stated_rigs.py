@@ -16,6 +16,7 @@ from soilml.log_import.recording import Recording
 from soilml.remarks import about, texts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
 def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
     logs, edits, stages = writer(np.random.default_rng(7), tmp_path)
@@ -94,6 +95,7 @@ def test_codes_of_missing_readings(values, left, tmp_path):
     assert bool(found.notes) == (left < len(values))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("column", ["t", "M"])
 def test_huge_numbers_are_missing_in_every_format(tmp_path, column):

@@ -78,6 +78,7 @@ def test_the_autocorrelation_time_is_that_of_the_process():
     assert autocorrelation_time(np.random.default_rng(8).standard_normal(20000)) < 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blur, interval", [(0.0, 0), (0.0005, 0), (0.003, 0), (0.003, 0.2)])
 def test_slip_from_places_is_calibrated(blur, interval):
     """Places in m with white noise, rotation exact, slip that wanders by 0.02.

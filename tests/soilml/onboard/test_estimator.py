@@ -280,6 +280,7 @@ def test_a_short_name_is_a_file_or_a_released_one(tmp_path, monkeypatch):
     assert find_model("wheel") == Path("wheel")
 
 
+@pytest.mark.slow
 def test_the_calibration_of_pooled_rows_is_written_as_it_was_read():
     entry = json.loads(Estimator.load("exported/slip_torque.onnx").metadata["together"])
     pooling = read_pooling(entry)

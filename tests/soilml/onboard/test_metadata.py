@@ -89,6 +89,7 @@ CHANGES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", CHANGES)
 @pytest.mark.parametrize("command", ["estimate", "export-c", "export-step"])
 def test_a_malformed_entry_is_refused_by_every_command(tmp_path, capsys, what, command):
@@ -111,6 +112,7 @@ def test_a_set_of_a_graph_without_one_is_refused(tmp_path):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", released_models())
 def test_released_files_signed_again_are_read(tmp_path, name):
     assert Estimator.load(signed(released_models()[name], tmp_path / "m.onnx")).names

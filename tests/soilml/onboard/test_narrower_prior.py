@@ -59,6 +59,7 @@ def test_the_file_s_own_prior_changes_nothing(rover):
     assert same.in_range == wide.in_range and same.reason == wide.reason
 
 
+@pytest.mark.slow
 def test_it_is_nearly_the_posterior_with_that_prior(rover):
     """Errors beside those of the exact posterior, over random soils and boxes."""
     rng, case = np.random.default_rng(3), read_recipe("wheel").case

@@ -135,6 +135,7 @@ def of_plates_and_shear(case):
     return bevameter(plates | {"pressure_Pa": 1e6 * z}, shear)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "shape", "said"),
     [
@@ -182,6 +183,7 @@ def test_an_unknown_part_of_a_gap_report_is_refused(case):
         gap(case).plot(part="held_out")
 
 
+@pytest.mark.slow
 def test_the_backend_is_left_to_the_user():
     """Reports need none; what the user draws after them has the one of MPLBACKEND."""
     code = "from soilml.report.figure_style import report_style\nwith report_style(): pass\n"

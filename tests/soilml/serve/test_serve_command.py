@@ -30,6 +30,7 @@ def test_a_port_that_does_not_exist_is_one_line(port, capsys):
     assert f"--port is {port}; needed is a number from 0 to 65535" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
     process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
@@ -44,6 +45,7 @@ def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_worker_ends_with_its_server(tmp_path):
     """Even where the server is killed: the worker sees the end of its input."""
     process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})

@@ -49,6 +49,7 @@ def sensor(share, inside=lambda features: np.ones(len(features), dtype=bool)):
     return predict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
 def test_the_share_of_error_in_common_is_found(share):
     found = measure_held_out(sensor(share), rows([8] * 1000, True), CONDITIONS, FACTOR)

@@ -32,6 +32,7 @@ def drive(rng, rows):
     return {"slip": slip, "load": load, "torque": torque, "sinkage": sinkage}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file", "rows"), [("wheel", 1), ("wheel", 3), ("any_wheel", 1)])
 def test_a_stream_gets_the_answers_of_the_file(tmp_path, file, rows):
     out = exported(tmp_path, file, "--rows", str(rows))

@@ -30,6 +30,7 @@ def test_the_exact_solution_in_tiles_is_that_of_the_eigensystem(monkeypatch):
         np.testing.assert_allclose(other, one, rtol=0.3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_fixed_size_solution_in_parts_is_that_of_all_rows_at_once(monkeypatch):
     x, y, _ = curve(3000)
     once = FixedSizeLSSVM(centres=40).fit(x, y)
@@ -43,6 +44,7 @@ def test_the_fixed_size_solution_in_parts_is_that_of_all_rows_at_once(monkeypatc
         np.testing.assert_allclose(one, whole, rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("regressor", "rows"),
     [
@@ -72,6 +74,7 @@ def test_ten_times_the_rows_need_little_more_memory_where_prototypes_are_few():
     assert 1.6e9 < exact.memory < 2.5e9  # half of the matrix of 3.2 GB, and what it takes beside
 
 
+@pytest.mark.slow
 def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
     rng = np.random.default_rng(0)
     x = np.repeat(rng.uniform(-2.0, 2.0, (80, 1)), 10, axis=0) + 0.01 * rng.normal(size=(800, 1))

@@ -24,6 +24,7 @@ def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows
     )
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_no_bit_and_progress_reaches_its_end():
     x = np.random.default_rng(1).normal(size=(3 * TILE, 2))
     found, steps = [], []

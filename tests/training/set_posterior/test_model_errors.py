@@ -98,6 +98,7 @@ def test_a_stronger_soil_under_a_heavier_load_responds_alike():
     assert np.asarray(forces[1]) == pytest.approx(np.asarray(forces[0]), rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
 def test_columns_of_the_bearing_are_changes_with_its_logarithm(kind, request):
     posterior, step = request.getfixturevalue(kind), 1e-4

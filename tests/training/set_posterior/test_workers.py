@@ -81,6 +81,7 @@ def test_limits_and_figures_of_a_set_posterior_are_the_same(wheel_posterior, mon
         np.testing.assert_array_equal(one.cover90, three.cover90)
 
 
+@pytest.mark.slow
 def test_analytic_estimates_are_the_same_and_failures_too():
     recipe = read_recipe("benchmark")
     tables = [one.table for one in benchmark_sets(recipe, SHEAR, 2)][:10]

@@ -160,6 +160,7 @@ def test_a_missing_solution_names_its_side():
         )
 
 
+@pytest.mark.slow
 def test_there_is_at_most_one_solution():
     rng, modulus = np.random.default_rng(0), np.geomspace(1e-5, 10.0, 64)
     for _ in range(150):

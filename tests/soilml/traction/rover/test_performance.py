@@ -130,6 +130,7 @@ def test_a_column_of_wheels_stands_for_gear_and_pass(case):
     identify(again, measured(again, list(FOUR)), None, "nonlinear")  # the effect needs the pass
 
 
+@pytest.mark.slow
 def test_the_report_knows_what_the_rows_tell(case):
     table = measured(case, list(FOUR))
     found = rover_report(case, table, slopes=SLOPES)
