@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
+from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import systematic_resampling
-from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
 from training.benchmark.bayes_limit_file import FRACTIONS, HPD_DRAWS, PosteriorSummary
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION

@@ -19,8 +19,8 @@ from soilml.fitting.free_parameters import select_free
 from soilml.fitting.observations import read_observations
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
-from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.sampling.surface_sampling import surface_sample
+from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.surface_sampling import surface_sample
 
 METHODS = ("nonlinear", "posterior")
 #: Numbers of rows, and the largest at which the model itself is sampled for comparison.

@@ -22,7 +22,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/fitting/descent.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
-    "soilml/numerics/sobol_points.py": {"scipy"},
+    "soilml/numerics/resampling.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/plot.py": {"matplotlib"},
     "soilml/gap/evidence/repeats.py": {"scipy"},

@@ -30,7 +30,7 @@ from soilml.fitting.observations import Observations
 from soilml.fitting.shared_errors_sensor_columns import sensor_columns
 from soilml.fitting.spread_rows import spread_rows
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.numerics.sobol_points import sobol_points
+from soilml.numerics.resampling import sobol_points
 
 Floats = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from soilml.fitting.descent import (
 )
 from soilml.fitting.free_parameters import soil_test_rates
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.numerics.sampling.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.sampling.surface_sampling import MOST_ROUNDS, surface_sample
-from soilml.numerics.sampling.surrogate_density import Region
+from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample
+from soilml.numerics.surrogate_density import SamplingBox
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def normal_start(density: PosteriorDensity, optimum: Optimum) -> ImportanceSampl
 
 def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceSample:
     """Samples of the density itself, in a box about those of a similar one."""
-    region = Region.of(start, REACH)
+    region = SamplingBox.of(start, REACH)
 
     def log_density(fractions: Floats) -> Floats:
         u = region.points(fractions)

@@ -18,13 +18,13 @@ from soilml.identification.fit_result import Fit
 from soilml.identification.joint_sample import joint_sample, most_probable
 from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.numerics.chi_squared import chi_squared_quantile
-from soilml.numerics.sampling.importance_sampling import (
+from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
     importance_sample,
 )
-from soilml.numerics.sampling.surface_sampling import surface_sample
+from soilml.numerics.quantiles import chi_squared_quantile
+from soilml.numerics.surface_sampling import surface_sample
 from soilml.quantities import column
 from soilml.remarks import Remark
 

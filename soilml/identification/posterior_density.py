@@ -23,7 +23,7 @@ from soilml.fitting.noise_and_process import squared_residuals_and_log_determina
 from soilml.fitting.observations import Observations
 from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
 from soilml.fitting.shared_errors_sensor_columns import sensor_columns
-from soilml.numerics.sampling.importance_sampling import ImportanceSample
+from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]

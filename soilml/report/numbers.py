@@ -51,6 +51,10 @@ class Estimated(Protocol):
         """Unit of both."""
 
 
+#: Significant digits of estimates in files: a millionth of the value is far below any uncertainty.
+SIGNIFICANT_DIGITS = 6
+
+
 def decimal(value: float, digits: int = 3) -> str:
     """A number with this many significant digits, never with a power of ten."""
     if not math.isfinite(value):
@@ -230,3 +234,12 @@ def format_probability(p: float) -> str:
     if p < 0.005:
         return "< 0.01"
     return "> 0.99" if p > 0.995 else f"{p:.2f}"
+
+
+def significant(value: float, digits: int = SIGNIFICANT_DIGITS) -> float:
+    """A number rounded to significant digits.
+
+    >>> significant(0.05407576875886196), significant(45769539.457, 4)
+    (0.0540758, 45770000.0)
+    """
+    return float(f"{value:.{digits}g}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.traction.by_load import LoadPrediction, predictions_by_load
 from soilml.traction.moment_draws import estimated_draws
 from soilml.traction.pull_and_slope import Traction, predict_traction

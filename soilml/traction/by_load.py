@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.numerics.quantile_band import quantile_band
+from soilml.numerics.quantiles import quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.remarks import Remark
 from soilml.row_status import Status

@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.fitting.free_parameters import select_free
 from soilml.fitting.observations import read_observations
 from soilml.io.table import Table
-from soilml.numerics.quantile_band import QUANTILES, quantile_band
+from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import SAME_LOAD
 

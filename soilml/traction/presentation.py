@@ -11,7 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from soilml.io.text_tables import format_table
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.report import numbers

@@ -19,8 +19,8 @@ from soilml.fitting.free_parameters import FreeParameter, select_free
 from soilml.fitting.observations import Observations, read_observations
 from soilml.identification.posterior import misfit_limit
 from soilml.io.table import Table
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling
-from soilml.numerics.sampling.importance_sampling import importance_sample
 from training.benchmark.bayes_limit_file import FRACTIONS, HPD_DRAWS, PosteriorSummary
 from training.benchmark.designs import (
     DesignSets,

@@ -19,8 +19,8 @@ from soilml.gap.report.results import EstimatedValue
 from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION, Prior
-from soilml.numerics.rounding import significant
 from soilml.quantities import Z_90
+from soilml.report.numbers import significant
 
 Floats = NDArray[np.float64]
 

@@ -21,8 +21,8 @@ from soilml.identification.bevameter.soil_section import (
 )
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.prior import Prior
-from soilml.numerics.rounding import significant
 from soilml.physics.soils.soil_tests import SoilTest
+from soilml.report.numbers import significant
 
 
 def bevameter(

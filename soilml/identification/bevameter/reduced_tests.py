@@ -11,8 +11,8 @@ from soilml.identification.bevameter.estimate import SpreadEstimate
 from soilml.identification.bevameter.pressure_sinkage import LEAST_SIZE_RATIO, PressureSinkageFit
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.identification.bevameter.soil_section import widths_of_gears
-from soilml.numerics.rounding import significant
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
+from soilml.report.numbers import significant
 
 #: Standard deviations that the range of 95 % of a normal distribution reaches from its middle.
 Z_95 = 1.96

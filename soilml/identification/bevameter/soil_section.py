@@ -9,9 +9,9 @@ from soilml.config.case import Case
 from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
 from soilml.identification.bevameter.shear_strength import ShearFit
 from soilml.numerics.prior import Prior
-from soilml.numerics.rounding import significant
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
+from soilml.report.numbers import significant
 
 #: Least modulus of a width, as a fraction of the estimate, where tests at other widths leave it
 #: open down to zero.

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.numerics.quadrature import columns, crowded_ends, crowded_start
-from soilml.numerics.sine_series import sine_and_versine
+from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, sine_and_versine
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.gears.arc import (
     BrakingLaw,

@@ -18,7 +18,7 @@ from soilml.identification.typical_errors import fit_with_typical_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_remarks import table_remarks
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark, texts
 from soilml.report.result_files import json_text

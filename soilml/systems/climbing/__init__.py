@@ -8,7 +8,7 @@ predicts drawbar pull and slope against slip; `quantile_band` summarises the sam
 Source: Nagatani et al., online estimation of climbing ability.
 """
 
-from soilml.numerics.quantile_band import quantile_band
+from soilml.numerics.quantiles import quantile_band
 from soilml.systems.climbing.ability import ClimbingAbility, climbing_ability
 from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
 from soilml.systems.climbing.identify import GroundEstimate, identify_ground

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.quantile_band import QUANTILES
+from soilml.numerics.quantiles import QUANTILES
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.ability import climbing_ability
 from soilml.systems.climbing.identify import identify_ground

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError, InputError
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.prior import Prior
-from soilml.numerics.sampling.importance_sampling import importance_sample
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.balance_likelihood import ForceBalances
 from soilml.systems.climbing.balance_noise import ShearParameters

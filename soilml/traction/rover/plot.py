@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.quantile_band import quantile_band
+from soilml.numerics.quantiles import quantile_band
 from soilml.report.figure_style import take_axes
 from soilml.traction.plot import POSTERIOR, PRIOR
 

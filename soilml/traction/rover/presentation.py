@@ -11,7 +11,7 @@ import numpy as np
 
 from soilml.config.wheeled_rover import WheeledRover
 from soilml.io.text_tables import format_table
-from soilml.numerics.quantile_band import quantile_band
+from soilml.numerics.quantiles import quantile_band
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.traction.presentation import Presentation

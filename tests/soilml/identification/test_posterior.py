@@ -10,7 +10,7 @@ from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.io.table import Table
-from soilml.numerics.sampling.importance_sampling import importance_sample
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.remarks import texts
 
 SLIPS = np.tile(np.linspace(0.1, 0.6, 4), 2)
@@ -127,7 +127,7 @@ def test_noise_that_nobody_declared_is_asked_for(case):
 
 def test_a_posterior_too_narrow_to_sample_is_refused_and_never_given_as_certain(case, monkeypatch):
     monkeypatch.setattr(import_module("soilml.identification.posterior"), "FEWEST_READINGS", 1000)
-    monkeypatch.setattr("soilml.numerics.sampling.importance_sampling.MOST_ROUNDS", 2)
+    monkeypatch.setattr("soilml.numerics.importance_sampling.MOST_ROUNDS", 2)
     case = replace(case, noise={"torque_Nm": Noise(share=1e-4)})
     truth = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
     table = measured(case, truth, SLIPS, LOADS, seed=1)

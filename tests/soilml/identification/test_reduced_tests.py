@@ -11,7 +11,7 @@ from soilml.fitting import soil_test_remarks
 from soilml.identification import condensed_rows, joint_sample
 from soilml.identification.bevameter import reduced_tests
 from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
-from soilml.numerics.sampling.importance_sampling import ImportanceSample
+from soilml.numerics.importance_sampling import ImportanceSample
 
 
 def spread(value, low, high):

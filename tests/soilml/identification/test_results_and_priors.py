@@ -15,8 +15,8 @@ from soilml.identification.fit_result import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
 from soilml.io.table import Table
+from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.numerics.prior import Prior
-from soilml.numerics.sampling.importance_sampling import ImportanceSample
 from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil

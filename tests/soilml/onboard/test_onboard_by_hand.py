@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.chi_squared import chi_squared_quantile
+from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard import Estimator
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.gaussian_pooling import LEAST_STD_RATIO, RowInformation, RunConditions

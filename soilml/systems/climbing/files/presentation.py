@@ -6,7 +6,7 @@ from math import pi
 from pathlib import Path
 
 from soilml.io.text_tables import format_table
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.numerics.quantile_band import QuantileBand, quantile_band
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark
 from soilml.systems.climbing.ability import (

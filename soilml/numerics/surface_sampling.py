@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.numerics.importance_sampling import LEAST_EFFECTIVE_SIZE, ImportanceSample
 from soilml.numerics.resampling import effective_size, latin_hypercube, systematic_resampling
-from soilml.numerics.sampling.importance_sampling import LEAST_EFFECTIVE_SIZE, ImportanceSample
-from soilml.numerics.sampling.polynomial_surface import (
+from soilml.numerics.surrogate_density import (
+    REACH,
+    ModelDensity,
     PolynomialSurface,
+    SamplingBox,
     Scaling,
+    SurrogateDensity,
     fit_surface,
     term_count,
 )
-from soilml.numerics.sampling.surrogate_density import REACH, ModelDensity, Region, SurrogateDensity
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +109,7 @@ def surface_sample(
             return None
         points.append(u[known])
         predictions.append(y[known])
-        region = Region.cube(p) if samples is None else Region.of(samples, reach)
+        region = SamplingBox.cube(p) if samples is None else SamplingBox.of(samples, reach)
         surface, errors = _fitted(np.concatenate(points), np.concatenate(predictions), region)
         if surrogate is not None and surrogate.power == 1.0:
             if known.mean() < 1.0 - MOST_UNPREDICTED:
@@ -130,7 +133,7 @@ def surface_sample(
     return None
 
 
-def _fitted(u: Floats, y: Floats, region: Region) -> tuple[PolynomialSurface, Floats]:
+def _fitted(u: Floats, y: Floats, region: SamplingBox) -> tuple[PolynomialSurface, Floats]:
     """The surface of the degree with the least leave-one-out errors, and these errors (n, k)."""
     p, distance = u.shape[1], region.distance(u)
     reach = max(REACH, region.half_width)
@@ -164,7 +167,7 @@ def _approached(
     return None
 
 
-def _error_at(surrogate: SurrogateDensity, region: Region, u: Floats, y: Floats) -> float:
+def _error_at(surrogate: SurrogateDensity, region: SamplingBox, u: Floats, y: Floats) -> float:
     """Standard deviation, under the density, of the error of its logarithm at new points (n, p).
 
     `y` (n, k) are the predictions there, and `region` that of the samples that the points are

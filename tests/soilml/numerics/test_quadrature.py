@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.quadrature import crowded_ends, crowded_start
-from soilml.numerics.sine_series import sine_and_versine
+from soilml.numerics.quadrature import crowded_ends, crowded_start, sine_and_versine
 
 
 @pytest.mark.parametrize("nodes", [crowded_start(14), crowded_ends(24)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.sampling.importance_sampling import importance_sample
+from soilml.numerics.importance_sampling import importance_sample
 
 
 def test_samples_drawn_about_the_middle_have_the_moments_of_a_density_of_many_dimensions():

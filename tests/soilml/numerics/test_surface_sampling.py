@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.sampling import surface_sampling
-from soilml.numerics.sampling.importance_sampling import importance_sample
-from soilml.numerics.sampling.polynomial_surface import Scaling, fit_surface, monomials, term_count
-from soilml.numerics.sampling.surface_sampling import surface_sample
-from soilml.numerics.sampling.surrogate_density import Region
+from soilml.numerics import surface_sampling
+from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.surface_sampling import surface_sample
+from soilml.numerics.surrogate_density import (
+    SamplingBox,
+    Scaling,
+    fit_surface,
+    monomials,
+    term_count,
+)
 
 SLIP = np.linspace(0.1, 0.9, 12)
 
@@ -107,7 +112,7 @@ def test_leave_one_out_errors_are_those_of_fits_without_the_point():
     rng = np.random.default_rng(3)
     u = rng.random((30, 2))
     y = np.stack([np.exp(u[:, 0]), np.sin(3.0 * u[:, 1])], axis=1)
-    scaling = Region.cube(2).scaling
+    scaling = SamplingBox.cube(2).scaling
     surface, errors = fit_surface(scaling, 3, u, y)
     assert surface(u) == pytest.approx(y, abs=0.05)
     for i in (0, 7, 29):

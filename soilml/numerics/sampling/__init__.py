@@ -1,1 +1,0 @@
-"""Weighted samples of densities over the unit cube."""
