@@ -15,7 +15,7 @@ from typing import Any
 from datagen.gear_sensors import GEAR_SENSORS, GearSensor
 from soilml.config.case import Case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior

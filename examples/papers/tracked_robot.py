@@ -35,10 +35,10 @@ from soilml.systems.tracked_robot import (
 )
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
+    implied_points,
     predicted_pull,
     simulate_group,
 )
-from soilml.systems.tracked_robot.pull_regression import implied_points
 
 OUT = Path("demo/papers/tracked_robot.png")
 PRINTED = {("sand", False): 600, ("sand", True): 620, ("clay", False): 800, ("clay", True): 950}

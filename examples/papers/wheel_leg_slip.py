@@ -10,6 +10,35 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
+from soilml.systems.wheel_legs.geometry import wheel_leg
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.sensor_fusion import (
+    PROPERTIES,
+    RULES,
+    SENSORS,
+    fit_estimators,
+    score_estimators,
+)
+from soilml.systems.wheel_legs.slip_models import (
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
+    fit_torque_slip,
+    soil_spring,
+)
+from soilml.systems.wheel_legs.soil_from_slip import soil_from_torque, soil_from_vibration
+from soilml.systems.wheel_legs.stances import (
+    FOOT,
+    LOAD,
+    SLIPS,
+    SpringLeg,
+    four_soils,
+    midstance_torques,
+    sample_soils,
+    simulate_stance,
+    simulate_stances,
+    vibration_amplitude,
+)
+from soilml.systems.wheel_legs.walk import walk
 
 from soilml import Model, Operating, Wheel, soil
 from soilml.config.case import Case
@@ -19,33 +48,6 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.papers import comin2017_slip as chapter
 from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
-from soilml.systems.wheel_legs.sensing.sensor_fusion import (
-    PROPERTIES,
-    RULES,
-    SENSORS,
-    fit_estimators,
-    score_estimators,
-)
-from soilml.systems.wheel_legs.sensing.simulated_stances import (
-    FOOT,
-    LOAD,
-    SLIPS,
-    four_soils,
-    midstance_torques,
-    sample_soils,
-    simulate_stances,
-)
-from soilml.systems.wheel_legs.sensing.slip_fits import fit_torque_slip
-from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.sensing.soil_from_slip import soil_from_torque, soil_from_vibration
-from soilml.systems.wheel_legs.sensing.stick_slip import (
-    SpringLeg,
-    simulate_stance,
-    vibration_amplitude,
-)
-from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
-from soilml.systems.wheel_legs.walking.walk import walk
 
 Floats = NDArray[np.float64]
 

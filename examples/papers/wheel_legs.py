@@ -15,13 +15,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
-
-from soilml.systems.wheel_legs.sensing.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
-from soilml.systems.wheel_legs.walking.gait_metrics import compare_feet, compare_legs
-from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.plate_stresses import plate_stresses
-from soilml.systems.wheel_legs.walking.walk import walk
+from soilml.systems.wheel_legs.gait_metrics import compare_feet, compare_legs
+from soilml.systems.wheel_legs.geometry import wheel_leg
+from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
+from soilml.systems.wheel_legs.walk import plate_stresses, walk
 
 OUT = Path("demo/papers/wheel_legs.png")
 SAND = LinearGround(stiffness=0.7e6)

@@ -2,7 +2,7 @@
 
 from soilml.config.case import Case, read_case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import take_prior
 from soilml.config.write_case import case_as_toml
 
 __all__ = [

@@ -8,16 +8,15 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.measurement_noise import Noise, take_bias, take_noise
 from soilml.config.model_discrepancy import Discrepancy, take_discrepancy
 from soilml.config.model_settings import (
     UNNAMED_GEAR,
     take_effects,
     take_gear,
     take_gears,
+    take_soil,
 )
-from soilml.config.sensor_bias import take_bias
-from soilml.config.soil_settings import take_soil
 from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
@@ -221,16 +220,7 @@ def read_case_of_one_gear(
     InputError
         As `read_case` does, and where the file has several gears and none of this name.
     """
-    settings = read_settings(path, f"soilml init {path}")
-    case = take_case(settings, effects)
-    if with_bias:
-        case = replace(case, bias=take_bias(settings.table("bias")))
-    elif "bias" in settings:
-        settings.fail(
-            "[bias] is read by identify, pull, gap and estimate --case alone (in Python, "
-            "with_bias=True); for other commands delete it"
-        )
-    settings.finish()
+    case = read_case(path, effects, with_bias)
     if not case.gears and gear is None:
         return case
     known = ", ".join(case.gears)

@@ -1,17 +1,44 @@
-"""Measurement noise: absolute, relative, or both."""
+"""Errors of sensors: noise of each reading, and biases that all readings of a sensor share.
+
+Both have an absolute part and one relative to the reading: `0.05`, `"2 %"` or `"2 % + 0.05"`.
+"""
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from soilml.config.share_and_constant import (
-    share_and_constant_as_setting,
-    take_share_and_constant,
-)
 from soilml.io.toml_settings import Settings
+from soilml.quantities import column
+
+#: Largest share of a reading, and largest constant part, in the unit of any column.
+MOST_SHARE, MOST_CONSTANT = 100.0, 1e9
+_SHARE = re.compile(r"\s*([0-9.eE+-]+)\s*%\s*(?:\+\s*([0-9.eE+-]+)\s*)?")
+
+#: What a model file for the board knows of a sensor's bias: by column, the name of its offset and
+#: the name of its relative error.
+KNOWN_PARTS: dict[str, tuple[str | None, str | None]] = {
+    column("slip"): ("slip_bias", None),
+    column("load"): (None, "load_gain"),
+    column("torque"): ("torque_bias", "torque_gain"),
+    column("sinkage"): ("sinkage_bias", None),
+    column("drawbar_pull"): ("drawbar_pull_bias", None),
+}
+#: The same as effects of the catalogue: of an offset, and of a relative error.
+_EFFECTS: dict[str, tuple[str, str]] = {
+    column("slip"): ("slip-offset", ""),
+    column("load"): ("", "load-gain"),
+    column("torque"): ("torque-offset", "torque-gain"),
+    column("sinkage"): ("sinkage-offset", ""),
+    column("drawbar_pull"): ("drawbar-offset", ""),
+}
+#: Forms of a noise or bias in a message; a bias may be zero.
+NEEDED = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
 
 
 @dataclass(frozen=True)
@@ -43,10 +70,92 @@ class Noise:
 
 def take_noise(settings: Settings, key: str) -> Noise:
     """Read `key = 0.05`, `key = "2 %"` or `key = "2 % + 0.05"`."""
-    needed = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
-    share, constant = take_share_and_constant(settings, key, needed)
+    share, constant = take_share_and_constant(settings, key, NEEDED)
     if share + constant == 0.0:
         settings.fail(
             f"{key} is {settings.content[key]!r}; a standard deviation must be above zero"
         )
     return Noise(constant=constant, share=share)
+
+
+def take_bias(settings: Settings) -> dict[str, Noise]:
+    """Read `[bias]`: by column, the standard deviation of its offset, its relative error, or both.
+
+    Raises `InputError` for a column without a bias, and for a part that it cannot have: slip,
+    sinkage and drawbar pull have an offset, load has a relative error, torque has both.
+    """
+    settings.permit(KNOWN_PARTS)
+    found = {}
+    for key, (offset, gain) in KNOWN_PARTS.items():
+        if key not in settings:
+            continue
+        share, constant = take_share_and_constant(settings, key, NEEDED)
+        bias = Noise(constant=constant, share=share)
+        if bias.share and gain is None:
+            settings.fail(f"{key} has a bias in its own unit; needed is a number without %")
+        if bias.constant and offset is None:
+            settings.fail(f"{key} has a relative bias; needed is '1 %'")
+        found[key] = bias
+    settings.finish()
+    return found
+
+
+def checked_sensors(bias: Mapping[str, Noise]) -> dict[str, float]:
+    """Standard deviations of faults of sensors, by effect, as `gap` takes them: those above zero.
+
+    A declared error becomes the size of the fault that an analysis may find.
+    """
+    sizes: dict[str, float] = {}
+    for key, declared in bias.items():
+        offset, gain = _EFFECTS[key]
+        sizes |= {offset: declared.constant} if offset else {}
+        sizes |= {gain: declared.share} if gain else {}
+    return {name: size for name, size in sizes.items() if size > 0.0}
+
+
+def common_errors(bias: Mapping[str, Noise]) -> dict[str, float]:
+    """Standard deviations of the errors that all readings share, by name, of declared columns.
+
+    A column that is declared has no error other than the one declared.
+    """
+    errors: dict[str, float] = {}
+    for key, declared in bias.items():
+        offset, gain = KNOWN_PARTS[key]
+        errors |= {offset: declared.constant} if offset else {}
+        errors |= {gain: declared.share} if gain else {}
+    return errors
+
+
+def take_share_and_constant(settings: Settings, key: str, needed: str) -> tuple[float, float]:
+    """Share, as a fraction, and constant part of `key = 0.05`, `"2 %"` or `"2 % + 0.05"`.
+
+    Raises `InputError` for another form and for a part that is negative or too large; `needed`
+    describes the three forms in its message.
+    """
+    value = settings.take(key, (int, float, str), needed)
+    share = constant = math.nan
+    try:
+        if not isinstance(value, str):
+            share, constant = 0.0, float(value)
+        elif match := _SHARE.fullmatch(value):
+            share, constant = float(match[1]) / 100.0, float(match[2] or 0.0)
+        else:
+            settings.fail(f"{key} is {value!r}; needed is {needed}")
+    except ValueError:
+        settings.fail(f"{key} is {value!r}; needed is {needed}")
+    if not (math.isfinite(share + constant) and share >= 0.0 and constant >= 0.0):
+        settings.fail(f"{key} is {value!r}; a standard deviation is a finite number, zero or more")
+    if share > MOST_SHARE or constant > MOST_CONSTANT:
+        settings.fail(
+            f"{key} is {value!r}; a standard deviation is at most {100 * MOST_SHARE:g} % and "
+            f"{MOST_CONSTANT:g}"
+        )
+    return share, constant
+
+
+def share_and_constant_as_setting(share: float, constant: float) -> Any:
+    """The two parts as they are written in TOML."""
+    text = f"{100 * share:.15g} %"
+    if share and constant:
+        return f"{text} + {constant!r}"
+    return text if share else constant

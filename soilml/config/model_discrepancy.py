@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.config.share_and_constant import (
+from soilml.config.measurement_noise import (
     share_and_constant_as_setting,
     take_share_and_constant,
 )

@@ -1,25 +1,31 @@
-"""Gears and effects as they are written in a model file."""
+"""Gears, effects, the soil and priors as they are written in a model file."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
 from typing import Any
 
-from soilml.config.prior_settings import take_prior
-from soilml.config.units import take_quantity
+from soilml.config.units import in_si, take_quantity
 from soilml.errors import InputError, did_you_mean
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import Parameter, check, declared
+from soilml.parameters import Parameter, check, declared, with_values
 from soilml.physics.effects import Effect
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.base import Gear
 from soilml.physics.model import Model
+from soilml.physics.soils import Soil, soil
+from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTest
 
 #: Name of the gear in [gear], beside those in [gears.NAME].
 UNNAMED_GEAR = "gear"
+#: Priors about zero by the name that they have in a model file.
+NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
+#: Kinds of tests; the key of the measured quantity tells which one a table is.
+_TEST_KINDS: tuple[type[SoilTest], ...] = (PlatePressure, ShearStrength)
 _GEAR_NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 Effects = Mapping[str, type[Effect]]
@@ -107,6 +113,79 @@ def take_instance(cls: type, settings: Settings) -> Any:
         settings.fail(str(error))
     check(made, f"{settings.where}: ")
     return made
+
+
+def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTest, ...]]:
+    """The soil in a table [soil], its priors by name, and the tests in [[soil.test]]."""
+    priors = settings.table("prior")
+    tests = tuple(_take_test(entry) for entry in settings.tables("test"))
+    if "name" in settings:
+        name = settings.text("name")
+        try:
+            base = soil(name)
+        except InputError as error:
+            settings.fail(str(error))
+        values = {
+            key: take_quantity(settings, key, parameter.unit)
+            for key, parameter in declared(Soil).items()
+            if key in settings
+        }
+        settings.permit(declared(Soil))
+        made = with_values(base, values)
+        check(made, f"{settings.where}: ")
+    else:
+        made = take_instance(Soil, settings)
+    settings.finish()
+    return made, take_priors(priors, Soil), tests
+
+
+def _take_test(settings: Settings) -> SoilTest:
+    kinds = [kind for kind in _TEST_KINDS if kind.quantity in settings]
+    if len(kinds) != 1:
+        settings.fail(
+            "needed is pressure (Pa), with plate_width and sinkage, or strength (Pa), with "
+            "normal_stress; and scatter, such as '15 %'"
+        )
+    made: SoilTest = take_instance(kinds[0], settings)
+    settings.finish()
+    return made
+
+
+def take_prior(settings: Settings, key: str, *, unit: str = "1", about_zero: bool = False) -> Prior:
+    """Read `key = [lower, upper]` or `key = { range = [lower, upper], scale = "log" }`.
+
+    With `about_zero`, also a normal prior about zero, `{ normal = 0.2 }`, or its positive half,
+    `{ half-normal = 0.2 }`. Numbers are in the SI unit `unit`, or texts with a unit: "25 deg".
+    """
+    needed = "[lower, upper], or { range = [lower, upper], scale = 'log' }"
+    if about_zero:
+        needed += ", or { normal = std }, or { half-normal = std }"
+    value = settings.take(key, (list, dict), needed)
+    kind = next(iter(value)) if isinstance(value, dict) and len(value) == 1 else None
+    if about_zero and kind in NORMAL:
+        std = (
+            in_si(settings, key, value[kind], unit) if isinstance(value[kind], str) else value[kind]
+        )
+        if isinstance(std, bool) or not isinstance(std, int | float) or not 0.0 < std < math.inf:
+            settings.fail(f"{key}: {kind} is {std!r}; needed is a standard deviation above zero")
+        return NORMAL[kind](float(std))
+    log = False
+    if isinstance(value, dict):
+        log = value.get("scale") == "log"
+        if value.keys() - {"range", "scale"} or value.get("scale", "log") not in ("log", "linear"):
+            settings.fail(f"{key} is {value!r}; needed is {needed}")
+        value = value.get("range")
+    if isinstance(value, list):
+        value = [in_si(settings, key, x, unit) if isinstance(x, str) else x for x in value]
+    numbers = isinstance(value, list) and all(
+        isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in value
+    )
+    if not numbers or len(value) != 2 or not value[0] < value[1]:
+        settings.fail(f"{key} is {value!r}; needed is {needed} with lower below upper")
+    lower, upper = float(value[0]), float(value[1])
+    if log and lower <= 0.0:
+        settings.fail(f"{key}: a logarithmic range must be positive, it begins at {lower:g}")
+    return Prior(lower, upper, log)
 
 
 def _within_bounds(settings: Settings, key: str, prior: Prior, parameter: Parameter) -> Prior:

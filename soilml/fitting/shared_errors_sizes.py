@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.config.sensor_bias import KNOWN_PARTS, common_errors
+from soilml.config.measurement_noise import KNOWN_PARTS, common_errors
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.gears.base import Gear
 from soilml.remarks import Remark

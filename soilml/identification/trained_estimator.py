@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.measurement_noise import common_errors
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
-from soilml.config.sensor_bias import common_errors
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import independent_bound, slip_load_points

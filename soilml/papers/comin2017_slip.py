@@ -20,19 +20,23 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import pull_efficiency
 from soilml.physics.soils import soil
-from soilml.systems.wheel_legs.sensing.simulated_stances import SLIPS, four_soils, midstance_torques
-from soilml.systems.wheel_legs.sensing.slip_fits import (
+from soilml.systems.wheel_legs.slip_models import (
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
     SlipModelFit,
+    TorqueSlip,
+    VibrationSlip,
     fit_torque_slip,
     fit_vibration_slip,
 )
-from soilml.systems.wheel_legs.sensing.slip_models import (
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
-    TorqueSlip,
-    VibrationSlip,
+from soilml.systems.wheel_legs.stances import (
+    GRAVITY,
+    SLIPS,
+    SpringLeg,
+    four_soils,
+    midstance_torques,
+    vibration_amplitude,
 )
-from soilml.systems.wheel_legs.sensing.stick_slip import GRAVITY, SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 

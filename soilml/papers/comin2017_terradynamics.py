@@ -8,21 +8,20 @@ from functools import cache
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.sensing.sinkage_fit import (
-    SimulatedSinkage,
-    SinkageFit,
-    fit_simulated_sinkage,
-    simulate_sinkage,
-)
-from soilml.systems.wheel_legs.walking.gait_metrics import (
+from soilml.systems.wheel_legs.gait_metrics import (
     FeetComparison,
     GaitMetrics,
     compare_feet,
     compare_legs,
     decreasing_until,
 )
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.resistive_force import stress_gains
+from soilml.systems.wheel_legs.resistive_force import LinearGround, stress_gains
+from soilml.systems.wheel_legs.sinkage_fit import (
+    SimulatedSinkage,
+    SinkageFit,
+    fit_simulated_sinkage,
+    simulate_sinkage,
+)
 
 #: Ground for the comparison of numbers of legs: the middle of the paper's range; not printed.
 MIDDLE = LinearGround(stiffness=0.7e6)

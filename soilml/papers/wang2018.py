@@ -11,7 +11,7 @@ from importlib import resources
 import numpy as np
 
 from soilml.physics.soils import soil
-from soilml.systems.tracked_robot.pull_regression import implied_points
+from soilml.systems.tracked_robot.group_identification import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
 #: Slips over which the drawbar pull is averaged as its plateau.

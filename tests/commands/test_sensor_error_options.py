@@ -9,7 +9,7 @@ from conftest import MODEL, simulated_run
 
 from soilml.cli import main
 from soilml.config.case import read_case_of_one_gear
-from soilml.config.sensor_bias import checked_sensors, common_errors, take_bias
+from soilml.config.measurement_noise import checked_sensors, common_errors, take_bias
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.identification.trained_estimator import with_sensors_of

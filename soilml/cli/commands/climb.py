@@ -11,7 +11,7 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import output_files, save_text, write_files
 
 if TYPE_CHECKING:
-    from soilml.systems.climbing.files.report import ClimbingReport
+    from soilml.systems.climbing.report import ClimbingReport
 
 #: Files of the folder of --out.
 FILES = ("report.html", "climb.json", "curve.csv", "climbs.csv")
@@ -91,9 +91,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
     from soilml.report.result_files import json_text, report_texts
     from soilml.systems.climbing.files.presentation import climb_report, climb_text
-    from soilml.systems.climbing.files.read_tables import read_climb_data
-    from soilml.systems.climbing.files.report import climbing_report
-    from soilml.systems.climbing.files.rover_file import read_rover
+    from soilml.systems.climbing.report import climbing_report
+    from soilml.systems.climbing.rover_file import read_rover
+    from soilml.systems.climbing.tables import read_climb_data
 
     folder = args.out is not None and not args.out.lower().endswith(".json")
     if folder:
@@ -135,7 +135,7 @@ def _curve(report: ClimbingReport) -> dict[str, Any]:
 
 
 def _runs(report: ClimbingReport) -> dict[str, Any]:
-    from soilml.systems.climbing.files.report import SPEED_ERROR
+    from soilml.systems.climbing.report import SPEED_ERROR
 
     climbs = report.data.climbs
     return {

@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_long_table
     from soilml.config.case import read_case
-    from soilml.config.sensor_bias import checked_sensors
+    from soilml.config.measurement_noise import checked_sensors
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
 

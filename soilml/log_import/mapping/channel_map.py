@@ -7,8 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from soilml.config.measurement_noise import Noise
-from soilml.config.share_and_constant import take_share_and_constant
+from soilml.config.measurement_noise import Noise, take_share_and_constant
 from soilml.io.toml_settings import Settings
 from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
 from soilml.log_import.units import dimension, factor

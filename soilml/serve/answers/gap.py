@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from soilml.config.case import read_case
-from soilml.config.sensor_bias import checked_sensors
+from soilml.config.measurement_noise import checked_sensors
 from soilml.gap import STATUSES, GapReport, gap
 from soilml.gap.presentation import gap_files
 from soilml.gap.report.page import (

@@ -10,10 +10,9 @@ Source: Nagatani et al., online estimation of climbing ability.
 
 from soilml.numerics.quantiles import quantile_band
 from soilml.systems.climbing.ability import ClimbingAbility, climbing_ability
-from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
+from soilml.systems.climbing.climb import Climb, Rover, Uncertainty, WheelRun
+from soilml.systems.climbing.climb_balances import modulus_per_climb
 from soilml.systems.climbing.identify import GroundEstimate, identify_ground
-from soilml.systems.climbing.rover import Rover
-from soilml.systems.climbing.shear_modulus_per_climb import modulus_per_climb
 from soilml.systems.climbing.simulated_rover import SimulatedRover
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Real
 from soilml.errors import FitError, InputError
-from soilml.systems.climbing.climb import WheelRun
+from soilml.systems.climbing.climb import Rover, WheelRun
 from soilml.systems.climbing.identify import GroundEstimate
-from soilml.systems.climbing.rover import Rover
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 from soilml.systems.climbing.wheel_force_components import ForceComponents, force_components
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.numerics.prior import Prior
-from soilml.systems.climbing.balance_noise import ShearParameters, balance_std
-from soilml.systems.climbing.climb import Climb, Uncertainty
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Climb, Rover, Uncertainty
+from soilml.systems.climbing.climb_balances import ShearParameters, balance_std
 from soilml.systems.climbing.wheel_force_components import (
     ForceComponents,
     force_components,

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Array
-from soilml.systems.climbing.climb import Climb, Uncertainty, WheelRun
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Climb, Rover, Uncertainty, WheelRun
 from soilml.systems.climbing.wheel_force_components import (
     ForceComponents,
     force_components,

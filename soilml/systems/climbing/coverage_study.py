@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from soilml.numerics.quantiles import QUANTILES
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.ability import climbing_ability
+from soilml.systems.climbing.climb import Rover
 from soilml.systems.climbing.identify import identify_ground
-from soilml.systems.climbing.rover import Rover
 from soilml.systems.climbing.simulated_rover import SimulatedRover, StressArc
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 

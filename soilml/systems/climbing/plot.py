@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from soilml.report.figure_style import AFTER, BEFORE, take_axes
 
 if TYPE_CHECKING:
-    from soilml.systems.climbing.files.report import ClimbingReport
+    from soilml.systems.climbing.report import ClimbingReport
 
 #: Width and height of the figure, inches.
 SIZE = (9.0, 3.8)

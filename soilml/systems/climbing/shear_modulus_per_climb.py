@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.numerics.prior import Prior
-from soilml.systems.climbing.balance_likelihood import ForceBalances
-from soilml.systems.climbing.climb import Climb
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Climb, Rover
+from soilml.systems.climbing.climb_balances import ForceBalances
 
 Floats = NDArray[np.float64]
 

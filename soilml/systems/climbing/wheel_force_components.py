@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Array, Real
-from soilml.systems.climbing.climb import WheelRun
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Rover, WheelRun
 from soilml.systems.force_sensor_wheel import forces_from_profile
 
 Floats = NDArray[np.float64]

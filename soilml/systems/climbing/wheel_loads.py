@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.systems.climbing.balance_noise import ShearParameters
-from soilml.systems.climbing.climb import Climb
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Climb, Rover
+from soilml.systems.climbing.climb_balances import ShearParameters
 from soilml.systems.climbing.wheel_force_components import force_components, shared_magnification
 
 #: Smallest range of tan(slope) from which the height of the centre of mass is estimated.

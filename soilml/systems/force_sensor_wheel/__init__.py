@@ -7,14 +7,21 @@ the force balance of a `SteadyRun`, and `predict_pull` predicts the pull at anot
 Nagatani, Ikeda, Sato and Yoshida, IROS 2009.
 """
 
-from soilml.systems.force_sensor_wheel.bekker_profile import bekker_stress_profile
-from soilml.systems.force_sensor_wheel.bin_average import BinnedStress, bin_stress
 from soilml.systems.force_sensor_wheel.deconvolution import deconvolve
-from soilml.systems.force_sensor_wheel.force_balance import BalanceSolution, solve_force_balance
+from soilml.systems.force_sensor_wheel.force_balance import (
+    BalanceSolution,
+    ShearStrength,
+    SteadyRun,
+    balanced_arc,
+    parabolic_arc,
+    solve_force_balance,
+)
 from soilml.systems.force_sensor_wheel.pull_prediction import PullPrediction, predict_pull
-from soilml.systems.force_sensor_wheel.sensor_model import (
+from soilml.systems.force_sensor_wheel.sensor_readings import (
+    BinnedStress,
     SensingWheel,
     SensorReadings,
+    bin_stress,
     simulate_readings,
 )
 from soilml.systems.force_sensor_wheel.shear_modulus import (
@@ -22,9 +29,7 @@ from soilml.systems.force_sensor_wheel.shear_modulus import (
     estimate_shear_modulus,
     profile_from_readings,
 )
-from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
-from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
-from soilml.systems.force_sensor_wheel.synthetic_arc import balanced_arc, parabolic_arc
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile, bekker_stress_profile
 from soilml.systems.force_sensor_wheel.wheel_forces import WheelForces, forces_from_profile
 
 __all__ = [

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.systems.force_sensor_wheel.sensor_model import Floats, SensingWheel, SensorReadings
+from soilml.systems.force_sensor_wheel.sensor_readings import Floats, SensingWheel, SensorReadings
 
 
 @dataclass(frozen=True)

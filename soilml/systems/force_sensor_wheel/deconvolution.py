@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.bin_average import BinnedStress
-from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel
+from soilml.systems.force_sensor_wheel.sensor_readings import BinnedStress, SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 
 #: Fewest bins that show a shape of seven numbers.

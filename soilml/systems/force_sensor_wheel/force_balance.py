@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel
-from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
+from soilml.systems.force_sensor_wheel.force_balance import ShearStrength, SteadyRun
+from soilml.systems.force_sensor_wheel.sensor_readings import SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 from soilml.systems.force_sensor_wheel.wheel_forces import ShearInputs, integrate_profile
 

@@ -7,23 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.bin_average import bin_stress
 from soilml.systems.force_sensor_wheel.deconvolution import fit_stress_arc
-from soilml.systems.force_sensor_wheel.force_balance import solve_vertical_balance
-from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel, SensorReadings
-from soilml.systems.force_sensor_wheel.shear_modulus import (
-    ShearModulusEstimate,
-    profile_from_readings,
+from soilml.systems.force_sensor_wheel.force_balance import (
+    ShearStrength,
+    SteadyRun,
+    solve_vertical_balance,
 )
-from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
-from soilml.systems.force_sensor_wheel.uncertainty import (
+from soilml.systems.force_sensor_wheel.sensor_readings import (
+    SensingWheel,
+    SensorReadings,
+    bin_stress,
+)
+from soilml.systems.force_sensor_wheel.shear_modulus import (
     STEP_IN_STD,
+    ShearModulusEstimate,
     delta_method_covariance,
     effective_degrees_of_freedom,
     jackknife_covariance,
+    profile_from_readings,
     student_t_quantile,
 )
+from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 
 #: Above this slip the measured k_x dropped to a third of its value at small slip (Table I).
 MAX_VALID_SLIP = 0.5

@@ -7,18 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.systems.force_sensor_wheel.bin_average import bin_stress
 from soilml.systems.force_sensor_wheel.deconvolution import deconvolve, fit_stress_arc
-from soilml.systems.force_sensor_wheel.force_balance import solve_force_balance
-from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel, SensorReadings
-from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
-from soilml.systems.force_sensor_wheel.uncertainty import (
+from soilml.systems.force_sensor_wheel.force_balance import (
+    ShearStrength,
+    SteadyRun,
+    solve_force_balance,
+)
+from soilml.systems.force_sensor_wheel.sensor_readings import (
+    SensingWheel,
+    SensorReadings,
+    bin_stress,
+)
+from soilml.systems.force_sensor_wheel.shear_modulus import (
     delta_method_covariance,
     effective_degrees_of_freedom,
     jackknife_covariance,
     student_t_quantile,
 )
+from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 
 #: Standard deviation of ln k_x for stress shapes that `deconvolve` does not represent: skewed
 #: parabolas and Bekker's wedges were recovered within 3 %.

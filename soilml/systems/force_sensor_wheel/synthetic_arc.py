@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.force_balance import excess_pull
-from soilml.systems.force_sensor_wheel.sensor_model import SensingWheel
-from soilml.systems.force_sensor_wheel.steady_run import ShearStrength, SteadyRun
+from soilml.systems.force_sensor_wheel.force_balance import ShearStrength, SteadyRun, excess_pull
+from soilml.systems.force_sensor_wheel.sensor_readings import SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
 #: Bisection steps for the middle of an arc.

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.sensor_model import SensorReadings
-from soilml.systems.force_sensor_wheel.steady_run import SteadyRun
+from soilml.systems.force_sensor_wheel.force_balance import SteadyRun
+from soilml.systems.force_sensor_wheel.sensor_readings import SensorReadings
 from soilml.systems.force_sensor_wheel.stress_profile import Floats
 
 #: Step of the central differences, in standard deviations of the measured quantity: large enough

@@ -6,8 +6,12 @@ and `identify_groups` the soil parameters from groups of pulls. `low_pass`, `sta
 Source: Wang, Yan and Du, J. Terramechanics 77, 2018.
 """
 
-from soilml.systems.tracked_robot.group_identification import GroupFits, identify_groups
-from soilml.systems.tracked_robot.pull_regression import Regression, linear_regression
+from soilml.systems.tracked_robot.group_identification import (
+    GroupFits,
+    Regression,
+    identify_groups,
+    linear_regression,
+)
 from soilml.systems.tracked_robot.robot import (
     BEYOND_PEAK,
     GROUSERS,

@@ -6,28 +6,28 @@ slip models `TORQUE_SLIP` and `VIBRATION_SLIP`, `soil_from_torque`, `soil_from_v
 IEEE Transactions on Robotics 33(6), 2017.
 """
 
-from soilml.systems.wheel_legs.sensing.sinkage_fit import SinkageFit, fit_sinkage
-from soilml.systems.wheel_legs.sensing.slip_models import (
+from soilml.systems.wheel_legs.gait_metrics import GaitMetrics, gait_metrics
+from soilml.systems.wheel_legs.geometry import FEET, WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.integrator import WalkStatus
+from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
+from soilml.systems.wheel_legs.sinkage_fit import SinkageFit, fit_sinkage
+from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
     TorqueSlip,
     VibrationSlip,
 )
-from soilml.systems.wheel_legs.sensing.soil_from_slip import (
+from soilml.systems.wheel_legs.soil_from_slip import (
     LegSoil,
     soil_from_torque,
     soil_from_vibration,
 )
-from soilml.systems.wheel_legs.sensing.stick_slip import (
+from soilml.systems.wheel_legs.stances import (
     SpringLeg,
     simulate_stance,
     vibration_amplitude,
 )
-from soilml.systems.wheel_legs.walking.gait_metrics import GaitMetrics, gait_metrics
-from soilml.systems.wheel_legs.walking.geometry import FEET, WheelLeg, wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS, LinearGround
-from soilml.systems.wheel_legs.walking.trajectory import WalkStatus
-from soilml.systems.wheel_legs.walking.walk import Walk, walk
+from soilml.systems.wheel_legs.walk import Walk, walk
 
 __all__ = [
     "FEET",

@@ -135,7 +135,7 @@ def test_torque_from_current_with_its_uncertainties(tmp_path):
 
 def test_the_bias_is_read_by_estimate(tmp_path, model_file):
     from soilml.config.case import read_case_of_one_gear
-    from soilml.config.sensor_bias import checked_sensors
+    from soilml.config.measurement_noise import checked_sensors
 
     path, _ = log_of(np.random.default_rng(24), tmp_path / "log.csv")
     content = MAP | SPEEDS | {"wheel": {"radius": "0.15 m +- 1 %"}}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.physics.contact import Force

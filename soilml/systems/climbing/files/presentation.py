@@ -12,8 +12,8 @@ from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.parameter_lines import ParameterLine, parameter_lines, parameter_table
 from soilml.report.terminal import rounded, shown_unit, significant
-from soilml.systems.climbing.files.report import ClimbingReport
 from soilml.systems.climbing.plot import SIZE
+from soilml.systems.climbing.report import ClimbingReport
 
 #: Number of slips in the printed curve.
 PRINTED_SLIPS = 9

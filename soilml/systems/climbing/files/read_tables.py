@@ -11,8 +11,7 @@ from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
-from soilml.systems.climbing.climb import Climb, WheelRun
-from soilml.systems.climbing.rover import WHEELS
+from soilml.systems.climbing.climb import WHEELS, Climb, WheelRun
 from soilml.systems.force_sensor_wheel import StressProfile
 
 Floats = NDArray[np.float64]

@@ -17,11 +17,11 @@ from soilml.systems.climbing.ability import (
     climbing_ability,
     shared_slips,
 )
-from soilml.systems.climbing.files.read_tables import ClimbData
-from soilml.systems.climbing.files.rover_file import RoverFile
+from soilml.systems.climbing.climb_balances import modulus_per_climb
 from soilml.systems.climbing.identify import GroundEstimate, identify_ground
-from soilml.systems.climbing.shear_modulus_per_climb import modulus_per_climb
+from soilml.systems.climbing.rover_file import RoverFile
 from soilml.systems.climbing.stress_by_slip import StressBySlip
+from soilml.systems.climbing.tables import ClimbData
 
 Floats = NDArray[np.float64]
 

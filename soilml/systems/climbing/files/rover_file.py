@@ -7,13 +7,12 @@ from dataclasses import dataclass, fields
 from typing import Annotated, final
 
 from soilml.config.measurement_noise import Noise, take_noise
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared
-from soilml.systems.climbing.climb import Uncertainty
-from soilml.systems.climbing.rover import Rover
+from soilml.systems.climbing.climb import Rover, Uncertainty
 
 #: Noise of the stress where [noise] has no normal_Pa.
 DEFAULT_STRESS_NOISE = Noise(share=0.05)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from soilml.systems.climbing.climb import Climb, WheelRun
-from soilml.systems.climbing.rover import WHEELS
+from soilml.systems.climbing.climb import WHEELS, Climb, WheelRun
 
 Columns = dict[str, list[Any]]
 

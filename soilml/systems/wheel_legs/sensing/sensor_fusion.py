@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from soilml.errors import FitError
 from soilml.onboard.fusion_rules import FusedEstimate, best_linear, inverse_variance, pairwise
-from soilml.systems.wheel_legs.sensing.simulated_stances import StanceReadings
-from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, PRESSURE
+from soilml.systems.wheel_legs.slip_models import GRAVITY, PRESSURE
+from soilml.systems.wheel_legs.stances import StanceReadings
 
 Floats = NDArray[np.float64]
 Rule = Callable[[Floats, Floats, Floats | None], FusedEstimate]

@@ -12,7 +12,7 @@ from soilml.physics.gears.wheel_leg_foot import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil, soil
-from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, vibration_amplitude
+from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 

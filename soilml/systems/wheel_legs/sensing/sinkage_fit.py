@@ -9,10 +9,10 @@ import numpy as np
 
 from soilml.arrays import Array, Real
 from soilml.errors import FitError, InputError
-from soilml.systems.wheel_legs.walking.gait_metrics import gait_metrics
-from soilml.systems.wheel_legs.walking.geometry import WheelLeg, wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS, LinearGround
-from soilml.systems.wheel_legs.walking.walk import walk
+from soilml.systems.wheel_legs.gait_metrics import gait_metrics
+from soilml.systems.wheel_legs.geometry import WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
+from soilml.systems.wheel_legs.walk import walk
 
 #: Stiffness of a soil poured loose, raked and vibrated, relative to the raked state; the paper
 #: prints the raked state only, the other two are assumed.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError
-from soilml.systems.wheel_legs.sensing.slip_models import (
+from soilml.systems.wheel_legs.slip_models import (
     GRAVITY,
     PRESSURE,
     STIFFNESS,

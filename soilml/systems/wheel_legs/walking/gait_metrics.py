@@ -10,9 +10,9 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.errors import InputError
-from soilml.systems.wheel_legs.walking.geometry import FEET, MAX_LEGS, wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.walk import Walk, walk
+from soilml.systems.wheel_legs.geometry import FEET, MAX_LEGS, wheel_leg
+from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.walk import Walk, walk
 
 #: Stiffnesses over which the paper compares feet, N/m^3: alpha_z from 0.4 to 1.0 N/cm^3.
 STIFFNESSES = (0.4e6, 0.6e6, 0.8e6, 1.0e6)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.walking.geometry import WheelLeg
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.resistive_force import resistance_terms
+from soilml.systems.wheel_legs.geometry import WheelLeg
+from soilml.systems.wheel_legs.resistive_force import LinearGround, resistance_terms
 
 #: Depth over which the offset of the normal stress builds up, m, so that the force is continuous.
 SKIN = 0.001

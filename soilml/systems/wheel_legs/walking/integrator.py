@@ -9,7 +9,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.walking.ground_reaction import (
+from soilml.systems.wheel_legs.ground_reaction import (
     GroundReaction,
     PlateBatch,
     ground_reaction,

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.walking.geometry import WheelLeg
-from soilml.systems.wheel_legs.walking.ground_reaction import SKIN, batch_plates
-from soilml.systems.wheel_legs.walking.integrator import FADING
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.resistive_force import resistance
-from soilml.systems.wheel_legs.walking.walk import Walk
+from soilml.systems.wheel_legs.geometry import WheelLeg
+from soilml.systems.wheel_legs.ground_reaction import SKIN, batch_plates
+from soilml.systems.wheel_legs.integrator import FADING
+from soilml.systems.wheel_legs.resistive_force import LinearGround, resistance
+from soilml.systems.wheel_legs.walk import Walk
 
 
 @dataclass(frozen=True)

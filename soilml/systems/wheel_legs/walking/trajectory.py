@@ -8,8 +8,8 @@ from enum import IntEnum
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.walking.ground_reaction import PlateBatch, ground_reaction
-from soilml.systems.wheel_legs.walking.integrator import (
+from soilml.systems.wheel_legs.ground_reaction import PlateBatch, ground_reaction
+from soilml.systems.wheel_legs.integrator import (
     GRAVITY,
     DriveParameters,
     HubState,

@@ -9,17 +9,18 @@ import numpy as np
 
 from soilml.arrays import Array, Real
 from soilml.errors import InputError
-from soilml.systems.wheel_legs.walking.geometry import WheelLeg
-from soilml.systems.wheel_legs.walking.ground_reaction import batch_plates
-from soilml.systems.wheel_legs.walking.integrator import (
+from soilml.systems.wheel_legs.geometry import WheelLeg
+from soilml.systems.wheel_legs.ground_reaction import batch_plates
+from soilml.systems.wheel_legs.integrator import (
     FADING,
     DriveParameters,
     StepMethod,
+    WalkSimulation,
+    WalkStatus,
     implicit_step,
     nearest_attack,
 )
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.trajectory import WalkSimulation, WalkStatus
+from soilml.systems.wheel_legs.resistive_force import LinearGround
 
 
 @dataclass(frozen=True)

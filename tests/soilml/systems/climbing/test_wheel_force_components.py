@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from soilml.systems.climbing.climb_balances import balance_std
 
 from soilml.errors import InputError
 from soilml.systems.climbing import Rover, SimulatedRover, Uncertainty
 from soilml.systems.climbing.ability import slope_pull
-from soilml.systems.climbing.balance_noise import balance_std
-from soilml.systems.climbing.wheel_force_components import force_components, pull_of_rover
-from soilml.systems.climbing.wheel_loads import estimate_wheel_loads
+from soilml.systems.climbing.wheel_force_components import (
+    estimate_wheel_loads,
+    force_components,
+    pull_of_rover,
+)
 from soilml.systems.force_sensor_wheel import forces_from_profile
 
 EXACT = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0)

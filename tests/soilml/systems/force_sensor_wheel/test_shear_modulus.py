@@ -25,7 +25,7 @@ from soilml.systems.force_sensor_wheel import (
     simulate_readings,
     solve_force_balance,
 )
-from soilml.systems.force_sensor_wheel.uncertainty import jackknife_covariance, student_t_quantile
+from soilml.systems.force_sensor_wheel.shear_modulus import jackknife_covariance, student_t_quantile
 
 NOISY = SensingWheel()
 QUIET = replace(NOISY, noise=0.0)

@@ -12,10 +12,10 @@ from soilml.numerics.prior import Prior
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
     identify_groups,
+    linear_regression,
     predicted_pull,
     simulate_group,
 )
-from soilml.systems.tracked_robot.pull_regression import linear_regression
 from soilml.systems.tracked_robot.robot import WANG2018
 
 pytestmark = pytest.mark.slow

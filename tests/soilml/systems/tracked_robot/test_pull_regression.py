@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from soilml.errors import FitError, InputError
-from soilml.systems.tracked_robot.pull_regression import implied_points, linear_regression
+from soilml.systems.tracked_robot.group_identification import implied_points, linear_regression
 
 
 def test_the_line_is_that_of_scipy():

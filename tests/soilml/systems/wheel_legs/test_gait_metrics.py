@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-
-from soilml.systems.wheel_legs.walking.gait_metrics import (
+from soilml.systems.wheel_legs.gait_metrics import (
     compare_feet,
     compare_legs,
     decreasing_until,
     gait_metrics,
 )
-from soilml.systems.wheel_legs.walking.geometry import wheel_leg
-from soilml.systems.wheel_legs.walking.linear_ground import LinearGround
-from soilml.systems.wheel_legs.walking.walk import walk
+from soilml.systems.wheel_legs.geometry import wheel_leg
+from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.walk import walk
 
 pytestmark = pytest.mark.slow
 

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-
-from soilml.errors import FitError
-from soilml.systems.wheel_legs.sensing.sensor_fusion import (
+from soilml.systems.wheel_legs.sensor_fusion import (
     PROPERTIES,
     RULES,
     SENSORS,
     fit_estimators,
     score_estimators,
 )
-from soilml.systems.wheel_legs.sensing.simulated_stances import simulate_stances
+from soilml.systems.wheel_legs.stances import simulate_stances
+
+from soilml.errors import FitError
 
 LEARN, HOLD = simulate_stances(300, seed=1), simulate_stances(300, seed=7)
 

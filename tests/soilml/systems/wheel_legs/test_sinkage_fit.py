@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-
-from soilml.errors import FitError, InputError
-from soilml.systems.wheel_legs.sensing.sinkage_fit import (
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.sinkage_fit import (
     SinkageFit,
     fit_simulated_sinkage,
     fit_sinkage,
     simulate_sinkage,
 )
-from soilml.systems.wheel_legs.walking.linear_ground import GROUNDS
+
+from soilml.errors import FitError, InputError
 
 pytestmark = pytest.mark.slow
 

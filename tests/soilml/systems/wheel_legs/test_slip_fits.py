@@ -2,20 +2,21 @@
 
 import numpy as np
 import pytest
-
-from soilml.errors import FitError
-from soilml.systems.wheel_legs.sensing.simulated_stances import (
+from soilml.systems.wheel_legs.slip_models import (
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
+    fit_lines,
+    fit_torque_slip,
+    fit_vibration_slip,
+)
+from soilml.systems.wheel_legs.stances import (
     SLIPS,
     four_soils,
     midstance_torques,
     sample_soils,
 )
-from soilml.systems.wheel_legs.sensing.slip_fits import (
-    fit_lines,
-    fit_torque_slip,
-    fit_vibration_slip,
-)
-from soilml.systems.wheel_legs.sensing.slip_models import TORQUE_SLIP, VIBRATION_SLIP
+
+from soilml.errors import FitError
 
 GRID = [v.ravel() for v in np.meshgrid(np.deg2rad([20.0, 30.0, 40.0]), [700.0, 800.0, 900.0])]
 SANDS = sample_soils(12, seed=2)

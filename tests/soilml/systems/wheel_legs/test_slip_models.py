@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-
-from soilml.errors import InputError
-from soilml.systems.wheel_legs.sensing.simulated_stances import four_soils
-from soilml.systems.wheel_legs.sensing.slip_models import (
+from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
     soil_spring,
     spring_soil,
 )
+from soilml.systems.wheel_legs.stances import four_soils
+
+from soilml.errors import InputError
 
 KNOWN = four_soils()
 ANGLE, STIFFNESS = KNOWN.soil.friction_angle, KNOWN.normal_stiffness

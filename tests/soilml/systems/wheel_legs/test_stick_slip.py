@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from soilml.errors import InputError
-from soilml.systems.wheel_legs.sensing import stick_slip
-from soilml.systems.wheel_legs.sensing.stick_slip import (
+from soilml.systems.wheel_legs.stances import (
     GRAVITY,
     SpringLeg,
     simulate_stance,
     vibration_amplitude,
 )
+
+from soilml.errors import InputError
+from soilml.systems.wheel_legs.sensing import stick_slip
 
 LEG = SpringLeg(stiffness=4000.0, bending=0.5)
 PHI, GAP = np.deg2rad(40.0), np.deg2rad(10.0)
