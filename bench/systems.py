@@ -6,16 +6,16 @@ import math
 import time
 
 import numpy as np
+from climbing_coverage import simulate_coverage
 from numpy.typing import NDArray
+
+from soilml import Midstance, Model, Operating, Wheel, soil
+from soilml.io.text_tables import format_table
+from soilml.systems.tracked_robot.robot import WANG2018
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.integrator import explicit_step
 from soilml.systems.wheel_legs.resistive_force import LinearGround
 from soilml.systems.wheel_legs.walk import walk
-
-from soilml import Midstance, Model, Operating, Wheel, soil
-from soilml.io.text_tables import format_table
-from soilml.systems.climbing.coverage_study import simulate_coverage
-from soilml.systems.tracked_robot.robot import WANG2018
 
 ROWS = 50_000
 #: Steps per turn of the paper (1e-4 s at 0.3 rad/s), and a vanishing speed of regularisation.

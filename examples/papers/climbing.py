@@ -10,13 +10,13 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from soilml.systems.climbing.tables import climb_tables
 
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
 from soilml.systems.climbing import SimulatedRover, modulus_per_climb
 from soilml.systems.climbing.climb import Climb, WheelRun
 from soilml.systems.climbing.simulated_rover import ARTIFICIAL_SLIPS, SLOPES
+from soilml.systems.climbing.tables import climb_tables
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt

@@ -15,8 +15,8 @@ from soilml.gap import gap
 from soilml.io.text_tables import format_table
 from soilml.numerics.prior import Prior
 from soilml.systems.force_sensor_wheel import (
+    MohrCoulomb,
     SensingWheel,
-    ShearStrength,
     SteadyRun,
     StressProfile,
     balanced_arc,
@@ -35,7 +35,7 @@ import matplotlib.pyplot as plt
 
 OUT = Path("demo/papers")
 SAND = soil("nagatani2009/toyoura_sand")
-STRENGTH = ShearStrength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
+STRENGTH = MohrCoulomb(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
 SENSORS = SensingWheel()
 WHEEL = Wheel(radius=SENSORS.radius, width=SENSORS.width)
 WEIGHT, TRUE = 28.92, float(SAND.shear_modulus)

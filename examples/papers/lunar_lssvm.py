@@ -93,7 +93,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
     width = ", ".join(f"{100 * w:.0f} %" for w in joint.std / joint.prior_std)
     print("\nAll have one load: cohesion and friction angle are confounded. Pooled, the LS-SVM")
     print(f"leaves {width} of the prior's widths, and")
-    print(f"least squares reports: {'; '.join(least.warnings) or 'no warning'}")
+    print(f"least squares reports: {'; '.join(map(str, least.warnings)) or 'no warning'}")
     found = {
         "prior": mean_and_interval(
             wheel_forces(case, soils(case, 1000, rng)[:, None, :], slip, LOAD).drawbar_pull

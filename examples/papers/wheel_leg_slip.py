@@ -10,6 +10,15 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
+
+from soilml import Model, Operating, Wheel, soil
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
+from soilml.gap import gap
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+from soilml.papers import comin2017_slip as chapter
+from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.sensor_fusion import (
@@ -39,15 +48,6 @@ from soilml.systems.wheel_legs.stances import (
     vibration_amplitude,
 )
 from soilml.systems.wheel_legs.walk import walk
-
-from soilml import Model, Operating, Wheel, soil
-from soilml.config.case import Case
-from soilml.config.measurement_noise import Noise
-from soilml.gap import gap
-from soilml.io.table import Table
-from soilml.numerics.prior import Prior
-from soilml.papers import comin2017_slip as chapter
-from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import soil
 from soilml.systems.force_sensor_wheel import (
+    MohrCoulomb,
     SensingWheel,
-    ShearStrength,
     SteadyRun,
     StressProfile,
     balanced_arc,
@@ -30,7 +30,7 @@ SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
 #: Shift of the exit towards the entry that leaves 30 of 70 degrees, rounded as in the effect.
 SHIFT = 0.57
 WHEEL, SAND = SensingWheel(noise=0.0), soil("nagatani2009/toyoura_sand")
-STRENGTH = ShearStrength(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
+STRENGTH = MohrCoulomb(friction_angle=SAND.friction_angle, cohesion=SAND.cohesion)
 WEIGHT = 28.92
 
 

@@ -5,12 +5,12 @@ import json
 
 import numpy as np
 import pytest
-from soilml.systems.climbing.tables import climb_tables, read_climb_data
 
 from soilml.cli import main
 from soilml.config.measurement_noise import Noise
 from soilml.io.text_tables import csv_text
 from soilml.systems.climbing import SimulatedRover
+from soilml.systems.climbing.tables import climb_tables, read_climb_data
 
 ROVER = """\
 [rover]

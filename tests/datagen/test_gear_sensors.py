@@ -5,8 +5,6 @@ import json
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from soilml.systems.wheel_legs.slip_models import spring_soil
-from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
 
 from datagen.gear_sensors import normal_stiffness
 from datagen.generate import generate
@@ -14,6 +12,8 @@ from datagen.recipe import read_recipe
 from datagen.simulation import sample_rows, simulate_rows
 from soilml import read_table, soil
 from soilml.errors import InputError
+from soilml.systems.wheel_legs.slip_models import spring_soil
+from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
 
 RECIPE = """\
 rows = {rows}

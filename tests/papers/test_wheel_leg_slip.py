@@ -5,10 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from soilml.systems.wheel_legs.geometry import wheel_leg
-from soilml.systems.wheel_legs.resistive_force import GROUNDS
-from soilml.systems.wheel_legs.stances import FOOT
-from soilml.systems.wheel_legs.walk import walk
 
 from soilml import Model, Operating, soil
 from soilml.config.case import Case
@@ -18,6 +14,10 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.fusion_rules import pairwise
 from soilml.physics.pull_efficiency import CLASSES
+from soilml.systems.wheel_legs.geometry import wheel_leg
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.stances import FOOT
+from soilml.systems.wheel_legs.walk import walk
 
 ROOT = Path(__file__).parents[2]
 SAND = soil("comin2017/ssc-2", shear_modulus=0.017 * FOOT.area**0.5)

@@ -14,8 +14,8 @@ from soilml.identification.fit_result import Fit
 from soilml.numerics.prior import Prior
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, SHEAR, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
-from soilml.systems.climbing.climb import Climb, Rover, Uncertainty, group_by_slope
-from soilml.systems.climbing.climb_balances import ForceBalances, ShearParameters
+from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, Uncertainty, group_by_slope
+from soilml.systems.climbing.climb_balances import ForceBalances
 from soilml.systems.climbing.soil_sampling import SoilPosterior, SoilSampler
 from soilml.systems.climbing.wheel_force_components import estimate_wheel_loads
 

@@ -11,8 +11,14 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.systems.climbing.ability import slope_pull
-from soilml.systems.climbing.climb import WHEELS, Climb, Rover, Uncertainty, WheelRun
-from soilml.systems.climbing.climb_balances import ShearParameters
+from soilml.systems.climbing.climb import (
+    WHEELS,
+    Climb,
+    Rover,
+    ShearParameters,
+    Uncertainty,
+    WheelRun,
+)
 from soilml.systems.climbing.wheel_force_components import force_components
 from soilml.systems.force_sensor_wheel import StressProfile
 

@@ -13,8 +13,8 @@ from soilml.errors import FitError, InputError
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.prior import Prior
 from soilml.quantities import SHEAR
-from soilml.systems.climbing.climb import Uncertainty
-from soilml.systems.climbing.climb_balances import ForceBalances, ShearParameters
+from soilml.systems.climbing.climb import ShearParameters, Uncertainty
+from soilml.systems.climbing.climb_balances import ForceBalances
 
 Floats = NDArray[np.float64]
 

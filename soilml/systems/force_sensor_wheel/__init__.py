@@ -10,7 +10,7 @@ Nagatani, Ikeda, Sato and Yoshida, IROS 2009.
 from soilml.systems.force_sensor_wheel.deconvolution import deconvolve
 from soilml.systems.force_sensor_wheel.force_balance import (
     BalanceSolution,
-    ShearStrength,
+    MohrCoulomb,
     SteadyRun,
     balanced_arc,
     parabolic_arc,
@@ -35,11 +35,11 @@ from soilml.systems.force_sensor_wheel.wheel_forces import WheelForces, forces_f
 __all__ = [
     "BalanceSolution",
     "BinnedStress",
+    "MohrCoulomb",
     "PullPrediction",
     "SensingWheel",
     "SensorReadings",
     "ShearModulusEstimate",
-    "ShearStrength",
     "SteadyRun",
     "StressProfile",
     "WheelForces",

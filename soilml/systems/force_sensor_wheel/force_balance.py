@@ -4,15 +4,51 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Real
 from soilml.errors import FitError
-from soilml.systems.force_sensor_wheel.force_balance import ShearStrength, SteadyRun
+from soilml.parameters import Parameter, check
+from soilml.physics.operating_point import MOST_SLIP
 from soilml.systems.force_sensor_wheel.sensor_readings import SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
 from soilml.systems.force_sensor_wheel.wheel_forces import ShearInputs, integrate_profile
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class SteadyRun:
+    """A steady run up a slope, with the standard deviations of the measured quantities.
+
+    The wheel carries weight cos(slope) and pulls weight sin(slope): Nagatani et al. 2009, eqs. 14
+    and 15. Valid for a rover whose wheels share weight and pull equally.
+    """
+
+    slip: Annotated[Real, Parameter("1", -MOST_SLIP, MOST_SLIP, "slip ratio")]
+    weight: Annotated[Real, Parameter("N", 1e-6, 1e7, "m g, on this wheel")]
+    slope: Annotated[Real, Parameter("rad", -1.2, 1.2, "alpha, uphill positive")] = 0.0
+    slip_std: Annotated[Real, Parameter("1", 0.0, 1.0)] = 0.0
+    weight_std: Annotated[Real, Parameter("N", 0.0, 1e7)] = 0.0
+    slope_std: Annotated[Real, Parameter("rad", 0.0, 1.2)] = 0.0
+
+    def __post_init__(self) -> None:
+        check(self, "run: ")
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class MohrCoulomb:
+    """Shear strength parameters of the soil, which must be known beforehand."""
+
+    friction_angle: Annotated[Real, Parameter("rad", 0.0, 1.4, "phi")]
+    cohesion: Annotated[Real, Parameter("Pa", 0.0, 1e6, "c")] = 0.0
+
+    def __post_init__(self) -> None:
+        check(self, "strength: ")
+
 
 #: Range of shear moduli searched, m: at the lower end the shear strength is mobilised at once, at
 #: the upper end practically no shear is mobilised within the contact of any wheel.
@@ -31,7 +67,7 @@ class BalanceSolution:
 
 
 def solve_force_balance(
-    profile: StressProfile, at: SteadyRun, wheel: SensingWheel, strength: ShearStrength
+    profile: StressProfile, at: SteadyRun, wheel: SensingWheel, strength: MohrCoulomb
 ) -> BalanceSolution:
     r"""Solve the vertical and the horizontal force balance of a wheel on a slope for M and k_x.
 
@@ -69,7 +105,7 @@ def solve_force_balance(
     --------
     >>> import math
     >>> run = SteadyRun(slip=0.29, weight=28.92, slope=math.radians(4.0))
-    >>> wheel, sand = SensingWheel(), ShearStrength(friction_angle=math.radians(38.0))
+    >>> wheel, sand = SensingWheel(), MohrCoulomb(friction_angle=math.radians(38.0))
     >>> from soilml.systems.force_sensor_wheel import balanced_arc
     >>> arc = balanced_arc(math.radians(30.0), run, wheel, sand, shear_modulus=0.0072)
     >>> solution = solve_force_balance(arc, run, wheel, sand)
@@ -105,7 +141,7 @@ def excess_pull(
     profile: StressProfile,
     at: SteadyRun,
     wheel: SensingWheel,
-    strength: ShearStrength,
+    strength: MohrCoulomb,
     modulus: Floats,
 ) -> tuple[Floats, Floats]:
     """Drawbar pull (N) beyond what the slope requires, and M, at shear moduli (m), (n,).
@@ -121,7 +157,7 @@ def solve_vertical_balance(
     profile: StressProfile,
     at: SteadyRun,
     wheel: SensingWheel,
-    strength: ShearStrength,
+    strength: MohrCoulomb,
     modulus: Floats,
 ) -> tuple[Floats, Floats]:
     """M that carries the weight at shear moduli (m), (n,), and the drawbar pull (N) with that M.
@@ -171,3 +207,61 @@ def _no_solution(excess: Floats, at: SteadyRun) -> str:
         f"slope requires {required:.3g} N: the stress is too far back; check the zero of the "
         "angle, that forward is positive, and the sign of the slope"
     )
+
+
+#: Bisection steps for the middle of an arc.
+HALVINGS = 40
+
+
+def parabolic_arc(
+    middle: float, length: float, peak: float, lean: float = 0.0, points: int = 201
+) -> StressProfile:
+    r"""A parabola of normal stress over an arc of the rim, optionally skewed forward.
+
+    .. math::
+        \sigma = \sigma_p (1 - u^2)(1 + \lambda u), \quad u = 2 (\theta - \theta_c) / l
+
+    `middle` and `length` in rad, `peak` (Pa) the stress at the middle, `lean` from -1 to 1. The
+    shape is our choice: Nagatani et al. 2009 print the length of the arc (section IV), and its
+    shape only as a figure.
+    """
+    u = np.linspace(-1.0, 1.0, points)
+    normal = peak * (1.0 - u**2) * (1.0 + lean * u)
+    return StressProfile(middle + 0.5 * length * u, np.maximum(normal, 0.0))
+
+
+def balanced_arc(
+    length: float,
+    at: SteadyRun,
+    wheel: SensingWheel,
+    strength: MohrCoulomb,
+    shear_modulus: float,
+    lean: float = 0.0,
+) -> StressProfile:
+    """The arc of this length (rad) that satisfies both force balances of the run.
+
+    The further forward an arc is, the smaller its pull: its middle is found by bisection over all
+    positions below the axle, its magnitude from the load. Nagatani et al. 2009 print k_x and the
+    length of the arc but not its position; this is the position consistent with both. Raises
+    `FitError` if there is none.
+    """
+    modulus = np.asarray([shear_modulus])
+
+    def excess_and_size(middle: float) -> tuple[float, float]:
+        arc = parabolic_arc(middle, length, 1.0, lean)
+        pull, size = excess_pull(arc, at, wheel, strength, modulus)
+        return float(pull[0]), float(size[0])
+
+    def too_far_back(middle: float) -> bool:
+        return not excess_and_size(middle)[0] <= 0.0  # NaN where its shear pulls the wheel down
+
+    rear, front = -0.45 * np.pi + 0.5 * length, 0.45 * np.pi - 0.5 * length
+    if not rear < front or not too_far_back(rear) or too_far_back(front):
+        raise FitError(
+            f"no position of an arc of {length:g} rad lets the wheel pull "
+            f"{float(at.weight) * np.sin(at.slope):.3g} N at slip {float(at.slip):g}"
+        )
+    for _ in range(HALVINGS):
+        middle = 0.5 * (rear + front)
+        rear, front = (middle, front) if too_far_back(middle) else (rear, middle)
+    return parabolic_arc(front, length, excess_and_size(front)[1], lean)

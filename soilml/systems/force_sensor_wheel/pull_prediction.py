@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.errors import FitError
+from soilml.remarks import Remark
 from soilml.systems.force_sensor_wheel.deconvolution import fit_stress_arc
 from soilml.systems.force_sensor_wheel.force_balance import (
-    ShearStrength,
+    MohrCoulomb,
     SteadyRun,
     solve_vertical_balance,
 )
@@ -41,7 +42,7 @@ class PullPrediction:
     std: float
     magnification: float
     degrees_of_freedom: float  # of the variance of the drawbar pull
-    warnings: tuple[str, ...]
+    warnings: tuple[Remark, ...]
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -54,7 +55,7 @@ def predict_pull(
     readings: SensorReadings,
     at: SteadyRun,
     wheel: SensingWheel,
-    strength: ShearStrength,
+    strength: MohrCoulomb,
     modulus: ShearModulusEstimate,
 ) -> PullPrediction:
     """Predict the drawbar pull from the readings of a run and a shear modulus estimated before.
@@ -103,12 +104,13 @@ def predict_pull(
     from_run = delta_method_covariance(at, lambda a: balance(profile, a, log_modulus))
     covariance = between_turns + from_run
     covariance = covariance + np.outer(change_per_std, change_per_std)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Remark, ...] = ()
     if float(at.slip) > MAX_VALID_SLIP:
-        warnings = (
+        text = (
             f"slip {float(at.slip):g} exceeds {MAX_VALID_SLIP:g}: measurements show that the shear "
-            "modulus found at small slip does not apply there",
+            "modulus found at small slip does not apply there"
         )
+        warnings = (Remark("outside-valid-slip", text, ("slip",)),)
     return PullPrediction(
         drawbar_pull=float(value[1]),
         std=float(np.sqrt(covariance[1, 1])),

@@ -1,6 +1,7 @@
 """Soil from climbs: what they determine, and what they do not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from soilml.numerics.prior import Prior
 from soilml.remarks import texts
 from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_per_climb
 from soilml.systems.climbing.climb import group_by_slope
-from soilml.systems.climbing.coverage_study import simulate_coverage
 
 SAND = {"cohesion": 0.0, "friction_angle": float(np.deg2rad(38.0))}
 SLOPES = np.deg2rad([0.0, 4.0, 8.0, 12.0]).tolist()
@@ -128,7 +128,10 @@ def test_no_shear_modulus_balances_a_slope_beyond_the_largest_pull(true, climbs)
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_truth_of_random_rovers():
+def test_intervals_cover_the_truth_of_random_rovers(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[4] / "bench"))
+    from climbing_coverage import simulate_coverage
+
     """Six rovers: three or fewer inside bands of nine tenths would come once in sixty."""
     found = simulate_coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())
     for name, covered in found.items():

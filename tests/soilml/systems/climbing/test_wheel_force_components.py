@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from soilml.systems.climbing.climb_balances import balance_std
 
 from soilml.errors import InputError
 from soilml.systems.climbing import Rover, SimulatedRover, Uncertainty
 from soilml.systems.climbing.ability import slope_pull
+from soilml.systems.climbing.climb_balances import balance_std
 from soilml.systems.climbing.wheel_force_components import (
     estimate_wheel_loads,
     force_components,

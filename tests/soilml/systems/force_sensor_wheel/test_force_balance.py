@@ -10,8 +10,8 @@ from scipy.integrate import quad
 from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
 from soilml.errors import FitError, InputError
 from soilml.systems.force_sensor_wheel import (
+    MohrCoulomb,
     SensingWheel,
-    ShearStrength,
     SteadyRun,
     StressProfile,
     balanced_arc,
@@ -24,7 +24,7 @@ from soilml.systems.force_sensor_wheel.force_balance import excess_pull
 
 SENSORS = SensingWheel(noise=0.0)
 PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
-STRENGTH = ShearStrength(friction_angle=PHI)
+STRENGTH = MohrCoulomb(friction_angle=PHI)
 RIM = {"radius": 0.055, "width": 0.064}
 
 
@@ -97,7 +97,7 @@ def test_the_stress_of_the_model_gives_the_forces_of_the_model():
         slope=math.atan2(force.drawbar_pull, 20.0),
     )
     back = solve_force_balance(
-        profile, pulled, SENSORS, ShearStrength(friction_angle=float(sand.friction_angle))
+        profile, pulled, SENSORS, MohrCoulomb(friction_angle=float(sand.friction_angle))
     )
     assert back.shear_modulus == pytest.approx(TRUE, rel=0.02)
 
@@ -156,7 +156,7 @@ def test_a_missing_solution_names_its_side():
             parabolic_arc(0.6, 0.5, 2e4),
             SteadyRun(slip=0.2, weight=0.001),
             SENSORS,
-            ShearStrength(friction_angle=PHI, cohesion=9e5),
+            MohrCoulomb(friction_angle=PHI, cohesion=9e5),
         )
 
 
@@ -166,7 +166,7 @@ def test_there_is_at_most_one_solution():
     for _ in range(150):
         arc = parabolic_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
         at = SteadyRun(slip=rng.uniform(-0.6, 0.9), weight=WEIGHT, slope=rng.uniform(-0.8, 0.5))
-        strength = ShearStrength(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
+        strength = MohrCoulomb(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
         left, _ = excess_pull(arc, at, SENSORS, strength, modulus)
         above = left[np.isfinite(left)] > 0
         assert np.count_nonzero(above[1:] != above[:-1]) <= 1

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from soilml.systems.wheel_legs.gait_metrics import (
     compare_feet,
     compare_legs,

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from soilml.systems.wheel_legs.geometry import FEET, Section, WheelLeg, wheel_leg
 
 from soilml.errors import InputError
+from soilml.systems.wheel_legs.geometry import FEET, Section, WheelLeg, wheel_leg
 
 
 def of_first_leg(wheel):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from soilml.systems.wheel_legs.resistive_force import (
     resistance,
     resistance_terms,

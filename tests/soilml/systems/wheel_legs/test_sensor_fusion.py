@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from soilml.errors import FitError
 from soilml.systems.wheel_legs.sensor_fusion import (
     PROPERTIES,
     RULES,
@@ -10,8 +12,6 @@ from soilml.systems.wheel_legs.sensor_fusion import (
     score_estimators,
 )
 from soilml.systems.wheel_legs.stances import simulate_stances
-
-from soilml.errors import FitError
 
 LEARN, HOLD = simulate_stances(300, seed=1), simulate_stances(300, seed=7)
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.sinkage_fit import (
     SinkageFit,
@@ -9,8 +11,6 @@ from soilml.systems.wheel_legs.sinkage_fit import (
     fit_sinkage,
     simulate_sinkage,
 )
-
-from soilml.errors import FitError, InputError
 
 pytestmark = pytest.mark.slow
 

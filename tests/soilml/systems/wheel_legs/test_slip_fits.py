@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from soilml.errors import FitError
 from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
@@ -15,8 +17,6 @@ from soilml.systems.wheel_legs.stances import (
     midstance_torques,
     sample_soils,
 )
-
-from soilml.errors import FitError
 
 GRID = [v.ravel() for v in np.meshgrid(np.deg2rad([20.0, 30.0, 40.0]), [700.0, 800.0, 900.0])]
 SANDS = sample_soils(12, seed=2)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from soilml.errors import InputError
 from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
@@ -9,8 +11,6 @@ from soilml.systems.wheel_legs.slip_models import (
     spring_soil,
 )
 from soilml.systems.wheel_legs.stances import four_soils
-
-from soilml.errors import InputError
 
 KNOWN = four_soils()
 ANGLE, STIFFNESS = KNOWN.soil.friction_angle, KNOWN.normal_stiffness

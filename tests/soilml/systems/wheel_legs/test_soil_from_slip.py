@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from soilml.systems.wheel_legs.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.soil_from_slip import soil_from_torque, soil_from_vibration
 
 from soilml.errors import FitError, InputError
+from soilml.systems.wheel_legs.slip_models import TORQUE_SLIP, VIBRATION_SLIP, soil_spring
+from soilml.systems.wheel_legs.soil_from_slip import soil_from_torque, soil_from_vibration
 
 ANGLE, STIFFNESS = 0.7, 1.6e4
 SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])

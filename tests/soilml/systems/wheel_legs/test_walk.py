@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from soilml.errors import InputError
 from soilml.systems.wheel_legs.gait_metrics import gait_metrics
 from soilml.systems.wheel_legs.geometry import FEET, Section, WheelLeg, wheel_leg
 from soilml.systems.wheel_legs.ground_reaction import batch_plates, ground_reaction
 from soilml.systems.wheel_legs.integrator import FADING, WalkStatus, explicit_step
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 from soilml.systems.wheel_legs.walk import plate_stresses, walk
-
-from soilml.errors import InputError
 
 SAND = LinearGround(stiffness=0.7e6)
 WEIGHT = 3.75 * 9.81

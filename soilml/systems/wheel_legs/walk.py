@@ -1,4 +1,4 @@
-"""Simulation of walking wheel-legs, many cases at once."""
+"""Simulation of walking wheel-legs, many cases at once, and the stress on their plates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Array, Real
 from soilml.errors import InputError
 from soilml.systems.wheel_legs.geometry import WheelLeg
-from soilml.systems.wheel_legs.ground_reaction import batch_plates
+from soilml.systems.wheel_legs.ground_reaction import SKIN, batch_plates
 from soilml.systems.wheel_legs.integrator import (
     FADING,
     DriveParameters,
@@ -20,7 +20,7 @@ from soilml.systems.wheel_legs.integrator import (
     implicit_step,
     nearest_attack,
 )
-from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.resistive_force import LinearGround, resistance
 
 
 @dataclass(frozen=True)
@@ -212,3 +212,38 @@ def _status(wheel_leg: WheelLeg, ground: LinearGround, slip: float) -> WalkStatu
     invalid_slip = commanded and not -1.0 <= slip <= 1.0
     invalid = wheel_leg.invalid_reason or ground.invalid_reason or invalid_slip
     return WalkStatus.INVALID if invalid else WalkStatus.OK
+
+
+@dataclass(frozen=True)
+class PlateStress:
+    """Positions of the plates (m, x along the walk, z up from the surface) and their stress (Pa).
+
+    Arrays (plates,), ordered by leg (leg, tip, heel), with the body last. `ahead` and `up` are the
+    components of the stress on the plate, 0 above the ground.
+    """
+
+    x: Array
+    z: Array
+    ahead: Array
+    up: Array
+    area: Array  # m^2
+
+
+def plate_stresses(
+    walked: Walk, instant: int, wheel: WheelLeg, ground: LinearGround, case: int = 0
+) -> PlateStress:
+    """Stress on every plate at an instant of a case of a walk (Comin and Saaj 2017, eq. 4)."""
+    plates = batch_plates([wheel], [ground])
+    pose = plates.at(float(walked.angle[instant]))
+    x, z, vx, vz = (
+        float(part[instant, case]) for part in (walked.x, walked.z, walked.vx, walked.vz)
+    )
+    turning = plates.speed * plates.turns
+    across, upwards = vx + turning * pose.z, vz - turning * pose.x
+    fading = FADING * wheel.speed * wheel.leg.length
+    pace = np.sqrt(across**2 + upwards**2 + fading**2)
+    sx, sz = resistance(pose.c2, pose.s2, across / pace, upwards / pace)
+    depth = np.maximum(-(z + pose.z), 0.0)
+    pressure = ground.stiffness * depth + ground.offset * (1.0 - np.exp(-depth / SKIN))
+    parts = (x + pose.x, z + pose.z, pressure * sx, pressure * sz, plates.area)
+    return PlateStress(*(part[:, 0] for part in parts))

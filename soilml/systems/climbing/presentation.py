@@ -12,8 +12,7 @@ from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.parameter_lines import ParameterLine, parameter_lines, parameter_table
 from soilml.report.terminal import rounded, shown_unit, significant
-from soilml.systems.climbing.plot import SIZE
-from soilml.systems.climbing.report import ClimbingReport
+from soilml.systems.climbing.report import FIGURE_SIZE, ClimbingReport
 
 #: Number of slips in the printed curve.
 PRINTED_SLIPS = 9
@@ -53,7 +52,7 @@ def climb_report(report: ClimbingReport, files: tuple[str, str]) -> Report:
         pictures=[
             ReportPicture(
                 "Pull and slope over slip",
-                picture(report.plot, 1, 2, SIZE, answer[0]),
+                picture(report.plot, 1, 2, FIGURE_SIZE, answer[0]),
                 "Lines: medians, with bands of 90 %. Dots: the climbs, at the mean slip of both "
                 "wheels.",
             )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark
+from soilml.report.figure_style import AFTER, BEFORE, take_axes
 from soilml.systems.climbing.ability import (
     ClimbingAbility,
     check_slip,
@@ -33,6 +34,8 @@ ZERO_SLIP_SIGMAS = 2.0
 SLIP_MARGIN = 0.02
 #: Relative error of the speeds assumed for the table of k_x by run, as in Fig. 9.
 SPEED_ERROR = 0.015
+#: Width and height of the figure, inches.
+FIGURE_SIZE = (9.0, 3.8)
 
 
 @dataclass(frozen=True)
@@ -121,9 +124,29 @@ class ClimbingReport:
         InputError
             For another number of axes.
         """
-        from soilml.systems.climbing.plot import plot_climbing
-
-        return plot_climbing(self, ax)
+        left, right = axes = take_axes(ax, 1, 2, FIGURE_SIZE)[0]
+        slip = self.ability.slip
+        for panel, band, factor in (
+            (left, self.pull, 1.0),
+            (right, self.slope, np.rad2deg(1.0)),
+        ):
+            panel.fill_between(
+                slip, factor * band.lower, factor * band.upper, color=AFTER, alpha=0.3, lw=0,
+                label="90 %",
+            )  # fmt: skip
+            panel.plot(slip, factor * band.middle, color=AFTER, lw=1.4, label="median")
+            panel.axhline(0.0, color="#888888", lw=0.7)
+            panel.set_xlabel("slip")
+        climbs = self.data.climbs
+        mean_slip = [0.5 * (c.front.slip + c.rear.slip) for c in climbs]
+        right.plot(
+            mean_slip, np.rad2deg([c.slope for c in climbs]), "o", color=BEFORE, ms=5,
+            label="climbs, mean slip",
+        )  # fmt: skip
+        left.set_ylabel("drawbar pull on level ground, N")
+        right.set_ylabel("slope climbed, degrees")
+        right.legend(frameon=False, loc="lower right")
+        return np.asarray(axes)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml climb` writes."""

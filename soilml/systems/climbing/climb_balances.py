@@ -1,23 +1,76 @@
-"""Standard deviation of the force balance of a climb, from the noise of the measurements."""
+"""Force balances of climbs: residuals, their covariance, and the shear modulus of each climb."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Array
-from soilml.systems.climbing.climb import Climb, Rover, Uncertainty, WheelRun
+from soilml.numerics.prior import Prior
+from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, Uncertainty, WheelRun
 from soilml.systems.climbing.wheel_force_components import (
     ForceComponents,
     force_components,
     pull_of_rover,
     shared_magnification,
+    stack_components,
 )
 from soilml.systems.force_sensor_wheel import StressProfile
 
 Floats = NDArray[np.float64]
-#: Cohesion (Pa), friction angle (rad), shear modulus (m).
-ShearParameters = tuple[float, float, float]
+
+#: Values of k_x, evenly spaced in the logarithm, between which forces are interpolated linearly.
+KNOTS = 256
+#: Extension of the table of ln k_x beyond both ends of the prior, against rounding.
+MARGIN = 1e-6
+#: Lower limit of the standard deviation of a balance, as a fraction of the weight.
+MIN_STD_FRACTION = 1e-4
+
+
+@dataclass(frozen=True)
+class ForceBalances:
+    """The climbs of one rover, with wheel forces tabulated over the range of k_x."""
+
+    rover: Rover
+    climbs: tuple[Climb, ...]
+    log_modulus: Floats  # (KNOTS,)
+    wheels: tuple[ForceComponents, ForceComponents]  # front and rear, each (climbs, KNOTS)
+
+    @classmethod
+    def tabulate(cls, rover: Rover, climbs: Sequence[Climb], modulus: Prior) -> ForceBalances:
+        """Tabulate the wheel forces between the ends of the prior of k_x (m)."""
+        knots = np.linspace(np.log(modulus.lower) - MARGIN, np.log(modulus.upper) + MARGIN, KNOTS)
+        front = stack_components([force_components(c.front, rover, np.exp(knots)) for c in climbs])
+        rear = stack_components([force_components(c.rear, rover, np.exp(knots)) for c in climbs])
+        return cls(rover, tuple(climbs), knots, (front, rear))
+
+    def residuals(self, soils: Floats) -> Floats:
+        """Pull less the weight's component along the slope, N (n, climbs).
+
+        `soils` (n, 3) are cohesion (Pa), friction angle (rad) and shear modulus (m).
+        """
+        cohesion, friction, modulus = soils.T
+        position = np.interp(np.log(modulus), self.log_modulus, np.arange(len(self.log_modulus)))
+        knot = np.minimum(position.astype(int), len(self.log_modulus) - 2)
+        front, rear = (wheel.interpolated(knot, position - knot) for wheel in self.wheels)
+        slope = np.asarray([climb.slope for climb in self.climbs])[:, None]
+        pull = pull_of_rover(self.rover, slope, (front, rear), cohesion, np.tan(friction))
+        return np.asarray(pull - self.rover.weight * np.sin(slope)).T
+
+    def whitener(self, shear: ShearParameters, noise: Uncertainty) -> tuple[Floats, Floats]:
+        """Whitening matrix and standard deviations of the residuals at one soil.
+
+        Returns (L, std): L @ residuals has unit covariance, L (climbs, climbs); std (climbs,), N.
+        """
+        stds = np.asarray([balance_std(self.rover, c, shear, noise) for c in self.climbs])
+        independent, shared = stds[:, 0], stds[:, 1:]
+        lower_limit = MIN_STD_FRACTION * self.rover.weight
+        covariance = np.diag(independent**2 + lower_limit**2) + shared @ shared.T
+        return np.linalg.inv(np.linalg.cholesky(covariance)), np.sqrt(np.diag(covariance))
+
 
 #: Step of forward differences: fraction of the speed, rad of a slope or of an entry angle. Well
 #: below the usual standard deviations of these quantities.
@@ -125,3 +178,40 @@ def _per_stress(
     pull = area * (friction * np.cos(angle) - np.sin(angle))
     lift = area * (friction * np.sin(angle) + np.cos(angle))
     return pull, lift
+
+
+#: Range in which k_x is searched, m, and points of the search grid, evenly spaced in ln k_x.
+RANGE = Prior(1e-4, 0.2, log=True)
+GRID_SIZE = 2001
+
+
+def modulus_per_climb(
+    rover: Rover,
+    climbs: Sequence[Climb],
+    *,
+    cohesion: float,
+    friction_angle: float,
+    speed_error: float = 0.0,
+) -> Floats:
+    """k_x (m) at which the forces of each climb balance (climbs,).
+
+    NaN if none from 0.1 to 200 mm does. With `speed_error` the climbs are evaluated as if the
+    speeds had been measured too high by this fraction. The pull of a driving wheel decreases with
+    k_x, so that there is at most one solution. References: Nagatani et al., section 6.2, Figs. 8
+    and 9.
+    """
+    assumed = [climb.with_speed_error(speed_error) for climb in climbs]
+    modulus = RANGE.at(np.linspace(0.0, 1.0, GRID_SIZE))
+    soils = np.stack(
+        [np.full(GRID_SIZE, cohesion), np.full(GRID_SIZE, friction_angle), modulus], axis=1
+    )
+    moduli = []
+    for residual in ForceBalances.tabulate(rover, assumed, RANGE).residuals(soils).T:
+        crossings = np.flatnonzero((residual[:-1] > 0.0) & (residual[1:] <= 0.0))
+        if len(crossings) == 0:
+            moduli.append(np.nan)
+            continue
+        i = int(crossings[0])
+        share = residual[i] / (residual[i] - residual[i + 1])  # linear in ln k_x
+        moduli.append(float(modulus[i] * (modulus[i + 1] / modulus[i]) ** share))
+    return np.asarray(moduli)

@@ -1,1 +1,0 @@
-"""Tables, settings and results of a climb, in and out."""

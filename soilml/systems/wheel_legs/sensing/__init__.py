@@ -1,1 +1,0 @@
-"""Slip and soil parameters from torque, vibration and sinkage of a wheel-leg."""

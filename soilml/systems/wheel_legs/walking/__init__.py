@@ -1,1 +1,0 @@
-"""A wheel-leg walking over time, by resistive-force theory."""
