@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.config.prior_settings import take_prior
+from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
@@ -21,8 +21,8 @@ from soilml.parameters import check, declared
 from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
-from soilml.systems.wheel_legs.sensing.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.sensing.stick_slip import SpringLeg, vibration_amplitude
+from soilml.systems.wheel_legs.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
+from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 
 Floats = NDArray[np.float64]
 
