@@ -22,10 +22,12 @@ from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import (
     AVERAGED,
     WindowRow,
+    means_of,
     plain_constants,
     quantities_of,
     rows_as_table,
     unusable,
+    values_of,
     without_torque,
 )
 from soilml.log_import.windows.steady import Stretch
@@ -68,7 +70,7 @@ def import_rows(
                         continue
                     groups.append((wheel, Run(labels[i], (recording,), run.times), [row]))
                     rows.append(row)
-        wrong += map_hints(log_map, wheel, _columns(every))
+        wrong += map_hints(log_map, wheel, values_of(every))
         rows_of_wheels.append((wheel, rows))
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
@@ -77,7 +79,7 @@ def import_rows(
     table = rows_as_table(groups, log_map)
     table = Table({k: v for k, v in table.columns.items() if k != "time_s"}, table.source)
     wheel, rows = rows_of_wheels[0]
-    means = _means(rows)
+    means = means_of(rows)
     bias, parts = shared_errors(
         lambda constants: quantities_of(means, log_map, wheel, constants),
         constants_of(wheel, log_map.vehicle),
@@ -165,19 +167,6 @@ def _channel(run: Run, channel: ChannelMap, count: int) -> tuple[Floats, Floats]
         return given, error
     ours = our_slip(given, channel.definition)
     return ours, np.abs(our_slip(given + error, channel.definition) - ours)
-
-
-def _means(rows: Sequence[WindowRow]) -> dict[str, float | Floats]:
-    roles = dict.fromkeys(role for row in rows for role in row.means)
-    return {role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles}
-
-
-def _columns(rows: Sequence[WindowRow]) -> dict[str, Floats]:
-    names = dict.fromkeys(name for row in rows for name in row.values)
-    found = {n: np.asarray([row.values.get(n, np.nan) for row in rows]) for n in names}
-    if any("slope" in row.means for row in rows):
-        found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
-    return found
 
 
 def _without_errors(table: Table) -> list[Remark]:

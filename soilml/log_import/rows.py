@@ -78,6 +78,21 @@ class WheelSeries:
     notes: tuple[Remark, ...] = ()
 
 
+def means_of(rows: Sequence[WindowRow]) -> dict[str, float | Floats]:
+    """Means of the channels (rows,) by role, NaN where a row has none."""
+    roles = dict.fromkeys(role for row in rows for role in row.means)
+    return {role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles}
+
+
+def values_of(rows: Sequence[WindowRow]) -> dict[str, Floats]:
+    """Quantities and slope (rows,) by name, NaN where a row has none."""
+    names = dict.fromkeys(name for row in rows for name in row.values)
+    found = {n: np.asarray([row.values.get(n, np.nan) for row in rows]) for n in names}
+    if any("slope" in row.means for row in rows):
+        found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
+    return found
+
+
 def plain_constants(log_map: LogMap, wheel: WheelMap) -> dict[str, float]:
     """The constants of a wheel by name, without their standard deviations."""
     return {name: c.value for name, c in constants_of(wheel, log_map.vehicle).items()}

@@ -57,21 +57,8 @@ _SHARE = re.compile(
 _POWER = re.compile(r"([A-Za-z]+)\s*(?:\^|\*\*)?\s*(-?\d)(?!\d)")
 #: Dimensions by the unit that soilml uses.
 DIMENSIONS = (
-    "s",
-    "rad/s",
-    "rad",
-    "m/s",
-    "m",
-    "1",
-    "N m",
-    "A",
-    "N",
-    "kg",
-    "N m/A",
-    "m/s^2",
-    "Pa",
-    "m^2",
-)
+    "s", "rad/s", "rad", "m/s", "m", "1", "N m", "A", "N", "kg", "N m/A", "m/s^2", "Pa", "m^2",
+)  # fmt: skip
 _ANGLES = ("deg", "rad", "turn", "rpm", "count", "mrad", "urad", "arcmin", "arcsec", "grade")
 _OTHER_KIND = {
     "N": "kg are a mass; write kgf where a scale shows the force in kg, or give the mass as "

@@ -34,11 +34,13 @@ from soilml.log_import.rows import (
     WindowRow,
     add_stated_errors,
     irregular_windows,
+    means_of,
     plain_constants,
     pool_errors,
     quantities_of,
     rows_as_table,
     unusable,
+    values_of,
     window_row,
     without_torque,
 )
@@ -199,28 +201,18 @@ class _Wheel:
                     kept.append(row)
             self.kept.append(kept)
 
-    def _windows(self) -> dict[str, Floats]:
-        """Means of all windows by quantity, left out or not, in the sensors' own direction."""
-        rows = [row for rows in self.rows for row in rows]
-        names = dict.fromkeys(name for row in rows for name in row.values)
-        found = {name: np.asarray([row.values.get(name, np.nan) for row in rows]) for name in names}
-        if any("slope" in row.means for row in rows):
-            found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
-        return found
-
     def map_hints(self) -> list[Remark]:
         """What says that the map is wrong."""
-        return map_hints(self.log_map, self.wheel, self._windows())
+        # all windows, left out or not
+        windows = values_of([row for rows in self.rows for row in rows])
+        return map_hints(self.log_map, self.wheel, windows)
 
     def shared_errors(self) -> Any:
         """The errors that the rows share."""
         rows = [row for rows in self.kept for row in rows]
         if not rows:
             return {}, []
-        roles = dict.fromkeys(role for row in rows for role in row.means)
-        means: dict[str, float | Floats] = {
-            role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles
-        }
+        means = means_of(rows)
         return shared_errors(
             lambda constants: quantities_of(means, self.log_map, self.wheel, constants),
             constants_of(self.wheel, self.log_map.vehicle),

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number
@@ -200,6 +201,17 @@ def resting(inputs: Inputs) -> slice | None:
     margin = _BEFORE_START + (SMOOTH / 2 if "wheel_angle" in inputs.places else 0.0)
     end = first - round(margin / inputs.step)
     return slice(0, end) if end * inputs.step >= _SHORTEST_REST else None
+
+
+def moving(inputs: Inputs) -> NDArray[np.bool_]:
+    """Samples (n,) in which the wheel drives; all of them where no speed is known."""
+    speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
+    if speed is None:
+        speed = inputs.values.get("ground_speed")
+    if speed is None:
+        return np.ones(inputs.time.size, dtype=bool)
+    size: Floats = np.abs(np.nan_to_num(speed))
+    return np.asarray(size > 0.3 * np.percentile(size, 90))
 
 
 def _effort(inputs: Inputs) -> Floats | None:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.log_import.channels.inputs import Inputs
+from soilml.log_import.channels.inputs import Inputs, moving
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.recording import Floats
 from soilml.remarks import Remark
 
 #: Sensors that respond when a wheel drives.
@@ -68,19 +66,11 @@ def _level(inputs: Inputs, role: str) -> float:
     values = inputs.values.get(role)
     if values is None or not np.isfinite(values).any():
         return float("nan")
-    driving = values[_driving(inputs)]
+    driving = values[moving(inputs)]
     if not np.isfinite(driving).any():
         driving = values
     rest = inputs.rest.get(role, (0.0, 0.0))[0] if role != "load" else 0.0
     return float(np.abs(np.nanmedian(driving) - (rest if np.isfinite(rest) else 0.0)))
-
-
-def _driving(inputs: Inputs) -> NDArray[np.bool_]:
-    speed = inputs.values.get("wheel_speed", inputs.values.get("ground_speed"))
-    if speed is None:
-        return np.ones(inputs.time.size, dtype=bool)
-    size: Floats = np.abs(np.nan_to_num(speed))
-    return np.asarray(size > 0.3 * np.percentile(size, 90))
 
 
 def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[Remark]:

@@ -46,17 +46,8 @@ _ERRORS = {
     "标准差", "误差",
 }  # fmt: skip
 _FILLERS = {
-    "of",
-    "the",
-    "type",
-    "standard",
-    "estandar",
-    "estándar",
-    "mean",
-    "avg",
-    "average",
-    "rel",
-}
+    "of", "the", "type", "standard", "estandar", "estándar", "mean", "avg", "average", "rel",
+}  # fmt: skip
 
 
 def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
@@ -142,68 +133,46 @@ def draft_of(
         draft.put("scale", "1 mm", Marked(f"CHANGE: travel for one count ({unit})"))
     elif is_raw_signal(unit) and role in CALIBRATED:
         lines = [line for recording in run.recordings for line in recording.about]
-        known_scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
-        example = f"1 {ROLES[role][0]}"
-        draft.put(
-            "scale", known_scale or example,
-            f"for 1 {unit}; stated in the log: {line[:60]}" if known_scale else
-            Marked(f"CHANGE: what 1 {unit} is, from the calibration of the sensor"),
-        )  # fmt: skip
+        scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
+        if scale:
+            draft.put("scale", scale, f"for 1 {unit}; stated in the log: {line[:60]}")
+        else:
+            why = f"CHANGE: what 1 {unit} is, from the calibration of the sensor"
+            draft.put("scale", f"1 {ROLES[role][0]}", Marked(why))
     elif dimension(unit) == "1" and role in ("torque", "motor_current"):
         rated, one = ("torque", "N m") if role == "torque" else ("current", "A")
-        said = stated.get(f"rated_{rated}")
-        draft.put(
-            "scale",
-            f"{float(said[0].split()[0]) / 100:g} {' '.join(said[0].split()[1:]) or one}"
-            if said
-            else f"0.01 {one}",
-            f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
-            if said
-            else Marked(f"CHANGE: what 1 % is, a hundredth of the rated {rated}"),
-        )
+        if said := stated.get(f"rated_{rated}"):
+            number, *own = said[0].split()
+            why = f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
+            draft.put("scale", f"{float(number) / 100:g} {' '.join(own) or one}", why)
+        else:
+            why = Marked(f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
+            draft.put("scale", f"0.01 {one}", why)
     elif dimension(unit) in ("count", "count/s"):
-        number = stated.get("counts_per_turn", ("1", ""))[0]
-        known_turn = "counts_per_turn" in stated
         draft.put("unit", unit, why)
-        draft.put(
-            "counts_per_turn",
-            float(number) if known_turn else 1.0,
-            "stated in the log"
-            if known_turn
-            else Marked("CHANGE: counts for one turn of the encoder"),
-        )
+        if "counts_per_turn" in stated:
+            draft.put("counts_per_turn", float(stated["counts_per_turn"][0]), "stated in the log")
+        else:
+            why = Marked("CHANGE: counts for one turn of the encoder")
+            draft.put("counts_per_turn", 1.0, why)
     else:
         draft.put("unit", unit, why)
     if role == "slope" and column.address.endswith("orientation.pitch"):
-        draft.put(
-            "reverse",
-            True,
-            "of a quaternion (REP 103): there the nose is down where it is positive",
-        )
+        why = "of a quaternion (REP 103): there the nose is down where it is positive"
+        draft.put("reverse", True, why)
     if role == "slip" and "kappa" in words_of(column.name):
         why = "of a kappa, as of tyres; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
     if role in ("wheel_angle", "wheel_speed", "motor_current"):
-        ratio = stated.get("gear_ratio")
-        if ratio is not None and _is_motor(column, role):
-            draft.put("gear_ratio", float(ratio[0].split()[0]), f"stated in the log: {ratio[1]}")
-        else:
-            why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
-            if role == "motor_current" or "mot" in column.address.lower():
-                why = Marked("CHANGE: turns of the motor for one of the wheel")
-            draft.put("gear_ratio", 1.0, why)
+        _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
-        constant = stated.get("torque_constant")
-        if constant is not None:
-            draft.put("torque_constant", f"{constant[0]} +- 5 %", f"stated: {constant[1]}")
+        if said := stated.get("torque_constant"):
+            draft.put("torque_constant", f"{said[0]} +- 5 %", f"stated: {said[1]}")
         else:
-            draft.put(
-                "torque_constant",
-                "1.0 N m/A +- 5 %",
-                Marked("CHANGE: from the data sheet of the motor"),
-            )
+            why = Marked("CHANGE: from the data sheet of the motor")
+            draft.put("torque_constant", "1.0 N m/A +- 5 %", why)
         efficiency = stated.get("efficiency", ("0.7", ""))[0]
         why = "of the gearbox" if "efficiency" in stated else Marked("CHANGE: of the gearbox")
         draft.put("efficiency", f"{efficiency} +- 0.05", why)
@@ -211,9 +180,19 @@ def draft_of(
     return draft
 
 
-def _is_motor(column: Candidate, role: str) -> bool:
-    words = column.address.lower()
-    return role == "motor_current" or "mot" in words or "enc" in words
+def _put_gear_ratio(
+    draft: Draft, role: str, column: Candidate, said: tuple[str, str] | None
+) -> None:
+    """The turns of the motor for one of the wheel, where a column may be of the motor."""
+    name = column.address.lower()
+    of_motor = role == "motor_current" or "mot" in name
+    if said is not None and (of_motor or "enc" in name):
+        draft.put("gear_ratio", float(said[0].split()[0]), f"stated in the log: {said[1]}")
+        return
+    why = "turns of the motor for one of the wheel; 1 where measured at the wheel"
+    if of_motor:
+        why = Marked("CHANGE: turns of the motor for one of the wheel")
+    draft.put("gear_ratio", 1.0, why)
 
 
 def rotation_unit(drafts: dict[str, Draft], stated: dict[str, tuple[str, str]]) -> None:

@@ -9,18 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.errors import SoilmlError
 from soilml.io.cell_text import is_plain
 from soilml.io.toml_settings import Settings
-from soilml.log_import.channels.inputs import Inputs, wheel_inputs
+from soilml.log_import.channels.inputs import Inputs, moving, wheel_inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
 from soilml.log_import.mapping.channel_map import take_channel
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
-from soilml.log_import.recording import Floats
 
 
 def toml_value(value: Any) -> str:
@@ -98,17 +96,6 @@ def inputs_of(drafts: dict[str, Draft], run: Run) -> Inputs | None:
         return wheel_inputs(run, wheel_of(drafts))
     except SoilmlError:
         return None
-
-
-def moving(inputs: Inputs) -> NDArray[np.bool_]:
-    """Samples (n,) in which the wheel drives; all of them where no speed is known."""
-    speed = inputs.values.get("wheel_speed", inputs.values.get("rim_speed"))
-    if speed is None:
-        speed = inputs.values.get("ground_speed")
-    if speed is None:
-        return np.ones(inputs.time.size, dtype=bool)
-    size: Floats = np.abs(np.nan_to_num(speed))
-    return np.asarray(size > 0.3 * np.percentile(size, 90))
 
 
 def fastest_ratio(inputs: Inputs) -> float:

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from soilml.log_import.channels.inputs import Inputs, resting
+from soilml.log_import.channels.inputs import Inputs, moving, resting
 from soilml.log_import.guesses.columns import words_of
-from soilml.log_import.guesses.draft import Draft, Marked, moving
+from soilml.log_import.guesses.draft import Draft, Marked
 
 #: Share of the reading while driving from which a reading at rest is an offset.
 _OFFSET = 0.01

@@ -23,28 +23,10 @@ _ZERO_SHARE = 0.3
 #: Bytes above ASCII in a row, and the share of those in pairs or more that says Chinese.
 _HIGH, _PAIRED = re.compile(rb"[\x80-\xff]+"), 0.8
 #: Cells that stand for a missing number.
-MISSING = frozenset(
-    (
-        "",
-        *[
-            "nan",
-            "na",
-            "n/a",
-            "null",
-            "none",
-            "-",
-            "--",
-            "---",
-            "#n/a",
-            "inf",
-            "-inf",
-            "+inf",
-            "nan(ind)",
-            "-nan(ind)",
-            "-nan",
-        ],
-    )
-) | {"1.#qnan", "-1.#ind", "missing", "?", "overflow"}
+MISSING = {
+    "", "nan", "na", "n/a", "null", "none", "-", "--", "---", "#n/a", "inf", "-inf", "+inf",
+    "nan(ind)", "-nan(ind)", "-nan", "1.#qnan", "-1.#ind", "missing", "?", "overflow",
+}  # fmt: skip
 COMMENTS = ("#", "%", "//", ";;")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 _COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eEdD][+-]?\d+)?", re.ASCII)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -61,18 +61,11 @@ def steady_windows(
     left_out
         Stretches that the user leaves out of this run.
     """
-    step = float(time[1] - time[0])
-    watched = {
-        name: quantities[name]
-        for name in _WATCHED
-        if name in quantities and np.isfinite(quantities[name]).mean() > 0.1
-    }
-    if "rim_speed" in watched and "speed" in watched:
-        watched.pop("slip", None)  # it follows from them, and is noise where the wheel rests
+    search = _Search(time, quantities, settings)
     found: list[Stretch] = []
-    for start, stop in _pieces(time, step, watched, settings):
-        for p, q in _without(*_trim(time, start, stop, step, settings), settings, left_out):
-            found += _judged(time, step, quantities, watched, p, q, settings)
+    for start, stop in search.pieces(np.arange(time.size), settings.sensitivity):
+        for p, q in _without(start, stop, settings, left_out):
+            found += search.judged(p, q)
     for entry in left_out:
         ends = max(entry.start, float(time[0])), min(entry.stop, float(time[-1]))
         found.append(Stretch(*ends, Remark("left-out-by-map", entry.why, severity="note")))
@@ -100,88 +93,6 @@ def _joined(stretches: list[Stretch], settings: WindowSettings) -> list[Stretch]
     return found
 
 
-def _judged(
-    time: Floats,
-    step: float,
-    quantities: Mapping[str, Floats],
-    watched: Mapping[str, Floats],
-    start: float,
-    stop: float,
-    settings: WindowSettings,
-    finer: bool = True,
-) -> list[Stretch]:
-    """A piece as one stretch; where it drifts, as what a finer search makes of it."""
-    a, b = without_transients(time, quantities, start, stop)
-    why = _why_not(time, step, quantities, a, b, settings)
-    if why is None or why.code != "not-steady":
-        return [Stretch(a, b, why)]
-    if not finer:
-        return [_shortened(time, step, quantities, Stretch(a, b, why), settings)]
-    rows = np.flatnonzero(_inside(time, start, stop))
-    part = {name: values[rows] for name, values in watched.items()}
-    closer = replace(settings, sensitivity=_FINER * settings.sensitivity)
-    return [
-        stretch
-        for p, q in _pieces(time[rows], step, part, closer)
-        for stretch in _judged(
-            time,
-            step,
-            quantities,
-            watched,
-            *_trim(time[rows], p, q, step, settings),
-            settings,
-            finer=False,
-        )
-    ]
-
-
-def _pieces(
-    time: Floats, step: float, watched: Mapping[str, Floats], settings: WindowSettings
-) -> list[tuple[float, float]]:
-    """Pieces of a run between change points, s."""
-    if not watched:
-        return [(float(time[0]), float(time[-1]))]
-    width = max(1, round(max(_SHORTEST_MEAN, step * time.size / _MOST_VALUES) / step))
-    count = max(1, time.size // width)
-    columns, least = [], []
-    for name, values in watched.items():
-        means = _block_means(values, width, count)
-        size = float(np.nanpercentile(np.abs(means), 90))
-        if size > 0.0:
-            columns.append(means)
-            least.append(_WATCHED[name] * size)
-    if not columns:
-        return [(float(time[0]), float(time[-1]))]
-    shortest = max(1, round(0.25 * settings.shortest / (width * step)))
-    pieces = steady_pieces(
-        np.stack(columns, axis=1), np.asarray(least), settings.sensitivity, shortest
-    )
-    edges = float(time[0]) + step * width * np.asarray([a for a, _ in pieces] + [pieces[-1][1]])
-    edges[-1] = time[-1]
-    return [(float(a), float(b)) for a, b in pairwise(edges)]
-
-
-def _block_means(values: Floats, width: int, count: int) -> Floats:
-    """Means of `count` blocks of `width` samples, (count,), gaps interpolated."""
-    blocks = values[: width * count].reshape(count, width)
-    valid = np.isfinite(blocks)
-    sums = np.where(valid, blocks, 0.0).sum(axis=1)
-    means = np.where(valid.any(axis=1), sums / np.maximum(valid.sum(axis=1), 1), np.nan)
-    known = np.flatnonzero(np.isfinite(means))
-    return np.interp(np.arange(count), known, means[known])
-
-
-def _trim(
-    time: Floats, start: float, stop: float, step: float, settings: WindowSettings
-) -> tuple[float, float]:
-    """A piece without the settling at its ends, at most a fifth of it on each side."""
-    margin = min(settings.settle, 0.2 * (stop - start))
-    return (
-        start if start <= time[0] + step else start + margin,
-        stop if stop >= time[-1] - step else stop - margin,
-    )
-
-
 def _without(
     start: float, stop: float, settings: WindowSettings, left_out: tuple[LeaveOut, ...]
 ) -> list[tuple[float, float]]:
@@ -205,114 +116,160 @@ def _without(
     return parts
 
 
-def _inside(time: Floats, start: float, stop: float) -> NDArray[np.bool_]:
-    return np.asarray((time >= start) & (time <= stop))
+def _block_means(values: Floats, width: int, count: int) -> Floats:
+    """Means of `count` blocks of `width` samples, (count,), gaps interpolated."""
+    blocks = values[: width * count].reshape(count, width)
+    valid = np.isfinite(blocks)
+    sums = np.where(valid, blocks, 0.0).sum(axis=1)
+    means = np.where(valid.any(axis=1), sums / np.maximum(valid.sum(axis=1), 1), np.nan)
+    known = np.flatnonzero(np.isfinite(means))
+    return np.interp(np.arange(count), known, means[known])
 
 
-def _why_not(
-    time: Floats,
-    step: float,
-    quantities: Mapping[str, Floats],
-    start: float,
-    stop: float,
-    settings: WindowSettings,
-) -> Remark | None:
-    """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
-    rows = _inside(time, start, stop)
-    low, high = settings.within
-    if stop <= low or start >= high:
-        return Remark("outside", "outside of [windows] within", severity="note")
-    if rests := _why_at_rest(step, quantities, rows):
-        return rests
-    if stop - start < settings.shortest:
-        text = f"{stop - start:.2g} s are too short (less than {settings.shortest:g} s)"
-        return Remark("too-short", text, severity="note")
-    if not rows.any():
-        return Remark("no-samples", "there are no samples")
-    for name in ("slip", "load"):
-        if name in quantities and np.mean(~np.isfinite(quantities[name][rows])) > _MISSING:
-            missing = np.mean(~np.isfinite(quantities[name][rows]))
-            return Remark("missing-samples", f"{missing:.0%} of the {name} is missing", (name,))
-    return _drift(step, quantities, rows, settings)
+@dataclass(frozen=True)
+class _Search:
+    """A run in which steady windows are searched: its grid (n,) and its samples by name (n,)."""
 
+    time: Floats
+    quantities: Mapping[str, Floats]
+    settings: WindowSettings
 
-def _drift(
-    step: float,
-    quantities: Mapping[str, Floats],
-    rows: NDArray[np.bool_],
-    settings: WindowSettings,
-) -> Remark | None:
-    """Which quantity changes within a window by more than it may; None where none does."""
-    for name, relative in (("slip", False), ("torque", True)):
-        if name not in quantities or not np.isfinite(quantities[name][rows]).any():
-            continue
-        values = quantities[name][rows]
-        third = len(values) // 3
-        first, last = mean_error(values[:third], step), mean_error(values[-third:], step)
-        change, error = abs(last[0] - first[0]), float(np.hypot(first[1], last[1]))
-        limit = settings.largest_slip_change
-        if relative:
-            limit = settings.largest_torque_change * float(np.nanmean(np.abs(values)))
-        if change > limit and not change < _SIGNIFICANT * error:
-            text = f"it is not steady: {name} changes by {change:.2g} in it"
-            return Remark("not-steady", text, (name,), "note")
-    return None
+    @property
+    def step(self) -> float:
+        return float(self.time[1] - self.time[0])
 
+    def watched(self) -> dict[str, Floats]:
+        """The quantities whose changes end a window."""
+        found = {
+            name: self.quantities[name]
+            for name in _WATCHED
+            if name in self.quantities and np.isfinite(self.quantities[name]).mean() > 0.1
+        }
+        if "rim_speed" in found and "speed" in found:
+            found.pop("slip", None)  # it follows from them, and is noise where the wheel rests
+        return found
 
-def _shortened(
-    time: Floats,
-    step: float,
-    quantities: Mapping[str, Floats],
-    stretch: Stretch,
-    settings: WindowSettings,
-) -> Stretch:
-    """The longest end or beginning of a drifting stretch that is steady, else all of it."""
-    start, stop = stretch.start, stretch.stop
-    length = stop - start
-    for share in (0.8, 0.65, 0.5, 0.35):
-        for a, b in ((stop - share * length, stop), (start, start + share * length)):
-            long_enough = b - a >= settings.shortest
-            if long_enough and not _drift(step, quantities, _inside(time, a, b), settings):
-                return Stretch(a, b)
-    return stretch
+    def pieces(self, rows: NDArray[np.intp], sensitivity: float) -> list[tuple[float, float]]:
+        """Pieces of a part of the run between change points, s, without the settling at its ends.
 
+        At most a fifth of a piece is settling on each side.
+        """
+        time, step, settings = self.time[rows], self.step, self.settings
+        width = max(1, round(max(_SHORTEST_MEAN, step * time.size / _MOST_VALUES) / step))
+        count = max(1, time.size // width)
+        columns, least = [], []
+        for name, values in self.watched().items():
+            means = _block_means(values[rows], width, count)
+            size = float(np.nanpercentile(np.abs(means), 90))
+            if size > 0.0:
+                columns.append(means)
+                least.append(_WATCHED[name] * size)
+        if not columns:
+            return [(float(time[0]), float(time[-1]))]
+        shortest = max(1, round(0.25 * settings.shortest / (width * step)))
+        parts = steady_pieces(np.stack(columns, axis=1), np.asarray(least), sensitivity, shortest)
+        edges = float(time[0]) + step * width * np.asarray([a for a, _ in parts] + [parts[-1][1]])
+        edges[-1] = time[-1]
+        found = []
+        for start, stop in pairwise(map(float, edges)):
+            margin = min(settings.settle, 0.2 * (stop - start))
+            first = start if start <= time[0] + step else start + margin
+            found.append((first, stop if stop >= time[-1] - step else stop - margin))
+        return found
 
-def _why_at_rest(
-    step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_]
-) -> Remark | None:
-    """By what the wheel is at rest in a window; None where it turns, or nothing says it.
+    def inside(self, start: float, stop: float) -> NDArray[np.bool_]:
+        """Samples (n,) of a stretch."""
+        return np.asarray((self.time >= start) & (self.time <= stop))
 
-    `quantities` are samples (n,) of a run, `rows` (n,) those of the window.
-    """
-    rim = quantities.get("rim_speed", quantities.get("speed"))
-    if rim is not None and np.isfinite(rim[rows]).any():
-        usual = float(np.nanpercentile(np.abs(rim), 90))
-        rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
-        return Remark("at-rest", "the wheel is at rest", severity="note") if rests else None
-    torque = quantities.get("torque")
-    if torque is None or not np.isfinite(torque[rows]).any():
+    def judged(self, start: float, stop: float, finer: bool = True) -> list[Stretch]:
+        """A piece as one stretch; where it drifts, as what a finer search makes of it."""
+        a, b = without_transients(self.time, self.quantities, start, stop)
+        why = self.why_not(a, b)
+        if why is None or why.code != "not-steady":
+            return [Stretch(a, b, why)]
+        if not finer:
+            return [self.shortened(Stretch(a, b, why))]
+        rows = np.flatnonzero(self.inside(start, stop))
+        parts = self.pieces(rows, _FINER * self.settings.sensitivity)
+        return [stretch for p, q in parts for stretch in self.judged(p, q, finer=False)]
+
+    def why_not(self, start: float, stop: float) -> Remark | None:
+        """Why a stretch is no steady window; a part of one that is `not-steady` may be one."""
+        rows, shortest = self.inside(start, stop), self.settings.shortest
+        low, high = self.settings.within
+        if stop <= low or start >= high:
+            return Remark("outside", "outside of [windows] within", severity="note")
+        if rests := self.why_at_rest(rows):
+            return rests
+        if stop - start < shortest:
+            text = f"{stop - start:.2g} s are too short (less than {shortest:g} s)"
+            return Remark("too-short", text, severity="note")
+        if not rows.any():
+            return Remark("no-samples", "there are no samples")
+        for name in ("slip", "load"):
+            if name in self.quantities:
+                missing = np.mean(~np.isfinite(self.quantities[name][rows]))
+                if missing > _MISSING:
+                    text = f"{missing:.0%} of the {name} is missing"
+                    return Remark("missing-samples", text, (name,))
+        return self.drift(rows)
+
+    def drift(self, rows: NDArray[np.bool_]) -> Remark | None:
+        """Which quantity changes within a window by more than it may; None where none does."""
+        for name in ("slip", "torque"):
+            if name not in self.quantities or not np.isfinite(self.quantities[name][rows]).any():
+                continue
+            values = self.quantities[name][rows]
+            third = len(values) // 3
+            first, last = (mean_error(v, self.step) for v in (values[:third], values[-third:]))
+            change, error = abs(last[0] - first[0]), float(np.hypot(first[1], last[1]))
+            limit = self.settings.largest_slip_change
+            if name == "torque":
+                usual = float(np.nanmean(np.abs(values)))
+                limit = self.settings.largest_torque_change * usual
+            if change > limit and not change < _SIGNIFICANT * error:
+                text = f"it is not steady: {name} changes by {change:.2g} in it"
+                return Remark("not-steady", text, (name,), "note")
         return None
-    near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
-    if float(np.nanmedian(np.abs(torque[rows]))) >= near_zero:
-        return None
-    if _slips(step, quantities, rows, near_zero):
-        return None
-    text = "the torque is near zero: the wheel is probably at rest"
-    return Remark("torque-near-zero", text, ("torque",))
 
+    def shortened(self, stretch: Stretch) -> Stretch:
+        """The longest end or beginning of a drifting stretch that is steady, else all of it."""
+        start, stop = stretch.start, stretch.stop
+        length = stop - start
+        for share in (0.8, 0.65, 0.5, 0.35):
+            for a, b in ((stop - share * length, stop), (start, start + share * length)):
+                if b - a >= self.settings.shortest and not self.drift(self.inside(a, b)):
+                    return Stretch(a, b)
+        return stretch
 
-def _slips(
-    step: float, quantities: Mapping[str, Floats], rows: NDArray[np.bool_], near_zero: float
-) -> bool:
-    """Whether a window without torque has a slip of its own: where a wheel begins to brake.
+    def why_at_rest(self, rows: NDArray[np.bool_]) -> Remark | None:
+        """By what the wheel is at rest in a window; None where it turns, or nothing says it."""
+        rim = self.quantities.get("rim_speed", self.quantities.get("speed"))
+        if rim is not None and np.isfinite(rim[rows]).any():
+            usual = float(np.nanpercentile(np.abs(rim), 90))
+            rests = float(np.nanmedian(np.abs(rim[rows]))) < _AT_REST * usual
+            return Remark("at-rest", "the wheel is at rest", severity="note") if rests else None
+        torque = self.quantities.get("torque")
+        if torque is None or not np.isfinite(torque[rows]).any():
+            return None
+        near_zero = _AT_REST * float(np.nanpercentile(np.abs(torque), 90))
+        above = float(np.nanmedian(np.abs(torque[rows]))) >= near_zero
+        if above or self.slips(rows, near_zero):
+            return None
+        text = "the torque is near zero: the wheel is probably at rest"
+        return Remark("torque-near-zero", text, ("torque",))
 
-    It is one that varies little and is not that of the rest with which the log begins.
-    """
-    slip, torque = quantities.get("slip"), quantities["torque"]
-    first = max(3, round(_FIRST / step))
-    if slip is None or not (np.isfinite(slip[:first]).any() and np.isfinite(slip[rows]).any()):
-        return False
-    middle = float(np.nanmedian(slip[rows]))
-    steady = float(np.nanstd(slip[rows])) < 0.5 * abs(middle)
-    rests = np.isfinite(torque[:first]).any() and abs(np.nanmedian(torque[:first])) < near_zero
-    return bool(steady and rests and abs(middle - float(np.nanmedian(slip[:first]))) > _OTHER_SLIP)
+    def slips(self, rows: NDArray[np.bool_], near_zero: float) -> bool:
+        """Whether a window without torque has a slip of its own: where a wheel begins to brake.
+
+        It is one that varies little and is not that of the rest with which the log begins.
+        """
+        slip, torque = self.quantities.get("slip"), self.quantities["torque"]
+        first = max(3, round(_FIRST / self.step))
+        if slip is None or not (np.isfinite(slip[:first]).any() and np.isfinite(slip[rows]).any()):
+            return False
+        middle = float(np.nanmedian(slip[rows]))
+        steady = float(np.nanstd(slip[rows])) < 0.5 * abs(middle)
+        rests = np.isfinite(torque[:first]).any() and abs(np.nanmedian(torque[:first])) < near_zero
+        other = abs(middle - float(np.nanmedian(slip[:first]))) > _OTHER_SLIP
+        return bool(steady and rests and other)
