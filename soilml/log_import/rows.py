@@ -170,7 +170,12 @@ def _exact_speeds(
     )
     interval = max(inputs.intervals.get(role, 0.0) for role in (rim_role, ground_role))
     _, error, rim_rate, ground_rate = travel_ratio(
-        inputs.step, scale * rim, ground, rim_is_place, ground_is_place, interval
+        step=inputs.step,
+        rim=scale * rim,
+        ground=ground,
+        rim_is_place=rim_is_place,
+        ground_is_place=ground_is_place,
+        interval=interval,
     )
     if np.isfinite(rim_rate) and np.isfinite(ground_rate):
         means[rate_key], means["ground_speed"] = rim_rate / scale, ground_rate

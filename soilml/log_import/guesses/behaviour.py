@@ -35,13 +35,13 @@ class Behaviour:
     """
 
     count: int
-    low: float
-    high: float
-    middle: float
-    rising: float
-    constant: bool
-    wraps_at: float
-    travel: float
+    low: float = float("nan")
+    high: float = float("nan")
+    middle: float = float("nan")
+    rising: float = 0.0
+    constant: bool = True
+    wraps_at: float = 0.0
+    travel: float = 0.0
 
     @property
     def size(self) -> float:
@@ -53,7 +53,7 @@ def behaviour(values: Floats) -> Behaviour:
     """Describe a column (n,)."""
     own = values[np.isfinite(values)]
     if own.size < 2:
-        return Behaviour(own.size, np.nan, np.nan, np.nan, 0.0, True, 0.0, 0.0)
+        return Behaviour(count=own.size)
     steps = np.diff(own)
     low, middle, high = (float(v) for v in np.percentile(own, [1, 50, 99]))
     moved = steps[steps != 0.0]
@@ -63,14 +63,14 @@ def behaviour(values: Floats) -> Behaviour:
     total = float(changes.sum())
     is_step = total > 0.0 and float(changes.max()) > 0.5 * total
     return Behaviour(
-        own.size,
-        low,
-        high,
-        middle,
-        float(np.mean(moved > 0.0)) if moved.size else 0.0,
-        float(np.ptp(own)) == 0.0,
-        _wrap(own, steps),
-        abs(float(places[-1] - places[0])) / total if total and not is_step else 0.0,
+        count=own.size,
+        low=low,
+        high=high,
+        middle=middle,
+        rising=float(np.mean(moved > 0.0)) if moved.size else 0.0,
+        constant=float(np.ptp(own)) == 0.0,
+        wraps_at=_wrap(own, steps),
+        travel=abs(float(places[-1] - places[0])) / total if total and not is_step else 0.0,
     )
 
 

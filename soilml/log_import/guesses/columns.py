@@ -11,7 +11,7 @@ from pathlib import Path
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
 from soilml.log_import.mapping.channel_map import ROLES
-from soilml.log_import.recording import Recording
+from soilml.log_import.recording import Floats, Recording
 from soilml.log_import.units import dimension, is_raw_signal, spelling, unit_in_name
 from soilml.optional_imports import tomllib
 
@@ -39,6 +39,11 @@ _ALSO = {
 }
 #: Roles that a sensor may show in volts or counts, which need the calibration of the sensor.
 CALIBRATED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "position")
+#: Roles and units of which the unit alone, without a name, makes a column a candidate.
+_UNIT_SUFFICES = {
+    ("torque", "N m"), ("motor_current", "A"), ("wheel_speed", "rad/s"), ("ground_speed", "m/s"),
+    ("position", "m"), ("load", "N"), ("wheel_angle", "count"),
+}  # fmt: skip
 #: Score from which a name says the role whatever the topic is called.
 _CLEAR = 4.0
 #: Most columns of text that are listed.
@@ -126,45 +131,35 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
             scores[role] = score - _CLEAR  # fx of /force_torque is a force
         elif own_score >= _CLEAR or role not in scores:
             scores[role] = max(own_score, score)
-    found = {
-        role: total
-        for role in (*ROLES, "time")
-        if (total := _score(role, scores.get(role, 0.0), kind, unit, own, recording, name)) > 0.0
-    }
     topic_named = recording.name.startswith("/") or ambiguous
     address = f"{recording.name}:{name}" if topic_named and recording.name else name
-    return Candidate(address, name, unit, kind, own, found)
+    column = Candidate(address=address, name=name, unit=unit, kind=kind, about=own, scores={})
+    totals = {r: _score(column, r, scores.get(r, 0.0), values) for r in (*ROLES, "time")}
+    return replace(column, scores={role: total for role, total in totals.items() if total > 0.0})
 
 
-def _score(
-    role: str,
-    score: float,
-    kind: str | None,
-    unit: str,
-    own: Behaviour,
-    recording: Recording,
-    name: str,
-) -> float:
-    """How well a column fits a role; 0 or less where it does not."""
+def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
+    """How well a column fits a role; 0 or less where it does not. `score` is that of its name."""
+    own, kind = column.about, column.kind
     if own.count < 2:
         return 0.0
     if role == "time":
         if kind not in (None, "s"):
             return 0.0
-        even = looks_like_time(recording.columns[name], score > 0.0)
+        even = looks_like_time(values, score > 0.0)
         return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
     wanted = (ROLES[role][0], *_ALSO.get(role, ()))
-    if is_raw_signal(unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
+    if is_raw_signal(column.unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
         kind = None  # the name decides
     if kind is not None:
         if kind not in wanted and not (kind == "1" and role == "slip"):
             return 0.0
         if kind == "1" and role == "motor_current" and score < _CLEAR:
             return 0.0  # i in per cent is a slip
-        if kind == "1" and role != "slip" and spelling(unit) != "percent":
+        if kind == "1" and role != "slip" and spelling(column.unit) != "percent":
             return 0.0
         score += 2.5 if kind not in ("1",) else 2.0 if role == "slip" and score > 0.0 else 1.0
-        if score <= 2.5 and not _unit_suffices(role, kind):
+        if score <= 2.5 and (role, kind) not in _UNIT_SUFFICES:
             return 0.0
     if score <= 0.0:
         return 0.0
@@ -182,22 +177,9 @@ def _score(
         score -= 1.5  # a pull varies with slip
     if role == "slip" and kind is None and own.size > 150.0:
         score -= 4.0
-    if role == "time" or words_of(name)[:1] == ["std"]:
+    if words_of(column.name)[:1] == ["std"]:
         score -= 3.0
     return score
-
-
-def _unit_suffices(role: str, kind: str) -> bool:
-    """Whether a unit alone, without a name, makes a column a candidate."""
-    return (role, kind) in (
-        ("torque", "N m"),
-        ("motor_current", "A"),
-        ("wheel_speed", "rad/s"),
-        ("ground_speed", "m/s"),
-        ("position", "m"),
-        ("load", "N"),
-        ("wheel_angle", "count"),
-    )
 
 
 def liveliest(runs: Sequence[Run]) -> Run:

@@ -50,16 +50,18 @@ def take_windows(settings: Settings) -> WindowSettings:
             settings.fail(f"within is {given!r}; needed is {needed}")
         within = (float(given[0]), float(given[1]))
     found = WindowSettings(
-        take_uncertain(settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0).value,
-        take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
-        settings.number("sensitivity", usual.sensitivity),
-        take_uncertain(
+        shortest=take_uncertain(
+            settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0
+        ).value,
+        settle=take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
+        sensitivity=settings.number("sensitivity", usual.sensitivity),
+        largest_slip_change=take_uncertain(
             settings, "largest_slip_change", "1", Uncertain(usual.largest_slip_change)
         ).value,
-        take_uncertain(
+        largest_torque_change=take_uncertain(
             settings, "largest_torque_change", "1", Uncertain(usual.largest_torque_change)
         ).value,
-        within,
+        within=within,
     )
     if not found.sensitivity > 0.0:
         settings.fail("sensitivity must be above zero; 1 is usual, 2 finds smaller changes")
@@ -238,20 +240,20 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     for wheel in wheels:
         _check_wheel(settings, wheel, vehicle)
     return LogMap(
-        source,
-        tuple(wheels),
-        files,
-        time_column,
-        time_unit,
-        rate,
-        run_column,
-        at_reset,
-        each_struct,
-        pause,
-        vehicle,
-        take_windows(settings.table("windows")),
-        tuple(take_left_out(entry) for entry in settings.tables("leave_out")),
-        each_row,
+        source=source,
+        wheels=tuple(wheels),
+        files=files,
+        time_column=time_column,
+        time_unit=time_unit,
+        rate=rate,
+        run_column=run_column,
+        split_at_reset=at_reset,
+        each_struct=each_struct,
+        split_at_pause=pause,
+        vehicle=vehicle,
+        windows=take_windows(settings.table("windows")),
+        left_out=tuple(take_left_out(entry) for entry in settings.tables("leave_out")),
+        each_row=each_row,
     )
 
 
@@ -291,7 +293,14 @@ def _take_files(settings: Settings) -> tuple[FileKind, ...]:
         if "delay" in own:
             delay = take_uncertain(own, "delay", "s").value
         kinds.append(
-            FileKind(name, pattern, clock, delay, own.text("time", ""), own.text("time_unit", ""))
+            FileKind(
+                name=name,
+                pattern=pattern,
+                clock=clock,
+                delay=delay,
+                time_column=own.text("time", ""),
+                time_unit=own.text("time_unit", ""),
+            )
         )
         own.finish()
     return tuple(kinds)

@@ -123,7 +123,9 @@ def find_layout(lines: Sequence[str]) -> TextLayout | None:
     separator, comma, first, _, width = best
     names, units, header = _header(head[:first], separator, width)
     about = tuple(_plain(line) for line in head[:header] if _plain(line))
-    return TextLayout(separator, comma, names, units, first, about)
+    return TextLayout(
+        separator=separator, decimal_comma=comma, names=names, units=units, first=first, about=about
+    )
 
 
 def split_line(line: str, separator: str) -> list[str]:
