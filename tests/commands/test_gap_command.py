@@ -25,12 +25,12 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 from soilml.arrays import Real
-from soilml.physics.effects import EffectCard
+from soilml.physics.effects import Effect, EffectCard
 from soilml.parameters import Parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class CableDrag:
+class CableDrag(Effect):
     """A cable that is dragged along pulls back, the more the wheel slips."""
 
     name: ClassVar[str] = "cable-drag"
