@@ -20,9 +20,9 @@ from soilml.gap.design.planned_readings import expected_readings, joined_reading
 from soilml.gap.design.run_kinds import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.evidence.directions import Signature, effect_signatures
+from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.report.results import as_json_entry
 from soilml.io.read_table import Rows, as_table
-from soilml.numerics.subspaces import project_out
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
@@ -183,10 +183,10 @@ def audit(
         added_runs.append(AddedRun(option.kind, option.text, nameable, gained, cost))
     added_runs.sort(key=lambda run: -len(run.gained) / (run.cost or 1.0))
     return Audit(
-        tuple(sorted(table, key=lambda e: -e.separating_snr)),
-        indistinguishable_classes(signatures, readings.std, jacobian),
-        untestable,
-        tuple(added_runs),
+        effects=tuple(sorted(table, key=lambda e: -e.separating_snr)),
+        classes=indistinguishable_classes(signatures, readings.std, jacobian),
+        untestable=untestable,
+        added_runs=tuple(added_runs),
     )
 
 
@@ -289,17 +289,13 @@ def identifiability(
     if not signatures:
         return []
     columns = _whitened(signatures, std, len(jacobian))
-    projected = project_out(columns, jacobian)
-    signal, residual = np.linalg.norm(columns, axis=0), np.linalg.norm(projected, axis=0)
-    unit = projected / np.maximum(residual, 1e-300)
-    cosine = np.abs(unit.T @ unit)
-    np.fill_diagonal(cosine, 0.0)
+    similar = SignatureSimilarity.beside(jacobian, [s.name for s in signatures], columns)
+    signal, residual = np.linalg.norm(columns, axis=0), similar.norm
     table = []
     for i, s in enumerate(signatures):
-        nearest = np.argsort(-cosine[i])[:LISTED_RIVALS]
+        nearest = np.argsort(-similar.cosine[i])[:LISTED_RIVALS]
         about = effects[s.name].about
         size = about.reference[about.size]
-        sine = np.sqrt(max(0.0, 1.0 - float(cosine[i].max(initial=0.0)) ** 2))
         detectable = float("inf")
         if residual[i] > 1e-6:
             detectable = float((DETECTION_THRESHOLD + POWER_QUANTILE) / residual[i] * size)
@@ -313,9 +309,9 @@ def identifiability(
                 residual_signal=float(residual[i]),
                 absorbed=float(1.0 - (residual[i] / signal[i]) ** 2),
                 rivals=tuple(
-                    Rival(signatures[j].name, float(cosine[i, j])) for j in nearest if j != i
+                    Rival(similar.names[j], float(similar.cosine[i, j])) for j in nearest if j != i
                 ),
-                separating_snr=float(residual[i] * sine),
+                separating_snr=similar.separation(s.name, 1.0)[0],
                 detectable_size=detectable,
             )
         )
@@ -329,10 +325,8 @@ def indistinguishable_classes(
     if not signatures:
         return ()
     columns = _whitened(signatures, std, len(jacobian))
-    projected = project_out(columns, jacobian)
-    norm = np.linalg.norm(projected, axis=0)
-    unit = projected / np.maximum(norm, 1e-300)
-    sine = np.sqrt(np.maximum(0.0, 1.0 - (unit.T @ unit) ** 2))
+    similar = SignatureSimilarity.beside(jacobian, [s.name for s in signatures], columns)
+    norm, sine = similar.norm, np.sqrt(np.maximum(0.0, 1.0 - similar.cosine**2))
     label = list(range(len(signatures)))
     for i in range(len(signatures)):
         for j in range(i):
@@ -361,7 +355,7 @@ def plot_audit(found: Audit, ax: Any) -> Axes:
     left = [e.residual_signal for e in effects]
     apart = [e.separating_snr for e in effects]
     axes.barh(y - 0.19, left, 0.36, color=UNCHANGED, label="that the soil cannot imitate")
-    axes.barh(y + 0.19, apart, 0.36, color=AFTER, label="that tells it from its nearest rival")
+    axes.barh(y + 0.19, apart, 0.36, color=AFTER, label="that separates it from its nearest rival")
     axes.axvline(NAMEABLE_SIGMA, color="black", lw=1.2)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.set_xlim(left=0.0)

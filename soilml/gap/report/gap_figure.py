@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from soilml.errors import InputError
-from soilml.gap.report.results import GapReduction, GapReport
+from soilml.gap.report.results import BeforeAfter, GapReduction, GapReport
 from soilml.report.figure_style import (
     AFTER,
     BEFORE,
@@ -83,16 +83,25 @@ def plot_gap(gap: Mapping[str, GapReduction], ax: Any = None, part: str = "train
     if part not in gap:
         known = ", ".join(gap) or "none: it could not be analysed"
         raise InputError(f"part is {part!r}; this report has {known}")
-    figures = gap[part]
-    pairs = {"all readings": (figures.before, figures.after)}
-    pairs |= {channel_name(k): v for k, v in figures.channels.items()}
-    changed = any(s.before != s.after for s in gap.values())
-    rows = [Bar(k, b, a if changed else math.nan) for k, (b, a) in pairs.items()]
-    values = [v for pair in pairs.values() for v in pair if math.isfinite(v)] or [1.0]
+    rows = _bars(gap[part], any(s.before != s.after for s in gap.values()))
     axes: Axes = take_axes(ax, 1, 1, (5.4, 0.9 + 0.6 * len(rows)))[0, 0]
-    draw_bars(axes, rows, max(values), min(values))
+    draw_bars(axes, rows, *_range(gap[part]))
     axes.set_title(TITLES.get(part, part.replace("_", " ")))
     return axes
+
+
+def _bars(figures: GapReduction, changed: bool) -> list[Bar]:
+    """The rows of a chart: all readings, then each channel."""
+    pairs = {"all readings": BeforeAfter(figures.before, figures.after)}
+    pairs |= {channel_name(name): pair for name, pair in figures.channels.items()}
+    return [Bar(name, b, a if changed else math.nan) for name, (b, a) in pairs.items()]
+
+
+def _range(*reductions: GapReduction) -> tuple[float, float]:
+    """The largest and the smallest finite figure of some reductions."""
+    pairs = [pair for r in reductions for pair in ((r.before, r.after), *r.channels.values())]
+    values = [v for pair in pairs for v in pair if math.isfinite(v)] or [1.0]
+    return max(values), min(values)
 
 
 @dataclass(frozen=True)
@@ -101,25 +110,17 @@ class GapBars:
 
     title: str
     reduction: GapReduction
-    image: str
-    alt: str
+    image: SvgImage
 
 
 def gap_bars(report: GapReport, changed: bool) -> list[GapBars]:
     """One chart for the fitted rows and one for each held-out part, on a common axis."""
-    tables = {}
-    for key, reduction in report.gap.items():
-        pairs = {"all readings": (reduction.before, reduction.after)}
-        pairs |= {channel_name(k): v for k, v in reduction.channels.items()}
-        tables[key] = pairs
-    values = [v for pairs in tables.values() for pair in pairs.values() for v in pair]
-    values = [v for v in values if math.isfinite(v)] or [1.0]
+    most, least = _range(*report.gap.values())
     charts = []
-    for key, pairs in tables.items():
-        rows = [Bar(k, b, a if changed else math.nan) for k, (b, a) in pairs.items()]
-        title = TITLES.get(key, key.replace("_", " "))
-        chart = _bar_chart(rows, max(values), min(values), f"{title}: {_as_text(rows)}")
-        charts.append(GapBars(title, report.gap[key], chart.image, chart.alt))
+    for key, reduction in report.gap.items():
+        rows, title = _bars(reduction, changed), TITLES.get(key, key.replace("_", " "))
+        chart = _bar_chart(rows, most, least, f"{title}: {_as_text(rows)}")
+        charts.append(GapBars(title, reduction, chart))
     return charts
 
 

@@ -53,7 +53,6 @@ def prediction_curves(curves: ReadingsAndPredictions, changed: bool) -> dict[str
         "runs": [_legend_entry(run) for run in runs],
         "of": len(parts),
         "several_loads": len(parts) > len(set(curves.run)),
-        "hidden": bool(curves.held_out.any()),
     }
 
 
@@ -156,10 +155,7 @@ def _plot_run(
         axes.fill_between(slip, low, high, color=run.colour, alpha=0.18, lw=0)
     else:
         axes.vlines(slip, low, high, color=run.colour, alpha=0.3, lw=5)
-    for hidden in (False, True):
-        part = here[curves.held_out[here] == hidden]
-        axes.plot(curves.slip[part], factor * curves.reading[part], run.marker, color=run.colour,
-                  ms=4.6, mew=1.0, mfc="white" if hidden else run.colour)  # fmt: skip
+    axes.plot(slip, factor * curves.reading[here], run.marker, color=run.colour, ms=4.6, mew=1.0)
 
 
 def _plot_residuals(

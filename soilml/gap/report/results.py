@@ -131,7 +131,6 @@ class ReadingsAndPredictions:
     before: Floats
     after: Floats
     after_std: Floats
-    held_out: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.evidence.repeats import overstated_noise_notes
+from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.report.results import (
     CandidateSummary,
     GapReduction,
@@ -35,10 +36,11 @@ from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.verdict.estimates import effect_estimates
-from soilml.numerics.subspaces import project_out
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
+
+Floats = NDArray[np.float64]
 
 #: Outliers that a note lists by name.
 LISTED_OUTLIERS = 6
@@ -272,11 +274,7 @@ def readings_and_predictions(analysis: Analysis, after: Solution) -> ReadingsAnd
         before=analysis.result.soil.prediction,
         after=prediction,
         after_std=np.sqrt(np.maximum(variance, 0.0)),
-        held_out=np.zeros(len(readings), dtype=np.bool_),
     )
-
-
-Floats = NDArray[np.float64]
 
 
 def named_effects(
@@ -294,16 +292,15 @@ def named_effects(
     effects = []
     for name in best.names:
         snr, rival = similarity.separation(name, _size(best.fit, name))
-        estimates = effect_estimates(fit, name)
         effects.append(
             NamedEffect(
-                name,
-                estimates,
-                tuple(sorted(alternatives)),
-                snr,
-                rival,
-                posterior.probability(name),
-                posterior.effect_log_odds(name),
+                name=name,
+                parameters=effect_estimates(fit, name),
+                alternatives=tuple(sorted(alternatives)),
+                separating_snr=snr,
+                nearest_rival=rival,
+                probability=posterior.probability(name),
+                log_odds=posterior.effect_log_odds(name),
             )
         )
     return effects
@@ -315,35 +312,6 @@ def _size(fit: Solution, effect: str) -> float:
         if isinstance(c, EffectCoordinate) and c.effect == effect:
             return float(x)
     return 0.0
-
-
-@dataclass(frozen=True)
-class SignatureSimilarity:
-    """Norms (sigma) and cosines of the catalogue's signatures, with the soil projected out."""
-
-    names: tuple[str, ...]
-    norm: Floats  # (k,)
-    cosine: Floats  # (k, k), absolute, with a zero diagonal
-
-    def separation(self, name: str, size: float) -> tuple[float, str]:
-        """Separating signal-to-noise ratio of an effect at a size, and its nearest rival.
-
-        Norm of the effect's projected signature times the sine of the angle to the nearest
-        rival's, in sigma; `size` is in reference sizes.
-        """
-        if name not in self.names:
-            return 0.0, ""
-        i = self.names.index(name)
-        rival = int(np.argmax(self.cosine[i]))
-        sine = float(np.sqrt(max(0.0, 1.0 - self.cosine[i, rival] ** 2)))
-        return abs(size) * float(self.norm[i]) * sine, self.names[rival]
-
-    def largest_cosine(self, names: Sequence[str]) -> float:
-        """Largest cosine between the signature of one of these effects and that of another."""
-        chosen = np.isin(self.names, names)
-        if not chosen.any() or chosen.all():
-            return 0.0
-        return float(self.cosine[chosen][:, ~chosen].max())
 
 
 def signature_similarity(
@@ -359,9 +327,5 @@ def signature_similarity(
     case = problem.case.with_values(soil)
     signatures, _ = effect_signatures(case, problem.readings, problem.effects)
     columns = whiten @ np.stack([s.column for s in signatures], axis=1)
-    columns = project_out(columns, whiten @ fit.derivatives[:, : len(problem.soil)])
-    norm = np.linalg.norm(columns, axis=0)
-    unit = columns / np.where(norm > 0, norm, 1.0)
-    cosine = np.abs(unit.T @ unit)
-    np.fill_diagonal(cosine, 0.0)
-    return SignatureSimilarity(tuple(s.name for s in signatures), norm, cosine)
+    space = whiten @ fit.derivatives[:, : len(problem.soil)]
+    return SignatureSimilarity.beside(space, [s.name for s in signatures], columns)

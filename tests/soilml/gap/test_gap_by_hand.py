@@ -16,9 +16,10 @@ from soilml.gap.evidence.directions import SECANT_STEP, Signature, effect_signat
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
 from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
 from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.search.explanation import EFFECT_PENALTY
 from soilml.gap.search.screening import free_law_gains, noise_only_gains, predicted_gains
-from soilml.gap.verdict.entries import SignatureSimilarity, named_effects, signature_similarity
+from soilml.gap.verdict.entries import named_effects, signature_similarity
 from soilml.gap.verdict.estimates import (
     PRIOR_HALF_WIDTH,
     effect_estimates,

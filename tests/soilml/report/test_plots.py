@@ -146,7 +146,7 @@ def of_plates_and_shear(case):
         (rover, (2, 2), "steepest slope, degrees"),
         (imported, (1,), "torque / (load × radius)"),
         (comparison, (2, 2), "friction angle"),
-        (audited, (), "that tells it from its nearest rival"),
+        (audited, (), "that separates it from its nearest rival"),
         (advised, (3,), "shear modulus: now 100%"),
         (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],

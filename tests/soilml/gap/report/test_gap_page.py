@@ -106,7 +106,6 @@ def curves(runs=8, channels=("torque_Nm", "drawbar_pull_N", "sinkage_m"), slips=
         before=0.9 * true,
         after=true,
         after_std=np.full(true.size, 0.05),
-        held_out=np.zeros(true.size, dtype=bool),
     )
 
 
@@ -287,7 +286,7 @@ def test_an_unchanged_gap_is_shown_once():
 def test_non_finite_figures_are_rendered():
     nan, inf = float("nan"), float("inf")
     c = curves(channels=("sinkage_m",), slips=1)
-    c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan), held_out=c.load > 60.0)
+    c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan))
     odd = GapReduction(inf, nan, {"sinkage_m": (nan, 0.0)}, 0, "")
     old = {"n": EstimatedValue(nan, nan, "1"), "kphi": EstimatedValue(0.0, inf, "N/m^(n+2)")}
     whole = report(curves=c, gap={"train": odd}, soil_before=old, soil_after=old, p_residual=nan)

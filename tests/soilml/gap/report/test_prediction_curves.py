@@ -26,7 +26,6 @@ def curves(load, run):
         before=load * slip,
         after=load * slip,
         after_std=np.ones(slip.size),
-        held_out=np.zeros(slip.size, dtype=np.bool_),
     )
 
 
