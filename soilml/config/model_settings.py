@@ -24,7 +24,7 @@ from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTe
 UNNAMED_GEAR = "gear"
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
-#: Kinds of tests; the key of the measured quantity tells which one a table is.
+#: Kinds of tests; the key of the measured quantity identifies the kind.
 _TEST_KINDS: tuple[type[SoilTest], ...] = (PlatePressure, ShearStrength)
 _GEAR_NAME = re.compile(r"[A-Za-z0-9_-]+")
 

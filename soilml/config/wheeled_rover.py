@@ -121,7 +121,7 @@ class WheeledRover:
     def pass_numbers(self, width: Mapping[str, float]) -> dict[str, int]:
         """Pass of each wheel: 1, and 1 more for each wheel ahead of it whose rut it runs in.
 
-        `width` (m) of each wheel tells which ruts overlap.
+        Ruts overlap by the `width` (m) of each wheel.
         """
         return {
             name: 1

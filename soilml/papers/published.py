@@ -1,4 +1,4 @@
-"""A printed number, and its comparison with the computed one."""
+"""The source papers, the numbers that they print, and their comparison with the computed ones."""
 
 from __future__ import annotations
 
@@ -10,7 +10,36 @@ from dataclasses import dataclass
 from importlib import resources
 
 from soilml.errors import InputError
-from soilml.papers.catalogue import PAPERS, chapters
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Title of a paper, and its chapters where they differ from the paper's own name.
+
+    Each chapter is a pair CHAPTER.csv and CHAPTER.py in this folder.
+    """
+
+    title: str
+    chapters: tuple[str, ...] = ()
+
+
+#: By the name that `soilml papers` takes.
+PAPERS: dict[str, Paper] = {
+    "nagatani2009": Paper("Nagatani, Ikeda, Sato and Yoshida 2009: a wheel with force sensors"),
+    "nagatani_climbing": Paper("Nagatani et al.: online estimation of climbing ability"),
+    "wang2018": Paper("Wang, Yan and Du 2018: a tracked robot's mobility"),
+    "comin2017": Paper(
+        "Comin and Saaj 2017: slip and soil from multi-legged wheel-legs",
+        ("comin2017_terradynamics", "comin2017_slip"),
+    ),
+    "xue2016": Paper("Xue et al. 2016: LS-SVM for the shearing parameters of lunar soil"),
+}
+
+
+def chapters(name: str) -> tuple[str, ...]:
+    """The chapters of a paper: its own name if it does not list any."""
+    return PAPERS[name].chapters or (name,)
+
 
 #: Columns of the CSV file of a chapter.
 COLUMNS = ("key", "what", "source", "unit", "published", "tolerance", "reason")
@@ -54,21 +83,16 @@ class Comparison:
 
     row: PrintedNumber
     computed: float
-    holds: bool
+    reproduced: bool
 
     @property
     def verdict(self) -> str:
         """yes, known, NO, given or not computed: see `soilml papers --help`."""
-        if self.holds:
+        if self.reproduced:
             return "given" if self.row.is_input else "yes"
         if not self.row.reason:
             return "NO"
         return "not computed" if math.isnan(self.computed) else "known"
-
-    @property
-    def is_consistent(self) -> bool:
-        """Whether the number is reproduced and has no reason, or is not and has one."""
-        return self.holds != bool(self.row.reason)
 
 
 def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:

@@ -8,8 +8,7 @@ from importlib import resources
 import pytest
 
 from soilml.cli import main
-from soilml.papers.catalogue import PAPERS, chapters
-from soilml.papers.published import COLUMNS, printed_numbers
+from soilml.papers.published import COLUMNS, PAPERS, chapters, printed_numbers
 
 ROWS = list(printed_numbers())
 CHAPTERS = [chapter for name in PAPERS for chapter in chapters(name)]
@@ -19,7 +18,7 @@ CHAPTERS = [chapter for name in PAPERS for chapter in chapters(name)]
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.paper}-{row.key}")
 def test_a_printed_number_is_reproduced_or_has_a_reason(row):
     found = row.compare()
-    assert found.is_consistent, (
+    assert found.reproduced != bool(found.row.reason), (
         f"{row.what}: printed {row.published} {row.unit}, computed {found.computed}, allowed "
         f"{row.allowed}, reason {row.reason!r}"
     )

@@ -9,7 +9,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import add_output
-from soilml.papers.catalogue import PAPERS
+from soilml.papers.published import PAPERS
 
 if TYPE_CHECKING:
     from soilml.papers.published import Comparison
@@ -76,7 +76,6 @@ def run(args: argparse.Namespace) -> int:
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it, then what the table omits."""
     from soilml.io.text_tables import format_table
-    from soilml.papers.catalogue import PAPERS
 
     rows = [c for c in found if every or c.verdict in ("yes", "known", "NO")]
     notes = list(dict.fromkeys(c.row.reason for c in rows if c.row.reason))

@@ -203,7 +203,7 @@ def _fit(
         )
         warnings.append(Remark("excess-residuals", text))
     if slopes == 1:
-        text = "only one slope: that the parameters hold on other slopes is not checked"
+        text = "only one slope: whether the parameters apply on other slopes is not checked"
         warnings.append(Remark("one-slope", text))
     warnings += [
         Remark(

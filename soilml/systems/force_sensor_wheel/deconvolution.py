@@ -12,9 +12,10 @@ from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfi
 
 #: Fewest bins that show a shape of seven numbers.
 LEAST_BINS = 12
-#: ln of the two bends and of the exponent where the search begins, and how firmly it is held there:
-#: where a bin's noise is this share of the largest stress, one unit weighs as much as one bin.
-USUAL, HOLD = np.asarray([0.4, 0.4, 0.0]), 1e-3
+#: ln of the two exponents a and of n where the search begins, and the weight with which the fit is
+#: regularised towards them: where a bin's noise is this share of the largest stress, a deviation of
+#: one weighs as much as one bin.
+START_SHAPE, SHAPE_WEIGHT = np.asarray([0.4, 0.4, 0.0]), 1e-3
 #: Points across the diameter of a sensor.
 CHORDS = 24
 STEPS, LONGEST_STEP = 60, 0.2
@@ -74,10 +75,10 @@ def fit_stress_arc(
 
     def misfit(x: Floats) -> Floats:
         mean, scale = size(x)
-        return np.concatenate([(scale * mean - seen) / most, HOLD * (x[3:] - USUAL)])
+        return np.concatenate([(scale * mean - seen) / most, SHAPE_WEIGHT * (x[3:] - START_SHAPE)])
 
     if start is None:
-        start = np.concatenate([[angle[0], angle[-1], angle @ seen / seen.sum()], USUAL])
+        start = np.concatenate([[angle[0], angle[-1], angle @ seen / seen.sum()], START_SHAPE])
     reach = wheel.diameter / wheel.radius
     x = _descended(misfit, start[:6], angle[0] - reach, angle[-1] + reach)
     off = float(np.sqrt(np.mean(misfit(x)[: len(seen)] ** 2)))
