@@ -189,7 +189,7 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
         low=np.asarray([min(_quantile(residual[piece], 0.05), 0.0) for piece in pieces]),
         high=np.asarray([max(_quantile(residual[piece], 0.95), 0.0) for piece in pieces]),
     )
-    # an interval that holds its mean, and is interpolated between bins, holds more than 90 %
+    # an interval that contains its mean, and is interpolated between bins, covers more than 90 %
     factor = _reach(rule, truth, fused, scale * spread)
     return replace(rule, low=factor * rule.low, high=factor * rule.high)
 
@@ -205,7 +205,7 @@ def _with_repeats(
 
 
 def _reach(rule: JointErrors, truth: Floats, mean: Floats, std: Floats) -> float:
-    """Factor on a rule's interval with which it holds 90 % of the true values (n,)."""
+    """Factor on a rule's interval with which it covers 90 % of the true values (n,)."""
     low, high = rule.interval(mean, std)
     side = np.where(truth < mean, mean - low, high - mean)
     return _quantile(np.abs(truth - mean) / np.maximum(side, 1e-9 * std), 0.9)

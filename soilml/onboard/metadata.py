@@ -1,7 +1,7 @@
 """What the runtime reads from the metadata of a model file.
 
-A checksum can be made anew by whoever changes a file: it tells damage, and nothing of what a file
-says. Hence every entry that is shown or computed with is checked here, once for all that read it.
+A checksum can be made anew by whoever changes a file: it shows damage, not whether a file is right.
+Hence every entry that is shown or computed with is checked here, once for all that read it.
 """
 
 from __future__ import annotations

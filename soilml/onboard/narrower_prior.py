@@ -17,8 +17,8 @@ POINTS = 2048
 REACH, ENTRIES = 8.0, 4001
 #: Fractions below the ends of the 90 % interval.
 INTERVAL = (0.05, 0.95)
-#: Standard deviation, in widths of the prior, of what the readings tell of a quantity where they
-#: tell nothing.
+#: Standard deviation, in widths of the prior, of the likelihood of a quantity that the readings do
+#: not determine.
 NO_INFORMATION = 20.0
 #: Share of the estimate in the box below which the readings contradict it.
 LEAST_MASS = 1e-4
@@ -115,7 +115,7 @@ def within_box(
 ) -> BoxMoments:
     r"""Moments and 90 % interval of q quantities of which a narrower uniform prior is known.
 
-    What the readings tell is taken as normal: the estimate's precision less that of its uniform
+    The likelihood is taken as normal: the estimate's precision less that of its uniform
     prior. Cut to the prior it should give the estimate back; the difference, which stems from an
     estimate that is not normal, is carried over to the cut by the box.
 
@@ -152,7 +152,7 @@ def within_box(
 def _without_prior(
     mean: Floats, covariance: Floats, lower: Floats, upper: Floats
 ) -> tuple[Floats, Floats]:
-    """Mean and covariance of what the readings alone tell, as if it were normal."""
+    """Mean and covariance of the likelihood, as if it were normal."""
     width = upper - lower
     scaled = covariance / np.outer(width, width)
     precision = np.linalg.inv(scaled)

@@ -1,14 +1,18 @@
-"""What is refused before a file's checksums are compared."""
+"""Model files as they are opened: names, sizes, and files that refer to others."""
 
+import hashlib
 import os
 
 import onnx
 import pytest
 from compiled_c import ROOT
+from onnx.external_data_helper import set_external_data
 
 import soilml.onboard.model_file as model_file
 from soilml import Estimator
 from soilml.errors import ModelFileError
+from soilml.onboard.model_file import metadata_checksum, refers_to_files, serialise_metadata
+from soilml.onboard.set_contract import INTERFACE
 
 WHEEL = ROOT / "exported" / "wheel_linear.onnx"
 
@@ -42,3 +46,100 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
     with (tmp_path / "m.onnx").open("wb") as opened:
         opened.truncate((4 << 20) + 1)
     assert "has 4 MB; a model file has at most 3 MB" in message(tmp_path / "m.onnx")
+
+
+def signed_again(model):
+    """The bytes of a model with the checksums of what it is now."""
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    del model.metadata_props[:]
+    graph = model.SerializeToString(deterministic=True)
+    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
+    return graph + serialise_metadata(metadata)
+
+
+def test_weights_in_another_file_are_refused(small_model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    model = onnx.load(small_model)
+    tensor = max(model.graph.initializer, key=lambda tensor: len(tensor.raw_data))
+    (tmp_path / "weights").write_bytes(tensor.raw_data)
+    assert not refers_to_files(signed_again(onnx.load(small_model)))
+    set_external_data(tensor, "weights")
+    tensor.ClearField("raw_data")
+    content = signed_again(model)
+    assert refers_to_files(content)
+    (tmp_path / "m.onnx").write_bytes(content)
+    with pytest.raises(ModelFileError, match="weights in other files"):
+        Estimator.load("m.onnx")
+
+
+def test_tensors_are_found_wherever_the_format_has_them():
+    outside = onnx.TensorProto(data_location=onnx.TensorProto.EXTERNAL)
+    inside = onnx.TensorProto(float_data=[1.0, 2.0], name="inside")
+
+    def graph(tensor):
+        return onnx.GraphProto(name="g", initializer=[tensor])
+
+    def model(tensor):
+        attributes = [
+            onnx.AttributeProto(name="a", t=tensor),
+            onnx.AttributeProto(name="a", tensors=[inside, tensor]),
+            onnx.AttributeProto(name="a", g=graph(tensor)),
+            onnx.AttributeProto(name="a", graphs=[graph(inside), graph(tensor)]),
+            onnx.AttributeProto(name="a", sparse_tensor=onnx.SparseTensorProto(values=tensor)),
+        ]
+        nodes = [onnx.NodeProto(op_type="Constant", attribute=[a]) for a in attributes]
+        yield onnx.ModelProto(graph=graph(tensor))
+        sparse = [onnx.SparseTensorProto(values=inside, indices=tensor)]
+        yield onnx.ModelProto(graph=onnx.GraphProto(sparse_initializer=sparse))
+        for node in nodes:
+            yield onnx.ModelProto(graph=onnx.GraphProto(node=[node]))
+            yield onnx.ModelProto(functions=[onnx.FunctionProto(name="f", node=[node])])
+
+    for found in model(outside):
+        assert refers_to_files(found.SerializeToString())
+    for found in model(inside):
+        assert not refers_to_files(found.SerializeToString())
+
+
+@pytest.mark.parametrize("number", [b"\x71" + b"\xff" * 8, b"\x75" + b"\xff" * 4])
+def test_numbers_of_eight_and_of_four_bytes_are_passed_over(number):
+    """Field 14, which ONNX does not have, before the graph."""
+    outside = onnx.TensorProto(data_location=onnx.TensorProto.EXTERNAL)
+    model = onnx.ModelProto(graph=onnx.GraphProto(initializer=[outside]))
+    assert refers_to_files(number + model.SerializeToString())
+    assert not refers_to_files(number + onnx.ModelProto(producer_name="p").SerializeToString())
+    with pytest.raises(ValueError, match="ends early"):
+        refers_to_files(number[:-1])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\x3a",
+        b"\x3a" + b"\xff" * 10 + b"\x01",
+        b"\x3a\x05abc",
+        b"\x0b\x0c",
+        b"\x38\x01",
+        b"\xff" * 12,
+    ],
+)
+def test_what_is_no_model_is_an_error(content):
+    with pytest.raises(ValueError):
+        refers_to_files(content)
+
+
+@pytest.mark.parametrize(
+    ("interface", "refused"), [("1", False), ("4", False), ("5", True), ("4b", True)]
+)
+def test_a_file_of_a_later_interface_is_refused(small_model, tmp_path, interface, refused):
+    model = onnx.load(small_model)
+    (entry,) = (e for e in model.metadata_props if e.key == "soilml_interface")
+    assert entry.value == INTERFACE == "4"
+    entry.value = interface
+    (tmp_path / "m.onnx").write_bytes(signed_again(model))
+    if refused:
+        with pytest.raises(ModelFileError, match=f"has interface {interface}; this version of"):
+            Estimator.load(tmp_path / "m.onnx")
+    else:
+        assert Estimator.load(tmp_path / "m.onnx").metadata["soilml_interface"] == interface
